@@ -1,0 +1,94 @@
+"""The physical chain: a base position, then joints and links in turn. It knows no search."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from armwright.exceptions import ArmError
+
+JointKind = Literal["revolute", "prismatic", "fixed"]
+Axis = Literal["x", "y", "z"]
+Vector = tuple[float, float, float]
+
+AXES: tuple[Axis, ...] = ("x", "y", "z")
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One joint about (revolute) or along (prismatic) a local axis.
+
+    lower, upper: the limits [rad] or [m]; a fixed joint has none and does not move.
+    """
+
+    kind: JointKind
+    axis: Axis
+    lower: float = 0.0
+    upper: float = 0.0
+
+    def __post_init__(self) -> None:
+        unit = "m" if self.kind == "prismatic" else "rad"
+        if not (math.isfinite(self.lower) and math.isfinite(self.upper)):
+            raise ArmError(f"joint limits must be finite: [{self.lower}, {self.upper}] {unit}")
+        if self.kind != "fixed" and not self.lower < self.upper:
+            raise ArmError(
+                f"joint limits are upside down: lower < upper is needed, not {self.lower} and {self.upper} {unit}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """The rigid body after a joint, in the frame that the joint moves.
+
+    offset: from this joint to the next, or to the tip of the arm [m].
+    mass: [kg].  com: centre of mass from this joint [m].  radius: of its round section [m].
+    """
+
+    offset: Vector
+    mass: float
+    com: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        values = (*self.offset, *self.com, self.mass, self.radius)
+        if not all(math.isfinite(v) for v in values):
+            raise ArmError(f"a link's numbers must be finite: {self}")
+        if self.mass < 0.0 or self.radius <= 0.0:
+            raise ArmError(f"a link needs mass >= 0 kg and radius > 0 m, not {self.mass} kg and {self.radius} m")
+
+    @property
+    def length(self) -> float:
+        """From this joint to the next [m]."""
+        return math.hypot(*self.offset)
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """A serial arm. With all joints at 0 every local frame stands parallel to the world's.
+
+    base: the first joint's position in the world [m].
+    joints, links: joint j moves link j and all that follows it.
+    """
+
+    base: Vector
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...]
+
+    def __post_init__(self) -> None:
+        if not self.joints or len(self.joints) != len(self.links):
+            raise ArmError(
+                f"an arm needs as many links as joints, at least one: {len(self.joints)} joints, {len(self.links)} links"
+            )
+        if not all(math.isfinite(v) for v in self.base):
+            raise ArmError(f"the base position must be finite: {self.base} m")
+
+    @property
+    def reach(self) -> float:
+        """The longest distance from the first joint that the tip could have [m]."""
+        strokes = sum(max(abs(j.lower), abs(j.upper)) for j in self.joints if j.kind == "prismatic")
+        return strokes + sum(link.length for link in self.links)
+
+
+def uniform_link(offset: Vector, mass: float, radius: float) -> Link:
+    """A link of uniform density: its centre of mass lies half way along `offset` [m]."""
+    x, y, z = offset
+    return Link(offset=offset, mass=mass, com=(x / 2, y / 2, z / 2), radius=radius)

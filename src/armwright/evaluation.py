@@ -1,0 +1,54 @@
+"""What the physics says of an arm at its targets: no preference, no sums."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arm import Arm
+from armwright.kinematics.arrays import stack_arms
+from armwright.kinematics.solve import solve_postures
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """N arms of J joints at T targets."""
+
+    targets: Array  # (T, 3) [m]
+    q: Array  # (N, T, J) kept joint angles [rad]; 0 for a fixed joint
+    reached: Array  # (N, T, 3) position of the tip [m]
+    position_error: Array  # (N, T) distance from the target [m]
+    joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m]; 0 for a fixed joint
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def __getitem__(self, rows: slice) -> "Evaluation":
+        return Evaluation(
+            self.targets, self.q[rows], self.reached[rows], self.position_error[rows], self.joint_torques[rows]
+        )
+
+
+def evaluate(arms: Sequence[Arm], targets: Array) -> Evaluation:
+    """Every arm at every target. Not reaching a target is a result, never an exception.
+
+    targets: (T, 3) [m].
+    """
+    arrays = stack_arms(arms)
+    postures = solve_postures(arrays, targets)
+    reached = postures.reached.astype(np.float64)
+    moving = list(arrays.joint_numbers)
+    q = np.zeros((len(arms), len(targets), arrays.n_joints))
+    torques = np.zeros_like(q)
+    q[..., moving] = postures.q
+    torques[..., moving] = postures.torque
+    return Evaluation(
+        targets=targets,
+        q=q,
+        reached=reached,
+        position_error=np.linalg.norm(reached - targets, axis=-1),
+        joint_torques=torques,
+    )

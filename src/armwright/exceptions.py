@@ -1,0 +1,91 @@
+"""Every error that armwright raises on purpose.
+
+    ArmwrightError
+    ├── UsageError              what was asked cannot be done as asked      (exit code 2)
+    │   ├── TaskError           a task's name, file or targets
+    │   ├── SpaceError          a design space's file or ranges
+    │   ├── DesignError         parameter values that are not in their design space
+    │   ├── ArmError            a chain that cannot exist, or that the kernels cannot compute yet
+    │   ├── SettingsError       the settings of a run
+    │   └── RunConflictError    the run folder holds a run with other settings
+    └── FailureError            something broke on the way                  (exit code 1)
+        ├── RunFolderError      a run folder that cannot be written, or whose content is damaged
+        ├── ModelError          a language model that cannot be used
+        ├── ProposalFault       a proposer gave no design; the trial becomes a black-box one
+        └── MissingExtraError   an optional dependency that is not installed
+
+A message is one line in the user's words: it names the value with its unit, what is allowed, and the
+way out.
+"""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class ArmwrightError(Exception):
+    """The base of all errors that armwright raises on purpose."""
+
+    exit_code = 1
+
+
+class UsageError(ArmwrightError):
+    """What was asked cannot be done as asked."""
+
+    exit_code = 2
+
+
+class TaskError(UsageError):
+    """A task's name, file or targets."""
+
+
+class SpaceError(UsageError):
+    """A design space's file or ranges."""
+
+
+class DesignError(UsageError):
+    """Parameter values that are not in their design space."""
+
+
+class ArmError(UsageError):
+    """A chain that cannot exist, or that the kernels cannot compute yet."""
+
+
+class SettingsError(UsageError):
+    """The settings of a run."""
+
+
+class RunConflictError(UsageError):
+    """The run folder holds a run with other settings."""
+
+
+class FailureError(ArmwrightError):
+    """Something broke on the way."""
+
+
+class RunFolderError(FailureError):
+    """A run folder that cannot be written, or whose content is damaged."""
+
+
+class ModelError(FailureError):
+    """A language model that cannot be used."""
+
+
+class ProposalFault(FailureError):
+    """A proposer gave no design; the trial becomes a black-box one.
+
+    kind: one word for statistics: timeout, connection, refused, …
+    """
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+class MissingExtraError(FailureError):
+    """An optional dependency that is not installed."""
+
+
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """' Did you mean "x"?' for the nearest allowed name, or nothing where none is near."""
+    near = get_close_matches(name, list(allowed), n=1, cutoff=0.6)
+    return f' Did you mean "{near[0]}"?' if near else ""

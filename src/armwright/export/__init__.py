@@ -1,0 +1,1 @@
+"""Arms in the formats of other tools."""

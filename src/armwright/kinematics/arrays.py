@@ -1,0 +1,100 @@
+"""Arms stacked into arrays, as the kernels take them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arm import AXES, Arm, Link
+from armwright.exceptions import ArmError
+
+MOST_JOINTS = 8
+LARGEST_ANGLE = 2 * np.pi  # [rad]
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class ArmArrays:
+    """N arms of D moving joints each. A fixed joint moves nothing: its link is part of the one before it.
+
+    joint_numbers: (D,) places of the moving joints in the arm's own list of joints.
+    """
+
+    base: Floats  # (N, 3) [m]
+    axis: Ints  # (N, D) 0, 1, 2 for local x, y, z
+    lower: Floats  # (N, D) [rad]
+    upper: Floats  # (N, D) [rad]
+    offset: Floats  # (N, D, 3) from a joint to the next [m]
+    com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next [m]
+    mass: Floats  # (N, D) [kg]
+    joint_numbers: tuple[int, ...]
+    n_joints: int
+
+    def __len__(self) -> int:
+        return len(self.base)
+
+    @property
+    def dof(self) -> int:
+        """The number D of moving joints."""
+        return self.axis.shape[1]
+
+
+def stack_arms(arms: Sequence[Arm]) -> ArmArrays:
+    """The arms as arrays. They must share which of their joints are fixed."""
+    if not arms:
+        raise ArmError("no arms were given")
+    kinds = tuple(joint.kind for joint in arms[0].joints)
+    if "prismatic" in kinds:
+        raise ArmError(f"joint {kinds.index('prismatic') + 1} is prismatic; the kernels take revolute and fixed joints")
+    moving = tuple(number for number, kind in enumerate(kinds) if kind == "revolute")
+    if not 1 <= len(moving) <= MOST_JOINTS:
+        raise ArmError(f"the kernels take 1 to {MOST_JOINTS} moving joints, not {len(moving)}")
+    for arm in arms:
+        _check_alike(arm, kinds)
+    rigid = [_rigid_groups(arm, moving) for arm in arms]
+    joints = [[arm.joints[number] for number in moving] for arm in arms]
+    return ArmArrays(
+        base=np.array([base for base, _ in rigid], dtype=np.float32),
+        axis=np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.int32),
+        lower=np.array([[j.lower for j in row] for row in joints], dtype=np.float32),
+        upper=np.array([[j.upper for j in row] for row in joints], dtype=np.float32),
+        offset=np.array([[link.offset for link in links] for _, links in rigid], dtype=np.float32),
+        com=np.array([[link.com for link in links] for _, links in rigid], dtype=np.float32),
+        mass=np.array([[link.mass for link in links] for _, links in rigid], dtype=np.float32),
+        joint_numbers=moving,
+        n_joints=len(kinds),
+    )
+
+
+def _check_alike(arm: Arm, kinds: tuple[str, ...]) -> None:
+    if tuple(joint.kind for joint in arm.joints) != kinds:
+        raise ArmError("arms that are evaluated together must have the same number and kinds of joints")
+    for number, joint in enumerate(arm.joints, start=1):
+        if joint.kind == "revolute" and max(-joint.lower, joint.upper) > LARGEST_ANGLE:
+            raise ArmError(f"joint {number} turns beyond ±2π rad: [{joint.lower:g}, {joint.upper:g}]")
+        if joint.kind == "revolute" and not joint.lower <= 0.0 <= joint.upper:
+            raise ArmError(f"joint {number}: the inverse kinematics starts at 0 rad, which its limits exclude")
+
+
+def _rigid_groups(arm: Arm, moving: tuple[int, ...]) -> tuple[tuple[float, ...], list[Link]]:
+    """The first moving joint's position, and one link for each moving joint with all fixed ones after it."""
+    base = np.array(arm.base)
+    for link in arm.links[: moving[0]]:
+        base = base + link.offset
+    ends = (*moving[1:], len(arm.joints))
+    return tuple(base), [_join(arm.links[start:end]) for start, end in zip(moving, ends, strict=True)]
+
+
+def _join(links: Sequence[Link]) -> Link:
+    if len(links) == 1:
+        return links[0]
+    offset, moment, mass = np.zeros(3), np.zeros(3), 0.0
+    for link in links:
+        moment = moment + link.mass * (offset + link.com)
+        offset = offset + link.offset
+        mass += link.mass
+    com = moment / mass if mass > 0.0 else offset
+    return Link(tuple(offset.tolist()), mass, tuple(com.tolist()), links[0].radius)

@@ -1,0 +1,109 @@
+"""Pareto fronts and hypervolume, all objectives minimised: arrays in, arrays out, on moocore."""
+
+from collections.abc import Sequence
+
+import moocore
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def front_mask(values: Array) -> NDArray[np.bool_]:
+    """(N,) True where no other row of `values` (N, M) is better or equal in all and better in one.
+
+    Of equal rows the first is kept.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if len(values) == 0:
+        return np.zeros(0, dtype=bool)
+    return moocore.is_nondominated(values, keep_weakly=False)
+
+
+def front_numbers(values: Array) -> list[int]:
+    """The rows on the front, by rising first objective."""
+    numbers = np.flatnonzero(front_mask(values))
+    return numbers[np.argsort(values[numbers, 0], kind="stable")].tolist()
+
+
+def hypervolume(values: Array, reference_point: Sequence[float]) -> float:
+    """The area (volume) dominated by `values` (N, M) and bounded by the reference point.
+
+    Points that are not below the reference point in all objectives count nothing.
+    """
+    inside = np.all(values < np.asarray(reference_point), axis=1) if len(values) else np.zeros(0, dtype=bool)
+    if not inside.any():
+        return 0.0
+    return float(moocore.hypervolume(values[inside], ref=list(reference_point)))
+
+
+class FrontTracker:
+    """The front of a growing set of points, one point after the other, and its hypervolume."""
+
+    def __init__(self, n_objectives: int, reference_point: Sequence[float] | None) -> None:
+        self._front = np.empty((0, n_objectives))
+        self._reference_point = reference_point
+        self._hypervolume: float | None = None
+
+    @property
+    def size(self) -> int:
+        """The number of points on the front."""
+        return len(self._front)
+
+    @property
+    def hypervolume(self) -> float | None:
+        """Bounded by the reference point; None as long as there is none."""
+        if self._hypervolume is None and self._reference_point is not None:
+            self._hypervolume = hypervolume(self._front, self._reference_point)
+        return self._hypervolume
+
+    def set_reference_point(self, reference_point: Sequence[float]) -> None:
+        """Bounds the hypervolume from now on."""
+        self._reference_point, self._hypervolume = reference_point, None
+
+    def add(self, point: Sequence[float]) -> None:
+        """One point more."""
+        row = np.asarray(point, dtype=np.float64)
+        if not np.any(np.all(self._front <= row, axis=1)):
+            self._front = np.vstack([self._front[~np.all(row <= self._front, axis=1)], row])
+            self._hypervolume = None
+
+
+def hypervolume_history(values: Array, reference_point: Sequence[float]) -> Array:
+    """(N,) the hypervolume of the first 1, 2, …, N rows of `values` (N, M)."""
+    tracker = FrontTracker(len(reference_point), reference_point)
+    history = np.zeros(len(values))
+    for i, row in enumerate(values):
+        tracker.add(row)
+        history[i] = tracker.hypervolume
+    return history
+
+
+def default_reference_point(values: Array) -> tuple[float, float]:
+    """1.1 times the worst non-dominated values, for a problem that states no reference point."""
+    worst = 1.1 * values[front_mask(values)].max(axis=0)
+    # A value of 0 would leave no area at all.
+    return tuple(np.maximum(worst, 1e-9).tolist())
+
+
+def knee_number(values: Array, reference_point: Sequence[float]) -> int | None:
+    """The row on the front that is farthest below the straight line between its ends within the reference box.
+
+    None where fewer than three designs of the front lie in the box.
+    """
+    numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
+    if len(numbers) < 3:
+        return None
+    front = values[numbers]
+    span = np.ptp(front, axis=0)
+    scaled = (front - front.min(axis=0)) / np.where(span > 0.0, span, 1.0)
+    return numbers[int(np.argmin(scaled.sum(axis=1)))]
+
+
+def solution_numbers(values: Array, reference_point: Sequence[float]) -> tuple[int, int] | None:
+    """Solutions 1 and 2 of the paper's figures: least position error, least torque, within the reference box.
+
+    None where the front lies wholly outside the box.
+    """
+    numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
+    return (numbers[0], numbers[-1]) if numbers else None

@@ -1,0 +1,42 @@
+"""The problem: a design space, a task, and what is minimised."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.arm import Arm
+from armwright.evaluation import Array, Evaluation, evaluate
+from armwright.objectives import PAPER_OBJECTIVES, Objective
+from armwright.space import Design, DesignSpace, paper_space
+from armwright.task import Task
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Which arm of `space` serves `task` best, by `objectives` (position error and torque)."""
+
+    task: Task
+    space: DesignSpace = paper_space()
+    objectives: tuple[Objective, ...] = PAPER_OBJECTIVES
+
+    @property
+    def reference_point(self) -> tuple[float, float] | None:
+        """The worst values that count for the hypervolume, where the task states them."""
+        return self.task.reference_point
+
+    def arm(self, design: Design) -> Arm:
+        """The physical chain that a design builds."""
+        return self.space.arm(design)
+
+    def evaluation(self, designs: Sequence[Design]) -> Evaluation:
+        """The physics of N designs at all targets."""
+        return evaluate([self.arm(design) for design in designs], self.task.points)
+
+    def values(self, evaluation: Evaluation) -> Array:
+        """(N, 2): position error [m] and torque [α-scaled] of evaluated designs; minimised."""
+        return np.column_stack([objective(evaluation) for objective in self.objectives])
+
+    def evaluate(self, designs: Sequence[Design]) -> Array:
+        """(N, 2): position error [m] and torque [α-scaled] of N designs; minimised."""
+        return self.values(self.evaluation(designs))

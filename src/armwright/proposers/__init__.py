@@ -1,0 +1,1 @@
+"""Proposers: where structural ideas come from, one design for every n_step trials."""

@@ -1,0 +1,3 @@
+from armwright.proposers.proposer import *
+class RulesProposer(Proposer):
+    name="rules"

@@ -1,0 +1,376 @@
+"""What a run leaves on disk: written, read and checked here and nowhere else.
+
+    config.yaml        everything needed to repeat the run
+    trials.jsonl       one line a finished trial, flushed before the next begins: the truth
+    transcripts.jsonl  every call to a language model
+    trials.csv, front.csv, summary.json, designs/NNNN/{arm.urdf, design.json}, figures/
+
+Everything below trials.jsonl is made from it and may be deleted.
+"""
+
+import csv
+import io
+import json
+import math
+import os
+import platform
+import shutil
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import yaml
+from filelock import FileLock, Timeout
+from pydantic import BaseModel, ConfigDict, Field
+
+from armwright.documents import parse_document
+from armwright.exceptions import DesignError, RunConflictError, RunFolderError
+from armwright.export.urdf import to_urdf
+from armwright.history import FinishedTrial, History
+from armwright.problem import Problem
+from armwright.proposers.proposer import ProposerSummary
+from armwright.space import DesignSpace
+from armwright.task import Task
+
+CONFIG = "config.yaml"
+TRIALS = "trials.jsonl"
+TRANSCRIPTS = "transcripts.jsonl"
+SUMMARY = "summary.json"
+FIGURES = "figures"
+DESIGNS = "designs"
+PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang")
+PARTS = ("total", "sampling", "evaluation", "proposing")
+
+
+class Method(BaseModel):
+    """How a study searches. proposer: its name and settings; None for black-box trials only."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    proposer: dict[str, Any] | None
+    sampler: str
+    n_init: int = Field(ge=1)
+    n_step: int = Field(ge=1)
+    n_total: int = Field(ge=1)
+
+
+class RunConfig(BaseModel):
+    """Everything needed to repeat a run.
+
+    reference_point: as the task states it, or as frozen after the first n_init trials (None until then).
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    task: Task
+    space: DesignSpace
+    reference_point: tuple[float, float] | None
+    method: Method
+    seed: int
+    versions: dict[str, str]
+
+    @property
+    def problem(self) -> Problem:
+        """The problem of the run."""
+        return Problem(task=self.task, space=self.space)
+
+
+def versions() -> dict[str, str]:
+    """The versions that the numbers of a run depend on."""
+    return {"python": platform.python_version(), **{name: metadata.version(name) for name in PACKAGES}}
+
+
+class RunFolder:
+    """A run folder held for writing by this process alone; a context manager."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = FileLock(path / ".lock")
+        self._trials: io.FileIO | None = None
+
+    def __enter__(self) -> Self:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock.acquire(timeout=0)
+        except Timeout as fault:
+            raise RunFolderError(
+                f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
+            ) from fault
+        except OSError as fault:
+            raise _write_error(self.path, fault) from fault
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        if self._trials is not None:
+            self._trials.close()
+            self._trials = None
+        self._lock.release()
+
+    def adopt(self, config: RunConfig) -> RunConfig:
+        """The folder's configuration: `config` for a new folder or one whose run it extends.
+
+        RunConflictError with the differences where the folder holds a run with other settings.
+        """
+        if (self.path / CONFIG).exists():
+            there = read_config(self.path)
+            _check_same_run(self.path, there, config)
+            config = config.model_copy(update={"reference_point": there.reference_point, "versions": there.versions})
+            if config == there:
+                return there
+        elif (self.path / TRIALS).exists():
+            raise RunFolderError(f"{self.path} holds {TRIALS} but no {CONFIG}; restore it, or give another --out DIR")
+        self.write_config(config)
+        return config
+
+    def write_config(self, config: RunConfig) -> None:
+        """Replaces config.yaml in one step."""
+        self.write_text(CONFIG, yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False, allow_unicode=True))
+
+    def open_trials(self, space: DesignSpace) -> list[FinishedTrial]:
+        """The finished trials; a last line that a crash cut short is dropped. Opens the file for `append`."""
+        path = self.path / TRIALS
+        trials, intact = _read_trials(path, space)
+        try:
+            self._trials = open(path, "ab", buffering=0)  # noqa: SIM115 (closed in __exit__)
+            self._trials.truncate(intact)
+        except OSError as fault:
+            raise _write_error(path, fault) from fault
+        return trials
+
+    def append(self, trial: FinishedTrial) -> None:
+        """Writes one finished trial: a single write, so that a crash leaves a whole line or a cut last one."""
+        assert self._trials is not None, "open_trials comes first"
+        line = (json.dumps(_trial_record(trial)) + "\n").encode()
+        try:
+            written = self._trials.write(line)
+            if written != len(line):
+                raise OSError(28, "No space left on device")
+        except OSError as fault:
+            raise _write_error(self.path / TRIALS, fault) from fault
+
+    def write_text(self, name: str, text: str) -> None:
+        """Replaces a file in one step, so that a crash leaves the old or the new one."""
+        target = self.path / name
+        part = target.with_name(target.name + ".part")
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part.write_text(text, encoding="utf-8", newline="\n")
+            os.replace(part, target)
+        except OSError as fault:
+            raise _write_error(target, fault) from fault
+
+    def write_results(self, history: History, summary: Mapping[str, Any]) -> None:
+        """Writes all that is made from the finished trials; the summary last, as the sign that all is there."""
+        self.write_text("trials.csv", _csv(_trial_rows(history)))
+        on_front = {member.number for member in history.front}
+        self.write_text("front.csv", _csv(row for row in _trial_rows(history) if row["number"] in on_front))
+        self._write_designs(history)
+        self.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
+
+    def _write_designs(self, history: History) -> None:
+        folder = self.path / DESIGNS
+        numbers = [member.number for member in history.front]
+        evaluation = history.evaluation(numbers)
+        for stale in folder.glob("[0-9]*"):
+            if stale.name not in {_design_name(number) for number in numbers}:
+                shutil.rmtree(stale, ignore_errors=True)
+        for row, member in enumerate(history.front):
+            record = {
+                "number": member.number,
+                "source": member.source,
+                "params": dict(member.design.params),
+                "objectives": _objective_record(history, member.values),
+                "masses": history.problem.space.mass_note,
+                "targets": [
+                    {
+                        "target": evaluation.targets[t].tolist(),
+                        "q": evaluation.q[row, t].tolist(),
+                        "reached": evaluation.reached[row, t].tolist(),
+                        "position_error": float(evaluation.position_error[row, t]),
+                        "joint_torques": evaluation.joint_torques[row, t].tolist(),
+                    }
+                    for t in range(len(evaluation.targets))
+                ],
+            }
+            name = f"{DESIGNS}/{_design_name(member.number)}"
+            self.write_text(f"{name}/arm.urdf", to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}"))
+            self.write_text(f"{name}/design.json", json.dumps(record, indent=2) + "\n")
+
+
+def read_config(path: Path) -> RunConfig:
+    """The configuration of a run folder."""
+    file = path / CONFIG
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as fault:
+        raise RunFolderError(f"{path} is not a run folder: cannot read {CONFIG} ({fault})") from fault
+    return parse_document(text, RunConfig, RunFolderError, str(file))
+
+
+def read_run(path: Path) -> tuple[RunConfig, History]:
+    """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
+    config = read_config(path)
+    trials, _ = _read_trials(path / TRIALS, config.space)
+    return config, History(config.problem, trials, config.method.n_init)
+
+
+def read_summary(path: Path) -> dict[str, Any] | None:
+    """summary.json, or None where the run has not ended (or the file is damaged; it can be made again)."""
+    try:
+        summary = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return summary if isinstance(summary, dict) else None
+
+
+def summarize(history: History, config: RunConfig, proposer: ProposerSummary | None) -> dict[str, Any]:
+    """What a run came to, as summary.json says it."""
+    curve = history.hypervolume
+    seconds: Counter[str] = Counter()
+    for trial in history:
+        seconds.update(trial.seconds)
+    faults = Counter(trial.fault for trial in history if trial.fault)
+    return {
+        "task": history.problem.task.name,
+        "seed": config.seed,
+        "n_trials": len(history),
+        "by_source": dict(Counter(trial.source for trial in history)),
+        "hypervolume": {
+            "reference_point": list(history.reference_point or ()),
+            "final": float(curve[-1]) if len(curve) else None,
+            "mean": float(curve.mean()) if len(curve) else None,
+            "history": curve.tolist(),
+        },
+        "front_size": len(history.front),
+        "proposer": None
+        if proposer is None
+        else {
+            "name": proposer.name,
+            "model": proposer.model,
+            "calls": proposer.calls,
+            "failures": dict(faults),
+            "tokens": proposer.tokens,
+            "cost_usd": proposer.cost_usd,
+        },
+        "seconds": {part: round(seconds[part], 6) for part in PARTS},
+        "versions": dict(config.versions),
+    }
+
+
+def _objective_record(history: History, values: Sequence[float]) -> dict[str, float]:
+    return {o.name: value for o, value in zip(history.problem.objectives, values, strict=True)}
+
+
+def _design_name(number: int) -> str:
+    return f"{number:04d}"
+
+
+def _trial_record(trial: FinishedTrial) -> dict[str, Any]:
+    record: dict[str, Any] = {"number": trial.number, "source": trial.source, "proposal": trial.proposal}
+    if trial.fault:
+        record["fault"] = trial.fault
+    record["params"] = dict(trial.design.params)
+    record["values"] = list(trial.values)
+    record["seconds"] = {part: round(value, 6) for part, value in trial.seconds.items()}
+    return record
+
+
+def _read_trials(path: Path, space: DesignSpace) -> tuple[list[FinishedTrial], int]:
+    """The trials of a file, and its length [bytes] without a cut last line."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return [], 0
+    except OSError as fault:
+        raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
+    end = content.rfind(b"\n") + 1
+    trials: list[FinishedTrial] = []
+    for number, line in enumerate(content[:end].splitlines()):
+        try:
+            trials.append(_parse_trial(line, number, space))
+        except (ValueError, KeyError, TypeError, DesignError) as fault:
+            raise RunFolderError(
+                f"{path}, line {number + 1} is damaged ({_words(fault)}); restore the file, or delete this line and "
+                "all after it: the same command then goes on from there"
+            ) from fault
+    return trials, end
+
+
+def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
+    record = json.loads(line)
+    if record["number"] != number:
+        raise ValueError(f"number {record['number']} where {number} is due")
+    values = tuple(float(value) for value in record["values"])
+    if len(values) != 2 or not all(math.isfinite(value) for value in values):
+        raise ValueError(f"values {record['values']} are not two finite numbers")
+    return FinishedTrial(
+        number=number,
+        source=str(record["source"]),
+        design=space.design(record["params"]),
+        values=values,
+        proposal=record["proposal"],
+        fault=record.get("fault"),
+        seconds={str(part): float(value) for part, value in record["seconds"].items()},
+    )
+
+
+def _words(fault: Exception) -> str:
+    return f"{fault} is missing" if isinstance(fault, KeyError) else str(fault)
+
+
+def _trial_rows(history: History) -> Iterable[dict[str, Any]]:
+    for trial in history:
+        yield {
+            "number": trial.number,
+            "source": trial.source,
+            **trial.design.params,
+            **_objective_record(history, trial.values),
+        }
+
+
+def _csv(rows: Iterable[Mapping[str, Any]]) -> str:
+    out = io.StringIO()
+    writer: csv.DictWriter[str] | None = None
+    for row in rows:
+        if writer is None:
+            writer = csv.DictWriter(out, fieldnames=list(row), lineterminator="\n")
+            writer.writeheader()
+        writer.writerow(row)
+    return out.getvalue()
+
+
+def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
+    """RunConflictError where `asked` is another run than the one that lies there; a larger n_total is the same."""
+    old, new = _identity(there), _identity(asked)
+    differences = [f"{key}: {old.get(key)} there, {new.get(key)} asked" for key in {**old, **new} if old.get(key) != new.get(key)]
+    if asked.method.n_total < there.method.n_total:
+        differences.append(f"n_total: {there.method.n_total} there, {asked.method.n_total} asked (it can only grow)")
+    if differences:
+        raise RunConflictError(
+            f"{path} holds a run with other settings ({'; '.join(differences)}). Give another --out DIR, or the same settings"
+        )
+
+
+def _identity(config: RunConfig) -> dict[str, Any]:
+    """What makes a run this run and no other, flat."""
+    content = config.model_dump(mode="json")
+    content["task"] = {key: content["task"][key] for key in ("name", "targets", "reference_point")}
+    del content["versions"], content["reference_point"], content["method"]["n_total"]
+    return _flat(content)
+
+
+def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in content.items():
+        flat.update(_flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {prefix + key: value})
+    return flat
+
+
+def _write_error(path: Path, fault: OSError) -> RunFolderError:
+    return RunFolderError(
+        f"cannot write {path}: {fault.strerror or fault}. What was written before is safe; "
+        "free room or give another --out DIR, and run the same command again"
+    )

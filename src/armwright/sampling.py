@@ -1,0 +1,124 @@
+"""The black box: Optuna asks and is told. The only file that builds Optuna studies and samplers.
+
+A fresh sampler, seeded from (seed, trial number), draws each trial: a resumed sampler with one seed for the
+whole run would repeat its first draws, this one goes on as if it had never stopped.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import optuna
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution
+from optuna.samplers import BaseSampler, RandomSampler, TPESampler
+from optuna.trial import Trial, TrialState, create_trial
+
+from armwright.exceptions import SettingsError, did_you_mean
+from armwright.history import RANDOM, FinishedTrial
+from armwright.seeding import derived_seed
+from armwright.space import Design, DesignSpace, FloatParameter
+
+SamplerFactory = Callable[[int], BaseSampler]
+
+SAMPLING = 1  # the place of its seeds under the run's seed
+
+
+def _tpe(seed: int) -> BaseSampler:
+    return TPESampler(n_startup_trials=10, multivariate=False, constant_liar=False, seed=seed)
+
+
+def _random(seed: int) -> BaseSampler:
+    return RandomSampler(seed=seed)
+
+
+SAMPLERS: dict[str, SamplerFactory] = {"tpe": _tpe, "random": _random}
+
+
+def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
+    """The factory `seed -> Optuna sampler` of a name, or the given one."""
+    if not isinstance(sampler, str):
+        return sampler
+    if sampler not in SAMPLERS:
+        raise SettingsError(f'unknown sampler "{sampler}".{did_you_mean(sampler, SAMPLERS)} Samplers: {", ".join(SAMPLERS)}')
+    return SAMPLERS[sampler]
+
+
+def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:
+    """The space in Optuna's words."""
+    return {
+        p.name: FloatDistribution(p.low, p.high) if isinstance(p, FloatParameter) else CategoricalDistribution(p.choices)
+        for p in space.parameters
+    }
+
+
+class BlackBox:
+    """An in-memory Optuna study over a design space, asked for one trial at a time."""
+
+    def __init__(self, space: DesignSpace, sampler: str | SamplerFactory, seed: int, n_objectives: int = 2) -> None:
+        self._space = space
+        self._factory = sampler_factory(sampler)
+        self._seed = seed
+        self._distributions = distributions(space)
+        self._study = _quiet_study(n_objectives)
+
+    @property
+    def study(self) -> optuna.Study:
+        """Optuna's own object."""
+        return self._study
+
+    def restore(self, trials: Iterable[FinishedTrial]) -> None:
+        """Adds finished trials, as a resumed run finds them on disk."""
+        for trial in trials:
+            self._study.add_trial(
+                create_trial(
+                    params=dict(trial.design.params),
+                    distributions=self._distributions,
+                    values=list(trial.values),
+                    user_attrs=_attributes(trial.source, trial.proposal),
+                )
+            )
+
+    def draw(self, number: int, source: str) -> tuple[Trial, Design]:
+        """The sampler's next design; uniformly random where source is `random`."""
+        seed = derived_seed(self._seed, SAMPLING, number)
+        self._study.sampler = _random(seed) if source == RANDOM else self._factory(seed)
+        trial = self._study.ask(self._distributions)
+        for name, value in _attributes(source, None).items():
+            trial.set_user_attr(name, value)
+        return trial, Design(trial.params)
+
+    def inject(self, design: Design, number: int, source: str, proposal: str) -> Trial:
+        """A trial for a design from elsewhere, which the sampler will learn from."""
+        # Checked here because Optuna takes out-of-range values with only a warning, and leaves a trial with an
+        # unknown category RUNNING for ever.
+        checked = self._space.design(design.params)
+        sampler = self._study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
+        self._study.enqueue_trial(dict(checked.params), user_attrs=_attributes(source, proposal))
+        trial = self._study.ask(self._distributions)
+        # Genetic samplers pass over trials that belong to no generation, and they assign one only to those
+        # whose values they draw themselves.
+        remember = getattr(sampler, "get_trial_generation", None)
+        if remember is not None:
+            remember(self._study, self._study.get_trials(deepcopy=False)[trial.number])
+        return trial
+
+    def tell(self, trial: Trial, values: Iterable[float]) -> None:
+        """The trial's values; from now on the sampler learns from it."""
+        self._study.tell(trial, list(values))
+
+    def abandon(self, trial: Trial) -> None:
+        """Ends a trial that could not be evaluated; the sampler learns nothing from it."""
+        self._study.tell(trial, state=TrialState.FAIL)
+
+
+def _attributes(source: str, proposal: str | None) -> Mapping[str, Any]:
+    return {"source": source} if proposal is None else {"source": source, "proposal": proposal}
+
+
+def _quiet_study(n_objectives: int) -> optuna.Study:
+    # Optuna announces each study at INFO; the user's own verbosity is put back.
+    verbosity = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
+    try:
+        return optuna.create_study(directions=["minimize"] * n_objectives)
+    finally:
+        optuna.logging.set_verbosity(verbosity)

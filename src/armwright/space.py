@@ -1,0 +1,262 @@
+"""The design space: named parameters, and the arm that their values build.
+
+The paper's space (D = 4) is `paper_space()`: the base position O, one of three rotation axes for each
+joint, one length for each link. Every number of it can be changed in a YAML file.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from armwright.arm import Arm, Axis, Joint, uniform_link
+from armwright.documents import read_document
+from armwright.exceptions import DesignError, SpaceError, did_you_mean
+
+JointType = Literal["R", "P", "Y"]
+Range = tuple[float, float]
+ParameterValue = float | str
+
+JOINT_AXES: dict[JointType, Axis] = {"R": "x", "P": "y", "Y": "z"}
+JOINT_WORDS: dict[JointType, str] = {
+    "R": "roll, about local x",
+    "P": "pitch, about local y",
+    "Y": "yaw, about local z, along the link",
+}
+TOY_MASS = 0.1  # [kg] of a whole arm
+LARGEST_LENGTH = 1000.0  # [m]; beyond it float32 kernels lose the millimetre
+
+
+@dataclass(frozen=True, slots=True)
+class FloatParameter:
+    """A real parameter: low <= value <= high, in `unit`."""
+
+    name: str
+    low: float
+    high: float
+    unit: str
+
+    def check(self, value: Any) -> float:
+        """`value` as a float; DesignError where it is not a number within the range."""
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise DesignError(f"{self.name} = {value!r} is not a finite number [{self.unit}]")
+        if not self.low <= value <= self.high:
+            raise DesignError(
+                f"{self.name} = {value:g} {self.unit} is outside {self.low:g} <= {self.name} <= {self.high:g} {self.unit}"
+            )
+        return float(value)
+
+
+@dataclass(frozen=True, slots=True)
+class CategoricalParameter:
+    """A parameter that takes one of a few names."""
+
+    name: str
+    choices: tuple[str, ...]
+
+    def check(self, value: Any) -> str:
+        """`value`; DesignError where it is not one of the choices."""
+        if value not in self.choices:
+            raise DesignError(f"{self.name} = {value!r} is not one of {', '.join(self.choices)}")
+        return value
+
+
+Parameter = FloatParameter | CategoricalParameter
+
+
+@dataclass(frozen=True)
+class Design:
+    """Parameter values: one point of a design space."""
+
+    params: Mapping[str, ParameterValue]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "params", dict(self.params))
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.params.items()))
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """The base position [m]."""
+        return tuple(float(self.params[f"origin_{axis}"]) for axis in "xyz")  # pyright: ignore[reportReturnType]
+
+    @property
+    def joints(self) -> str:
+        """The joint types in order, as one word: `YPRP`."""
+        return "".join(str(value) for name, value in self.params.items() if name.startswith("joint_"))
+
+    @property
+    def links(self) -> tuple[float, ...]:
+        """The link lengths in order [m]."""
+        return tuple(float(value) for name, value in self.params.items() if name.startswith("link_"))
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class MassPerMetre(_Frozen):
+    """Links of one section and material: mass grows with length."""
+
+    kind: Literal["per_metre"] = "per_metre"
+    kg: float = Field(default=0.0121, ge=0.0, le=1e4)
+
+    def mass(self, length: float) -> float:
+        """Of a link of `length` [m], in [kg]."""
+        return self.kg * length
+
+    def words(self) -> str:
+        return f"{self.kg:g} kg per metre of link"
+
+
+class MassPerLink(_Frozen):
+    """Modules of one mass, whatever their length."""
+
+    kind: Literal["per_link"]
+    kg: float = Field(default=0.002, ge=0.0, le=1e4)
+
+    def mass(self, length: float) -> float:
+        """Of any link, in [kg]."""
+        return self.kg
+
+    def words(self) -> str:
+        return f"{self.kg:g} kg for each link, whatever its length"
+
+
+class MassOfTube(_Frozen):
+    """Links cut from a round tube (or bar, where the wall is half the diameter) of a real material."""
+
+    kind: Literal["tube"]
+    density: float = Field(gt=0.0, le=3e4)  # [kg/m³]
+    outer_diameter: float = Field(gt=0.0, le=1.0)  # [m]
+    wall: float = Field(gt=0.0)  # [m]
+
+    @model_validator(mode="after")
+    def _check_wall(self) -> Self:
+        if self.wall > self.outer_diameter / 2:
+            raise ValueError(f"wall = {self.wall:g} m is more than half of outer_diameter = {self.outer_diameter:g} m")
+        return self
+
+    def mass(self, length: float) -> float:
+        """Of a link of `length` [m], in [kg]."""
+        outer = self.outer_diameter / 2
+        inner = outer - self.wall
+        return self.density * math.pi * (outer**2 - inner**2) * length
+
+    def words(self) -> str:
+        return (
+            f"a tube of {self.outer_diameter * 1e3:g} mm outer diameter and {self.wall * 1e3:g} mm wall, "
+            f"{self.density:g} kg/m³ ({self.mass(1.0):.3g} kg per metre)"
+        )
+
+
+MassModel = Annotated[MassPerMetre | MassPerLink | MassOfTube, Field(discriminator="kind")]
+
+
+class DesignSpace(_Frozen):
+    """A serial arm of `joints` revolute joints: base position, joint types and link lengths are searched.
+
+    The first joint sits at the origin O; link j follows joint j along local +z; with all angles 0 the
+    links stand in one vertical line. 2 D + 3 parameters.
+    """
+
+    name: str = Field(default="paper", min_length=1, max_length=100)
+    joints: int = Field(default=4, ge=1, le=8)
+    joint_types: tuple[JointType, ...] = Field(default=("R", "P", "Y"), min_length=1)
+    joint_range: Range = (-2.4, 2.4)  # [rad]
+    origin_x: Range = (-1.0, 1.0)  # [m]
+    origin_y: Range = (-1.0, 1.0)  # [m]
+    origin_z: Range = (-1.0, 1.0)  # [m]
+    link: Range = (0.03, 0.30)  # [m]
+    link_radius: float = Field(default=0.015, gt=0.0, le=1.0)  # [m]
+    mass: MassModel = MassPerMetre()
+
+    @model_validator(mode="after")
+    def _check_ranges(self) -> Self:
+        for name, unit in (("origin_x", "m"), ("origin_y", "m"), ("origin_z", "m"), ("link", "m"), ("joint_range", "rad")):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} is upside down: write the smaller number first")
+            if max(abs(low), abs(high)) > LARGEST_LENGTH:
+                raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} goes beyond ±{LARGEST_LENGTH:g}")
+        if self.link[0] <= 0.0:
+            raise ValueError(f"link = [{self.link[0]:g}, {self.link[1]:g}] m: a link must be longer than 0 m")
+        low, high = self.joint_range
+        if high - low < math.radians(3.0):
+            raise ValueError(f"joint_range = [{low:g}, {high:g}] rad is narrower than 3 degrees; a joint must move")
+        if not low <= 0.0 <= high:
+            raise ValueError(f"joint_range = [{low:g}, {high:g}] rad must hold 0, where the inverse kinematics starts")
+        if len(set(self.joint_types)) != len(self.joint_types):
+            raise ValueError(f"joint_types names a type twice: {', '.join(self.joint_types)}")
+        return self
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters in their fixed order: origin, joint types, link lengths."""
+        origin = [FloatParameter(f"origin_{axis}", *getattr(self, f"origin_{axis}"), "m") for axis in "xyz"]
+        joints = [CategoricalParameter(f"joint_{j}", self.joint_types) for j in range(1, self.joints + 1)]
+        links = [FloatParameter(f"link_{j}", *self.link, "m") for j in range(1, self.joints + 1)]
+        return (*origin, *joints, *links)
+
+    def design(self, params: Mapping[str, Any]) -> Design:
+        """The design with these values, in the space's order; DesignError where they are not in the space."""
+        names = [parameter.name for parameter in self.parameters]
+        for name in params:
+            if name not in names:
+                raise DesignError(f'unknown parameter "{name}". Parameters: {", ".join(names)}.{did_you_mean(name, names)}')
+        missing = [name for name in names if name not in params]
+        if missing:
+            raise DesignError(f"missing: {', '.join(missing)}")
+        return Design({parameter.name: parameter.check(params[parameter.name]) for parameter in self.parameters})
+
+    def clipped(self, origin: Iterable[float], joints: str, links: Iterable[float]) -> Design:
+        """The design of these numbers, each moved into its range."""
+        values = [*origin, *joints, *links]
+        return Design({p.name: _clip(p, value) for p, value in zip(self.parameters, values, strict=True)})
+
+    def sample(self, n: int, seed: int) -> list[Design]:
+        """`n` designs, uniform in every parameter."""
+        rng = np.random.default_rng(seed)
+        return [Design({p.name: _draw(p, rng) for p in self.parameters}) for _ in range(n)]
+
+    @property
+    def mass_note(self) -> str:
+        """How heavy the links are taken to be, in one sentence; it belongs wherever torques are shown."""
+        heaviest = self.joints * self.mass.mass(self.link[1])
+        toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if heaviest < TOY_MASS else ""
+        return f"links: {self.mass.words()}{toy}"
+
+    def arm(self, design: Design) -> Arm:
+        """The physical chain that a design builds."""
+        lower, upper = self.joint_range
+        joints = [Joint("revolute", JOINT_AXES[kind], lower, upper) for kind in design.joints]  # pyright: ignore[reportArgumentType]
+        links = [uniform_link((0.0, 0.0, length), self.mass.mass(length), self.link_radius) for length in design.links]
+        return Arm(base=design.origin, joints=tuple(joints), links=tuple(links))
+
+
+def paper_space(joints: int = 4) -> DesignSpace:
+    """The design space of the paper, with `joints` joints (4 in its experiments)."""
+    return DesignSpace(name="paper" if joints == 4 else f"paper-{joints}", joints=joints)
+
+
+def load_space(path: str | Path) -> DesignSpace:
+    """The design space of a YAML file; keys that it leaves out are as in the paper."""
+    return read_document(Path(path), DesignSpace, SpaceError)
+
+
+def _clip(parameter: Parameter, value: Any) -> ParameterValue:
+    if isinstance(parameter, FloatParameter):
+        return min(max(float(value), parameter.low), parameter.high)
+    return parameter.check(value)
+
+
+def _draw(parameter: Parameter, rng: np.random.Generator) -> ParameterValue:
+    if isinstance(parameter, FloatParameter):
+        return float(rng.uniform(parameter.low, parameter.high))
+    return parameter.choices[int(rng.integers(len(parameter.choices)))]

@@ -1,0 +1,171 @@
+"""The task: points that the tip of the arm should reach."""
+
+import csv
+import math
+from importlib import resources
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from armwright.documents import parse_document, read_document
+from armwright.exceptions import TaskError, did_you_mean
+
+Point = tuple[float, float, float]
+
+LARGEST_COORDINATE = 1000.0  # [m]
+MOST_TARGETS = 10_000
+UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
+
+
+class Task(BaseModel):
+    """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
+    targets: tuple[Point, ...]
+    reference_point: tuple[float, float] | None = None  # (position error [m], torque [α-scaled])
+    description: str = Field(default="", max_length=10_000)
+    provenance: str = Field(default="", max_length=10_000)
+
+    @model_validator(mode="after")
+    def _check_numbers(self) -> Self:
+        if not self.targets:
+            raise ValueError("targets is empty: give at least one point [x, y, z] in metres")
+        if len(self.targets) > MOST_TARGETS:
+            raise ValueError(f"targets has {len(self.targets)} points; at most {MOST_TARGETS} are allowed")
+        for number, point in enumerate(self.targets, start=1):
+            if max(abs(c) for c in point) > LARGEST_COORDINATE:
+                raise ValueError(
+                    f"target {number} = {list(point)} m is more than {LARGEST_COORDINATE:g} m away; "
+                    "coordinates are in metres (armwright init --from FILE --unit mm converts)"
+                )
+        if self.reference_point is not None and min(self.reference_point) <= 0.0:
+            raise ValueError(f"reference_point = {list(self.reference_point)} must be above 0 in both objectives")
+        return self
+
+    @property
+    def points(self) -> np.ndarray:
+        """The targets as an array (T, 3) [m]."""
+        return np.array(self.targets, dtype=np.float64)
+
+
+def builtin_tasks() -> dict[str, Task]:
+    """The tasks that come with armwright, by name."""
+    folder = resources.files("armwright") / "tasks"
+    files = sorted((f for f in folder.iterdir() if f.name.endswith(".yaml")), key=lambda f: _file_order(f.name))
+    tasks = [parse_document(f.read_text(encoding="utf-8"), Task, TaskError, f.name) for f in files]
+    return {task.name: task for task in tasks}
+
+
+def load_task(name_or_path: str | Path) -> Task:
+    """A built-in task by its name, or the task of a YAML file."""
+    known = builtin_tasks()
+    if str(name_or_path) in known:
+        return known[str(name_or_path)]
+    path = Path(name_or_path)
+    if path.is_file():
+        return read_document(path, Task, TaskError)
+    if path.suffix in (".yaml", ".yml"):
+        raise TaskError(f"there is no file {path}; `armwright init {path}` writes one to edit")
+    raise TaskError(
+        f'unknown task "{name_or_path}".{did_you_mean(str(name_or_path), known)} '
+        f"Built-in tasks: {', '.join(known)}; or give a YAML file"
+    )
+
+
+def random_task(seed: int) -> Task:
+    """One of a family of tasks without symmetry, for benchmarks.
+
+    6 to 12 points, uniform in a box; the box's centre is uniform in [-0.5, 0.5] x [-0.5, 0.5] x [0, 0.6] m,
+    its half sides in [0.15, 0.6] m. Reference point as the paper's tasks.
+    """
+    rng = np.random.default_rng([0x61726D, seed])
+    n = int(rng.integers(6, 13))
+    centre = rng.uniform([-0.5, -0.5, 0.0], [0.5, 0.5, 0.6])
+    half = rng.uniform(0.15, 0.6, 3)
+    points = centre + half * rng.uniform(-1.0, 1.0, (n, 3))
+    return Task(
+        name=f"random-{seed}",
+        targets=tuple((round(x, 4), round(y, 4), round(z, 4)) for x, y, z in points.tolist()),
+        reference_point=(5.0, 5.0),
+        description="Uniform points in a random box.",
+        provenance=f"armwright.task.random_task({seed})",
+    )
+
+
+def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) -> tuple[Point, ...]:
+    """The points of a CSV file with x, y and z in its first three columns, times `unit`, plus `offset` [m].
+
+    A first line that is not numbers is taken for the column names; empty lines and lines that begin
+    with # are passed over. Commas, semicolons, tabs or blanks may separate the columns.
+    """
+    if unit not in UNITS:
+        raise TaskError(f'unit "{unit}" is not one of {", ".join(UNITS)}')
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as fault:
+        raise TaskError(f"cannot read {path}: {fault.strerror or fault}") from fault
+    except UnicodeDecodeError as fault:
+        raise TaskError(f"{path} is not a text file in UTF-8") from fault
+    points: list[Point] = []
+    heading_seen = False
+    for number, line in enumerate(lines, start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = _split_row(line)
+        try:
+            x, y, z = (float(cell) for cell in row[:3])
+        except ValueError as fault:
+            if not points and not heading_seen:
+                heading_seen = True
+                continue
+            raise TaskError(f'{path}, line {number}: "{line.strip()[:60]}" is not three numbers x, y, z') from fault
+        if not all(math.isfinite(c) for c in (x, y, z)):
+            raise TaskError(f"{path}, line {number}: coordinates must be finite, not {row[:3]}")
+        scale = UNITS[unit]
+        points.append((_tidy(x * scale + offset[0]), _tidy(y * scale + offset[1]), _tidy(z * scale + offset[2])))
+    if not points:
+        raise TaskError(f"{path} holds no points: three numbers x, y, z a line are needed")
+    return tuple(points)
+
+
+def task_template(name: str, targets: tuple[Point, ...] | None = None) -> str:
+    """A commented task file to edit, with `targets` [m] or three example points."""
+    points = targets or ((0.45, 0.0, 0.1), (0.45, 0.2, 0.3), (0.45, -0.2, 0.3))
+    rows = "\n".join(f"  - [{x:g}, {y:g}, {z:g}]" for x, y, z in points)
+    return f"""\
+# A task for armwright: points that the tip of the arm should reach.
+# Run it with:  armwright optimize {name}.yaml
+name: {name}                     # names the run folder: letters, digits, . _ -
+
+# x, y, z in metres; z is up. The base is searched within ±1 m of the origin (see --space).
+targets:
+{rows}
+
+# Worst values that still count, for the hypervolume: [position error summed over the targets in m,
+# torque summed over the targets in N m, times 40]. Without it, 1.1 x the worst non-dominated values of the
+# first random trials is taken and kept for the run.
+# reference_point: [5.0, 5.0]
+
+# description: What the arm has to do there.
+# provenance: Who measured the points, and when.
+"""
+
+
+def _split_row(line: str) -> list[str]:
+    for delimiter in (",", ";", "\t"):
+        if delimiter in line:
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+    return line.split()
+
+
+def _tidy(value: float) -> float:
+    return round(value, 9)
+
+
+def _file_order(name: str) -> tuple[int, str]:
+    first = ("target-", "autodesign-", "slideopt-")
+    return next((i for i, prefix in enumerate(first) if name.startswith(prefix)), len(first)), name
