@@ -1,0 +1,104 @@
+"""Which arm should I build for this task?
+
+import armwright as aw
+
+problem = aw.Problem(task=aw.load_task("target-1"), space=aw.paper_space(joints=4))
+run = aw.optimize(problem, proposer="rules", n_total=200, seed=0, out="runs/mine")
+print(run.hypervolume[-1], aw.to_urdf(run.front[0].arm))
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from armwright.arm import Arm, Joint, Link, uniform_link
+    from armwright.evaluation import Evaluation, evaluate
+    from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
+    from armwright.export.urdf import to_urdf
+    from armwright.history import FinishedTrial, FrontMember, History
+    from armwright.pareto import hypervolume
+    from armwright.problem import Problem
+    from armwright.proposers.proposer import Proposal, Proposer
+    from armwright.report.figures import write_figures
+    from armwright.run_folder import read_run
+    from armwright.space import Design, DesignSpace, load_space, paper_space
+    from armwright.study import Run, optimize
+    from armwright.task import Task, builtin_tasks, load_task, random_task
+
+# Where each public name lives. Modules load when a name of theirs is first used, so that the command line
+# answers at once and nobody pays for what is not used.
+_PLACES = {
+    "Arm": "arm",
+    "ArmwrightError": "exceptions",
+    "Design": "space",
+    "DesignSpace": "space",
+    "Evaluation": "evaluation",
+    "FailureError": "exceptions",
+    "FinishedTrial": "history",
+    "FrontMember": "history",
+    "History": "history",
+    "Joint": "arm",
+    "Link": "arm",
+    "Problem": "problem",
+    "Proposal": "proposers.proposer",
+    "ProposalError": "exceptions",
+    "Proposer": "proposers.proposer",
+    "Run": "study",
+    "Task": "task",
+    "UsageError": "exceptions",
+    "builtin_tasks": "task",
+    "evaluate": "evaluation",
+    "hypervolume": "pareto",
+    "load_space": "space",
+    "load_task": "task",
+    "optimize": "study",
+    "paper_space": "space",
+    "random_task": "task",
+    "read_run": "run_folder",
+    "to_urdf": "export.urdf",
+    "uniform_link": "arm",
+    "write_figures": "report.figures",
+}
+
+__all__ = [
+    "Arm",
+    "ArmwrightError",
+    "Design",
+    "DesignSpace",
+    "Evaluation",
+    "FailureError",
+    "FinishedTrial",
+    "FrontMember",
+    "History",
+    "Joint",
+    "Link",
+    "Problem",
+    "Proposal",
+    "ProposalError",
+    "Proposer",
+    "Run",
+    "Task",
+    "UsageError",
+    "builtin_tasks",
+    "evaluate",
+    "hypervolume",
+    "load_space",
+    "load_task",
+    "optimize",
+    "paper_space",
+    "random_task",
+    "read_run",
+    "to_urdf",
+    "uniform_link",
+    "write_figures",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'armwright' has no attribute {name!r}")
+    return getattr(import_module(f"armwright.{_PLACES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

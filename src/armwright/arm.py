@@ -76,7 +76,8 @@ class Arm:
     def __post_init__(self) -> None:
         if not self.joints or len(self.joints) != len(self.links):
             raise ArmError(
-                f"an arm needs as many links as joints, at least one: {len(self.joints)} joints, {len(self.links)} links"
+                "an arm needs as many links as joints, at least one: "
+                f"{len(self.joints)} joints, {len(self.links)} links"
             )
         if not all(math.isfinite(v) for v in self.base):
             raise ArmError(f"the base position must be finite: {self.base} m")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -35,15 +35,12 @@ def parse_document(text: str, schema: type[Schema], error: type[ArmwrightError],
         raise error(f"{where} is not valid YAML: {_yaml_fault(fault)}") from fault
     if not isinstance(data, dict):
         raise error(f"{where} must hold keys and values ({', '.join(schema.model_fields)}), one a line")
-    return check_document(data, schema, error, where)
-
-
-def check_document(data: dict[Any, Any], schema: type[Schema], error: type[ArmwrightError], where: str) -> Schema:
-    """`data` as a value of `schema`; `error` in one line where it is not one."""
-    for key in data:
+    for key in cast("dict[Any, Any]", data):
         if key not in schema.model_fields:
             allowed = ", ".join(schema.model_fields)
-            raise error(f'{where}: unknown key "{key}". Allowed: {allowed}.{did_you_mean(str(key), schema.model_fields)}')
+            raise error(
+                f'{where}: unknown key "{key}". Allowed: {allowed}.{did_you_mean(str(key), schema.model_fields)}'
+            )
     try:
         return schema.model_validate(data)
     except ValidationError as fault:

@@ -11,7 +11,7 @@
     └── FailureError            something broke on the way                  (exit code 1)
         ├── RunFolderError      a run folder that cannot be written, or whose content is damaged
         ├── ModelError          a language model that cannot be used
-        ├── ProposalFault       a proposer gave no design; the trial becomes a black-box one
+        ├── ProposalError       a proposer gave no design; the trial becomes a black-box one
         └── MissingExtraError   an optional dependency that is not installed
 
 A message is one line in the user's words: it names the value with its unit, what is allowed, and the
@@ -70,7 +70,7 @@ class ModelError(FailureError):
     """A language model that cannot be used."""
 
 
-class ProposalFault(FailureError):
+class ProposalError(FailureError):
     """A proposer gave no design; the trial becomes a black-box one.
 
     kind: one word for statistics: timeout, connection, refused, …

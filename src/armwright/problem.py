@@ -1,7 +1,7 @@
 """The problem: a design space, a task, and what is minimised."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,7 +17,7 @@ class Problem:
     """Which arm of `space` serves `task` best, by `objectives` (position error and torque)."""
 
     task: Task
-    space: DesignSpace = paper_space()
+    space: DesignSpace = field(default_factory=paper_space)
     objectives: tuple[Objective, ...] = PAPER_OBJECTIVES
 
     @property

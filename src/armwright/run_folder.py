@@ -20,11 +20,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import yaml
 from filelock import FileLock, Timeout
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from armwright.documents import parse_document
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
@@ -45,10 +45,8 @@ PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang")
 PARTS = ("total", "sampling", "evaluation", "proposing")
 
 
-class Method(BaseModel):
+class Method(BaseModel, frozen=True, extra="forbid"):
     """How a study searches. proposer: its name and settings; None for black-box trials only."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     proposer: dict[str, Any] | None
     sampler: str
@@ -57,13 +55,11 @@ class Method(BaseModel):
     n_total: int = Field(ge=1)
 
 
-class RunConfig(BaseModel):
+class RunConfig(BaseModel, frozen=True, extra="forbid"):
     """Everything needed to repeat a run.
 
     reference_point: as the task states it, or as frozen after the first n_init trials (None until then).
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     task: Task
     space: DesignSpace
@@ -103,7 +99,9 @@ class RunFolder:
             raise _write_error(self.path, fault) from fault
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self._trials is not None:
             self._trials.close()
             self._trials = None
@@ -196,7 +194,9 @@ class RunFolder:
                 ],
             }
             name = f"{DESIGNS}/{_design_name(member.number)}"
-            self.write_text(f"{name}/arm.urdf", to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}"))
+            self.write_text(
+                f"{name}/arm.urdf", to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}")
+            )
             self.write_text(f"{name}/design.json", json.dumps(record, indent=2) + "\n")
 
 
@@ -220,10 +220,10 @@ def read_run(path: Path) -> tuple[RunConfig, History]:
 def read_summary(path: Path) -> dict[str, Any] | None:
     """summary.json, or None where the run has not ended (or the file is damaged; it can be made again)."""
     try:
-        summary = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        summary: dict[str, Any] = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
+        return summary if summary.keys() >= {"n_trials", "hypervolume"} else None
+    except (OSError, ValueError, AttributeError):
         return None
-    return summary if isinstance(summary, dict) else None
 
 
 def summarize(history: History, config: RunConfig, proposer: ProposerSummary | None) -> dict[str, Any]:
@@ -345,12 +345,15 @@ def _csv(rows: Iterable[Mapping[str, Any]]) -> str:
 def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
     """RunConflictError where `asked` is another run than the one that lies there; a larger n_total is the same."""
     old, new = _identity(there), _identity(asked)
-    differences = [f"{key}: {old.get(key)} there, {new.get(key)} asked" for key in {**old, **new} if old.get(key) != new.get(key)]
+    differences = [
+        f"{key}: {old.get(key)} there, {new.get(key)} asked" for key in {**old, **new} if old.get(key) != new.get(key)
+    ]
     if asked.method.n_total < there.method.n_total:
         differences.append(f"n_total: {there.method.n_total} there, {asked.method.n_total} asked (it can only grow)")
     if differences:
         raise RunConflictError(
-            f"{path} holds a run with other settings ({'; '.join(differences)}). Give another --out DIR, or the same settings"
+            f"{path} holds a run with other settings ({'; '.join(differences)}). "
+            "Give another --out DIR, or the same settings"
         )
 
 
@@ -358,14 +361,18 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     """What makes a run this run and no other, flat."""
     content = config.model_dump(mode="json")
     content["task"] = {key: content["task"][key] for key in ("name", "targets", "reference_point")}
-    del content["versions"], content["reference_point"], content["method"]["n_total"]
-    return _flat(content)
+    method = content.pop("method")
+    del content["versions"], content["reference_point"], method["n_total"]
+    return _flat({**content, **method})
 
 
 def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for key, value in content.items():
-        flat.update(_flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {prefix + key: value})
+        if isinstance(value, dict):
+            flat.update(_flat(cast("dict[str, Any]", value), f"{prefix}{key}."))
+        else:
+            flat[prefix + key] = value
     return flat
 
 

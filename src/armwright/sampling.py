@@ -4,12 +4,13 @@ A fresh sampler, seeded from (seed, trial number), draws each trial: a resumed s
 whole run would repeat its first draws, this one goes on as if it had never stopped.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution
 from optuna.samplers import BaseSampler, RandomSampler, TPESampler
+from optuna.study import StudyDirection
 from optuna.trial import Trial, TrialState, create_trial
 
 from armwright.exceptions import SettingsError, did_you_mean
@@ -38,14 +39,18 @@ def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
     if not isinstance(sampler, str):
         return sampler
     if sampler not in SAMPLERS:
-        raise SettingsError(f'unknown sampler "{sampler}".{did_you_mean(sampler, SAMPLERS)} Samplers: {", ".join(SAMPLERS)}')
+        raise SettingsError(
+            f'unknown sampler "{sampler}".{did_you_mean(sampler, SAMPLERS)} Samplers: {", ".join(SAMPLERS)}'
+        )
     return SAMPLERS[sampler]
 
 
 def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:
     """The space in Optuna's words."""
     return {
-        p.name: FloatDistribution(p.low, p.high) if isinstance(p, FloatParameter) else CategoricalDistribution(p.choices)
+        p.name: FloatDistribution(p.low, p.high)
+        if isinstance(p, FloatParameter)
+        else CategoricalDistribution(p.choices)
         for p in space.parameters
     }
 
@@ -110,7 +115,7 @@ class BlackBox:
         self._study.tell(trial, state=TrialState.FAIL)
 
 
-def _attributes(source: str, proposal: str | None) -> Mapping[str, Any]:
+def _attributes(source: str, proposal: str | None) -> dict[str, Any]:
     return {"source": source} if proposal is None else {"source": source, "proposal": proposal}
 
 
@@ -119,6 +124,6 @@ def _quiet_study(n_objectives: int) -> optuna.Study:
     verbosity = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
     try:
-        return optuna.create_study(directions=["minimize"] * n_objectives)
+        return optuna.create_study(directions=[StudyDirection.MINIMIZE] * n_objectives)
     finally:
         optuna.logging.set_verbosity(verbosity)

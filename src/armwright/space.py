@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from armwright.arm import Arm, Axis, Joint, uniform_link
 from armwright.documents import read_document
@@ -47,7 +47,8 @@ class FloatParameter:
             raise DesignError(f"{self.name} = {value!r} is not a finite number [{self.unit}]")
         if not self.low <= value <= self.high:
             raise DesignError(
-                f"{self.name} = {value:g} {self.unit} is outside {self.low:g} <= {self.name} <= {self.high:g} {self.unit}"
+                f"{self.name} = {value:g} {self.unit} is outside "
+                f"{self.low:g} <= {self.name} <= {self.high:g} {self.unit}"
             )
         return float(value)
 
@@ -97,11 +98,7 @@ class Design:
         return tuple(float(value) for name, value in self.params.items() if name.startswith("link_"))
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class MassPerMetre(_Frozen):
+class MassPerMetre(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Links of one section and material: mass grows with length."""
 
     kind: Literal["per_metre"] = "per_metre"
@@ -115,7 +112,7 @@ class MassPerMetre(_Frozen):
         return f"{self.kg:g} kg per metre of link"
 
 
-class MassPerLink(_Frozen):
+class MassPerLink(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Modules of one mass, whatever their length."""
 
     kind: Literal["per_link"]
@@ -129,7 +126,7 @@ class MassPerLink(_Frozen):
         return f"{self.kg:g} kg for each link, whatever its length"
 
 
-class MassOfTube(_Frozen):
+class MassOfTube(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Links cut from a round tube (or bar, where the wall is half the diameter) of a real material."""
 
     kind: Literal["tube"]
@@ -159,7 +156,7 @@ class MassOfTube(_Frozen):
 MassModel = Annotated[MassPerMetre | MassPerLink | MassOfTube, Field(discriminator="kind")]
 
 
-class DesignSpace(_Frozen):
+class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A serial arm of `joints` revolute joints: base position, joint types and link lengths are searched.
 
     The first joint sits at the origin O; link j follows joint j along local +z; with all angles 0 the
@@ -179,7 +176,13 @@ class DesignSpace(_Frozen):
 
     @model_validator(mode="after")
     def _check_ranges(self) -> Self:
-        for name, unit in (("origin_x", "m"), ("origin_y", "m"), ("origin_z", "m"), ("link", "m"), ("joint_range", "rad")):
+        for name, unit in (
+            ("origin_x", "m"),
+            ("origin_y", "m"),
+            ("origin_z", "m"),
+            ("link", "m"),
+            ("joint_range", "rad"),
+        ):
             low, high = getattr(self, name)
             if low > high:
                 raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} is upside down: write the smaller number first")
@@ -199,7 +202,8 @@ class DesignSpace(_Frozen):
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters in their fixed order: origin, joint types, link lengths."""
-        origin = [FloatParameter(f"origin_{axis}", *getattr(self, f"origin_{axis}"), "m") for axis in "xyz"]
+        ranges: dict[str, Range] = {"x": self.origin_x, "y": self.origin_y, "z": self.origin_z}
+        origin = [FloatParameter(f"origin_{axis}", *limits, "m") for axis, limits in ranges.items()]
         joints = [CategoricalParameter(f"joint_{j}", self.joint_types) for j in range(1, self.joints + 1)]
         links = [FloatParameter(f"link_{j}", *self.link, "m") for j in range(1, self.joints + 1)]
         return (*origin, *joints, *links)
@@ -209,7 +213,9 @@ class DesignSpace(_Frozen):
         names = [parameter.name for parameter in self.parameters]
         for name in params:
             if name not in names:
-                raise DesignError(f'unknown parameter "{name}". Parameters: {", ".join(names)}.{did_you_mean(name, names)}')
+                raise DesignError(
+                    f'unknown parameter "{name}". Parameters: {", ".join(names)}.{did_you_mean(name, names)}'
+                )
         missing = [name for name in names if name not in params]
         if missing:
             raise DesignError(f"missing: {', '.join(missing)}")

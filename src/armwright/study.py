@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from armwright.exceptions import ModelError, ProposalFault, SettingsError
+from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.history import BBO, RANDOM, FinishedTrial, FrontMember, History
 from armwright.pareto import Array, FrontTracker
 from armwright.problem import Problem
@@ -190,9 +190,11 @@ class Study:
         self._report("proposing", number, self.proposer.name)
         try:
             proposal = self.proposer.propose(self._history(), derived_seed(self.config.seed, PROPOSING, number))
-        except ProposalFault as fault:
+        except ProposalError as fault:
             if not any(trial.source == self.proposer.name for trial in self.trials):
-                raise ModelError(f"{fault}. No proposal has come from {self.proposer.name} so far; see --proposer rules") from fault
+                raise ModelError(
+                    f"{fault}. No proposal has come from {self.proposer.name} so far; see --proposer rules"
+                ) from fault
             return None, fault.kind
         self.problem.space.design(proposal.design.params)
         return proposal, None
@@ -210,7 +212,9 @@ class Study:
             if self.folder is not None:
                 self.folder.write_config(self.config)
 
-    def _report(self, doing: Literal["proposing", "finished"], number: int, source: str, fault: str | None = None) -> None:
+    def _report(
+        self, doing: Literal["proposing", "finished"], number: int, source: str, fault: str | None = None
+    ) -> None:
         if self.watch is None:
             return
         self.watch(
@@ -238,9 +242,7 @@ class Study:
         return Run(history, self.config, summary, folder, resumed)
 
 
-def _method(
-    proposer: Proposer | None, sampler: str | SamplerFactory, n_init: int, n_step: int, n_total: int
-) -> Method:
+def _method(proposer: Proposer | None, sampler: str | SamplerFactory, n_init: int, n_step: int, n_total: int) -> Method:
     factory = sampler_factory(sampler)
     name = sampler if isinstance(sampler, str) else f"{factory.__module__}.{factory.__qualname__}"
     return Method(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
@@ -19,10 +19,8 @@ MOST_TARGETS = 10_000
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 
 
-class Task(BaseModel):
+class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     targets: tuple[Point, ...]

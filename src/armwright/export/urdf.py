@@ -1,7 +1,7 @@
 """An arm as URDF, which MuJoCo, Pinocchio, ROS and most simulators load."""
 
 import math
-from xml.etree import ElementTree as xml
+from xml.etree import ElementTree
 
 from armwright.arm import Arm, Joint, Link, Vector
 
@@ -24,14 +24,14 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
     Link frames stand at their joints; with all joints at 0 they are parallel to the world's. Links are
     solid cylinders of uniform density from joint to joint, for inertia, collision and sight.
     """
-    robot = xml.Element("robot", name=name)
+    robot = ElementTree.Element("robot", name=name)
     # MuJoCo would otherwise dissolve `base` and `tip`, and drop what is only to be seen.
-    compiler = xml.SubElement(xml.SubElement(robot, "mujoco"), "compiler")
+    compiler = ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler")
     compiler.attrib.update(fusestatic="false", discardvisual="false")
     for material, rgba in COLOURS.items():
-        xml.SubElement(xml.SubElement(robot, "material", name=material), "color", rgba=rgba)
-    xml.SubElement(robot, "link", name="world")
-    xml.SubElement(robot, "link", name="base")
+        ElementTree.SubElement(ElementTree.SubElement(robot, "material", name=material), "color", rgba=rgba)
+    ElementTree.SubElement(robot, "link", name="world")
+    ElementTree.SubElement(robot, "link", name="base")
     _add_joint(robot, "world_to_base", "fixed", "world", "base", arm.base)
     parent, place = "base", (0.0, 0.0, 0.0)
     for number, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True), start=1):
@@ -39,49 +39,58 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
         _add_link(robot, child, joint, link)
         element = _add_joint(robot, f"joint_{number}", joint.kind, parent, child, place)
         if joint.kind != "fixed":
-            xml.SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
+            ElementTree.SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
             limits = {"lower": joint.lower, "upper": joint.upper, "effort": EFFORT, "velocity": VELOCITY}
-            xml.SubElement(element, "limit", {key: _number(value) for key, value in limits.items()})
+            ElementTree.SubElement(element, "limit", {key: _number(value) for key, value in limits.items()})
         parent, place = child, link.offset
-    xml.SubElement(robot, "link", name="tip")
+    ElementTree.SubElement(robot, "link", name="tip")
     _add_joint(robot, "tip_joint", "fixed", parent, "tip", place)
-    xml.indent(robot)
-    return '<?xml version="1.0"?>\n' + xml.tostring(robot, encoding="unicode") + "\n"
+    ElementTree.indent(robot)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding="unicode") + "\n"
 
 
-def _add_joint(robot: xml.Element, name: str, kind: str, parent: str, child: str, xyz: Vector) -> xml.Element:
-    element = xml.SubElement(robot, "joint", name=name, type=kind)
-    xml.SubElement(element, "parent", link=parent)
-    xml.SubElement(element, "child", link=child)
-    xml.SubElement(element, "origin", xyz=_numbers(xyz), rpy="0 0 0")
+def _add_joint(
+    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, xyz: Vector
+) -> ElementTree.Element:
+    element = ElementTree.SubElement(robot, "joint", name=name, type=kind)
+    ElementTree.SubElement(element, "parent", link=parent)
+    ElementTree.SubElement(element, "child", link=child)
+    ElementTree.SubElement(element, "origin", xyz=_numbers(xyz), rpy="0 0 0")
     return element
 
 
-def _add_link(robot: xml.Element, name: str, joint: Joint, link: Link) -> None:
-    element = xml.SubElement(robot, "link", name=name)
+def _add_link(robot: ElementTree.Element, name: str, joint: Joint, link: Link) -> None:
+    element = ElementTree.SubElement(robot, "link", name=name)
     rpy = _numbers(_along(link.offset))
     if link.mass > 0.0:
-        inertial = xml.SubElement(element, "inertial")
-        xml.SubElement(inertial, "origin", xyz=_numbers(link.com), rpy=rpy)
-        xml.SubElement(inertial, "mass", value=_number(link.mass))
+        inertial = ElementTree.SubElement(element, "inertial")
+        ElementTree.SubElement(inertial, "origin", xyz=_numbers(link.com), rpy=rpy)
+        ElementTree.SubElement(inertial, "mass", value=_number(link.mass))
         across = link.mass * (3.0 * link.radius**2 + link.length**2) / 12.0
         around = link.mass * link.radius**2 / 2.0
-        xml.SubElement(
-            inertial, "inertia", ixx=_number(across), iyy=_number(across), izz=_number(around), ixy="0", ixz="0", iyz="0"
+        ElementTree.SubElement(
+            inertial,
+            "inertia",
+            ixx=_number(across),
+            iyy=_number(across),
+            izz=_number(around),
+            ixy="0",
+            ixz="0",
+            iyz="0",
         )
     if link.length > 0.0:
         middle = _numbers((link.offset[0] / 2, link.offset[1] / 2, link.offset[2] / 2))
         for purpose in ("visual", "collision"):
-            body = xml.SubElement(element, purpose)
-            xml.SubElement(body, "origin", xyz=middle, rpy=rpy)
-            shape = xml.SubElement(body, "geometry")
-            xml.SubElement(shape, "cylinder", radius=_number(link.radius), length=_number(link.length))
+            body = ElementTree.SubElement(element, purpose)
+            ElementTree.SubElement(body, "origin", xyz=middle, rpy=rpy)
+            shape = ElementTree.SubElement(body, "geometry")
+            ElementTree.SubElement(shape, "cylinder", radius=_number(link.radius), length=_number(link.length))
             if purpose == "visual":
-                xml.SubElement(body, "material", name="link")
-    marker = xml.SubElement(element, "visual")
-    xml.SubElement(marker, "origin", xyz="0 0 0", rpy="0 0 0")
-    xml.SubElement(xml.SubElement(marker, "geometry"), "sphere", radius=_number(1.4 * link.radius))
-    xml.SubElement(marker, "material", name=f"joint_{joint.axis}")
+                ElementTree.SubElement(body, "material", name="link")
+    marker = ElementTree.SubElement(element, "visual")
+    ElementTree.SubElement(marker, "origin", xyz="0 0 0", rpy="0 0 0")
+    ElementTree.SubElement(ElementTree.SubElement(marker, "geometry"), "sphere", radius=_number(1.4 * link.radius))
+    ElementTree.SubElement(marker, "material", name=f"joint_{joint.axis}")
 
 
 def _along(offset: Vector) -> Vector:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import AXES, Arm, Link
+from armwright.arm import AXES, Arm, Link, Vector
 from armwright.exceptions import ArmError
 
 MOST_JOINTS = 8
@@ -79,13 +79,13 @@ def _check_alike(arm: Arm, kinds: tuple[str, ...]) -> None:
             raise ArmError(f"joint {number}: the inverse kinematics starts at 0 rad, which its limits exclude")
 
 
-def _rigid_groups(arm: Arm, moving: tuple[int, ...]) -> tuple[tuple[float, ...], list[Link]]:
+def _rigid_groups(arm: Arm, moving: tuple[int, ...]) -> tuple[Vector, list[Link]]:
     """The first moving joint's position, and one link for each moving joint with all fixed ones after it."""
     base = np.array(arm.base)
     for link in arm.links[: moving[0]]:
         base = base + link.offset
     ends = (*moving[1:], len(arm.joints))
-    return tuple(base), [_join(arm.links[start:end]) for start, end in zip(moving, ends, strict=True)]
+    return _vector(base), [_join(arm.links[start:end]) for start, end in zip(moving, ends, strict=True)]
 
 
 def _join(links: Sequence[Link]) -> Link:
@@ -97,4 +97,9 @@ def _join(links: Sequence[Link]) -> Link:
         offset = offset + link.offset
         mass += link.mass
     com = moment / mass if mass > 0.0 else offset
-    return Link(tuple(offset.tolist()), mass, tuple(com.tolist()), links[0].radius)
+    return Link(_vector(offset), mass, _vector(com), links[0].radius)
+
+
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

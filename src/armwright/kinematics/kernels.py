@@ -107,7 +107,9 @@ def kernels(dof: int) -> Kernels:
         return tip, axes, places
 
     @wp.func
-    def updated(arms: Arms, arm: int, q: Joints, h_before: Joints, error: wp.vec3, tip: wp.vec3, axes: Rows, places: Rows):
+    def updated(
+        arms: Arms, arm: int, q: Joints, h_before: Joints, error: wp.vec3, tip: wp.vec3, axes: Rows, places: Rows
+    ):
         """Angles after one update, and the limit gradients H that the next one compares with."""
         dx = error * wp.min(1.0, LONGEST_STEP / wp.max(wp.length(error), 1.0e-12))
         jacobian = Rows()  # column j of J as row j
@@ -120,7 +122,7 @@ def kernels(dof: int) -> Kernels:
             lower = arms.lower[arm, j]
             upper = arms.upper[arm, j]
             h[j] = limit_gradient(q[j], lower, upper)
-            w = float(1.0)
+            w = 1.0
             if h[j] >= h_before[j]:
                 w = 1.0 / (1.0 + h[j])
             weight[j] = w
@@ -157,7 +159,7 @@ def kernels(dof: int) -> Kernels:
             coms[j] = place + to_world(frame, arms.com[arm, j])
             place += to_world(frame, arms.offset[arm, j])
         torque = Joints()
-        carried = float(0.0)  # mass beyond joint j
+        carried = 0.0  # mass beyond joint j
         moment = wp.vec3()  # mass times position beyond joint j
         for i in range(D):
             j = D - 1 - i

@@ -1,7 +1,7 @@
 """The boundary of the kernels: numpy in, numpy out. Another kernel could stand behind it."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -53,9 +53,7 @@ def solve_postures(arms: ArmArrays, targets: NDArray[np.float64], updates: int =
     return Postures(q=q.numpy(), reached=reached.numpy(), torque=torque.numpy())
 
 
-def update_once(
-    arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats
-) -> tuple[Floats, Floats]:
+def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats) -> tuple[Floats, Floats]:
     """One update of the inverse kinematics from given angles; targets (N, 3), the rest (N, D)."""
     wp, made = _ready(arms.dof)
     arrays = [wp.array(np.float32(values), dtype=made.joints, device=DEVICE) for values in (q, h_before)]
@@ -97,7 +95,7 @@ def _ready(dof: int) -> tuple[Any, Any]:
 
 
 @contextmanager
-def _silent_stderr() -> Iterator[None]:
+def _silent_stderr() -> Generator[None]:
     """Drops what is written to the process's stderr meanwhile.
 
     Without an NVIDIA driver Warp's native code says so there, past every setting of its own.

@@ -52,7 +52,7 @@ class Proposer(Protocol):
         return ProposerSummary(self.name)
 
     def propose(self, history: History, seed: int) -> Proposal:
-        """The next design; ProposalFault where there is none (the trial becomes a black-box one).
+        """The next design; ProposalError where there is none (the trial becomes a black-box one).
 
         Must depend on nothing but `history` and `seed`, so that a killed run goes on as if it had not been.
         """

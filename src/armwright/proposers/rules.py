@@ -1,3 +1,5 @@
 from armwright.proposers.proposer import *
+
+
 class RulesProposer(Proposer):
-    name="rules"
+    name = "rules"

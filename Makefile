@@ -1,0 +1,50 @@
+# Everything runs in .venv, which is made here; nothing outside the checkout is touched.
+
+PYTHON ?= python3
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
+
+.PHONY: demo test check format bench clean
+
+demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
+	$(BIN)/armwright optimize target-1 --seed 0
+
+test: .venv/.test  ## the whole suite
+	$(BIN)/python -m pytest
+
+check: .venv/.test .venv/.check  ## format, lint, types, import staircase
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: .venv/.check
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: .venv/.test  ## the figures of docs/benchmarks.md; some 40 minutes on two cores
+	$(BIN)/python benchmarks/bench.py
+
+.venv/.python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "armwright needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) -V 2>&1). Try: make $(MAKECMDGOALS) PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
+		{ echo "$(PYTHON) cannot make virtual environments. On Debian and Ubuntu: sudo apt install python3-venv"; exit 1; }
+	$(PYTHON) -m venv .venv
+	$(PIP) pip
+	@touch $@
+
+.venv/.run: .venv/.python pyproject.toml constraints.txt
+	$(PIP) --editable '.[llm]'
+	@touch $@
+
+.venv/.test: .venv/.run
+	$(PIP) --group test
+	@touch $@
+
+.venv/.check: .venv/.run
+	$(PIP) --group check
+	@touch $@
+
+clean:
+	rm -rf .venv build dist .pytest_cache .ruff_cache

@@ -1,0 +1,5 @@
+"""`python -m armwright`."""
+
+from armwright.cli import main
+
+main()

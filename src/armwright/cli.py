@@ -1,0 +1,176 @@
+"""The command line: parses, calls, prints. Heavy imports wait until a command needs them."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from armwright.exceptions import ArmwrightError, RunFolderError, TaskError
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Which robot arm should I build for this task? Searches base position, joint types and link lengths "
+    "for small position error and small joint torque, and returns the Pareto set with a URDF for each arm.",
+)
+INTERRUPTED = 130  # the shell's word for Ctrl-C
+
+
+def main() -> NoReturn:
+    """The entry point: what we raise on purpose becomes one line and an exit code."""
+    try:
+        app()
+    except ArmwrightError as error:
+        print(f"armwright: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)
+    sys.exit(0)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(version("armwright"))
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Options of armwright itself."""
+
+
+@app.command()
+def optimize(
+    task: Annotated[str, typer.Argument(help="A built-in task (see `armwright tasks`) or a YAML file.")],
+    space: Annotated[Path | None, typer.Option(help="Design space as a YAML file; without it, the paper's.")] = None,
+    sampler: Annotated[str, typer.Option(help="Black-box sampler: tpe or random.")] = "tpe",
+    proposer: Annotated[
+        str,
+        typer.Option(
+            help="Who proposes every n-step-th design: auto (a configured model, else rules), none, rules, llm."
+        ),
+    ] = "auto",
+    prompt: Annotated[
+        str, typer.Option(help="Prompt of the model: plus (with analysis instructions) or minus.")
+    ] = "plus",
+    model: Annotated[str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.")] = None,
+    base_url: Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")] = None,
+    n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.")] = 10,
+    n_step: Annotated[int, typer.Option(help="Trials in a block; the first is the proposer's.")] = 10,
+    n_total: Annotated[int, typer.Option(help="Counted trials.")] = 200,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Run folder; without it, runs/TASK-seedSEED.")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+) -> None:
+    """Search designs for TASK. The same command again resumes or shows the run; a larger --n-total extends it."""
+    from armwright import console as view
+    from armwright.problem import Problem
+    from armwright.proposers.choice import choose_proposer
+    from armwright.space import load_space, paper_space
+    from armwright.study import optimize as run_study
+    from armwright.task import load_task
+
+    words = view.stderr_console() if json_ else view.stdout_console()
+    problem = Problem(load_task(task), paper_space() if space is None else load_space(space))
+    choice = choose_proposer(proposer, model, base_url, prompt)
+    folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
+    words.print(choice.reason)
+    try:
+        with view.watching(words) as watch:
+            run = run_study(
+                problem,
+                proposer=choice.proposer or "none",
+                sampler=sampler,
+                n_init=n_init,
+                n_step=n_step,
+                n_total=n_total,
+                seed=seed,
+                out=folder,
+                watch=watch,
+            )
+        finished_before = run.resumed == len(run.trials)
+        figures = _figures(folder, redraw=not finished_before)
+    except KeyboardInterrupt:
+        again = shlex.join(["armwright", *sys.argv[1:]])
+        words.print(f"\nstopped; every finished trial is in {folder}/. Go on with:\n  {again}")
+        sys.exit(INTERRUPTED)
+    if json_:
+        _print_json({"folder": str(folder), **run.summary})
+        return
+    if finished_before:
+        words.print(f"{folder}/ is finished; nothing was computed again. A larger --n-total extends it.")
+    elif run.resumed:
+        words.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
+    view.show_result(words, run, figures)
+
+
+@app.command()
+def tasks(json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> None:
+    """List the built-in tasks with their points and where they come from."""
+    from armwright import console as view
+    from armwright.task import builtin_tasks
+
+    known = list(builtin_tasks().values())
+    if json_:
+        _print_json([task.model_dump(mode="json") for task in known])
+    else:
+        view.show_tasks(view.stdout_console(), known)
+
+
+@app.command()
+def init(
+    file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
+    points: Annotated[
+        Path | None, typer.Option("--from", help="CSV file with x, y, z in its first three columns.")
+    ] = None,
+    unit: Annotated[str, typer.Option(help="Unit of the CSV file: m or mm.")] = "m",
+    offset: Annotated[tuple[float, float, float], typer.Option(help="Added to every point, in metres: X Y Z.")] = (
+        0,
+        0,
+        0,
+    ),
+) -> None:
+    """Write a commented task file to edit."""
+    from armwright.documents import parse_document
+    from armwright.task import Task, read_points, task_template
+
+    if file.suffix not in (".yaml", ".yml"):
+        raise TaskError(f"{file}: a task file ends in .yaml, such as {file.stem}.yaml")
+    if file.exists():
+        raise TaskError(f"{file} exists already; give another name, or delete it first")
+    targets = None if points is None else read_points(points, unit, offset)
+    text = task_template(file.stem, targets)
+    task = parse_document(text, Task, TaskError, str(file))
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as fault:
+        raise RunFolderError(f"cannot write {file}: {fault.strerror or fault}") from fault
+    print(
+        f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
+    )
+
+
+def _figures(folder: Path, redraw: bool) -> list[Path]:
+    """The figures of a run, drawn where they are missing or the run went on."""
+    from armwright.run_folder import FIGURES
+
+    there = sorted((folder / FIGURES).glob("*.png"))
+    if there and not redraw:
+        return there
+    from armwright.report.figures import write_figures
+
+    return write_figures(folder)
+
+
+def _print_json(content: Any) -> None:
+    import json
+
+    print(json.dumps(content, indent=2))

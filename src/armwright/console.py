@@ -1,0 +1,179 @@
+"""What the command line shows: progress while a study runs, and its result."""
+
+import sys
+import time
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from armwright.history import History
+from armwright.study import Progress as StudyProgress
+from armwright.study import Run
+from armwright.task import Task as DesignTask
+
+EVERY = 10  # counted trials between two plain lines
+
+
+class Watch(Protocol):
+    """Shows a study's progress."""
+
+    def __call__(self, progress: StudyProgress) -> None: ...
+
+
+@contextmanager
+def watching(console: Console) -> Generator[Watch]:
+    """A live line in a terminal, plain lines elsewhere."""
+    if console.is_terminal:
+        with _live(console) as watch:
+            yield watch
+    else:
+        yield _plain(console)
+
+
+def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
+    """The front and what the run came to."""
+    history = run.history
+    console.print(_front_table(history))
+    summary = run.summary
+    volume = summary["hypervolume"]
+    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    sources = ", ".join(f"{count} {source}" for source, count in summary["by_source"].items())
+    console.print(
+        f"hypervolume {volume['final']:.3f} (mean over iterations {volume['mean']:.3f}; reference point {reference})"
+    )
+    if volume["final"] == 0.0:
+        console.print(
+            "The front lies wholly outside the reference point: no design counts yet. Give more trials or another one."
+        )
+    console.print(f"{summary['n_trials']} trials: {sources}; {_seconds(summary['seconds'])}")
+    _show_proposer(console, summary["proposer"])
+    console.print(f"torque = 40 x the sum over the targets of |joint torques|; {history.problem.space.mass_note}")
+    if run.folder is not None:
+        console.print(f"results: {run.folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
+        if figures:
+            console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+
+
+def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
+    """Every task with its points and where they come from."""
+    for task in tasks:
+        reference = (
+            "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
+        )
+        console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
+        console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
+        console.print(f"  reference point: {reference}")
+        console.print(f"  provenance: {task.provenance}\n")
+
+
+def stdout_console() -> Console:
+    """Words on stdout, as plain text where stdout is no terminal."""
+    return Console(highlight=False, soft_wrap=True)
+
+
+def stderr_console() -> Console:
+    """Words on stderr, where stdout is for a program."""
+    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def _front_table(history: History) -> Table:
+    table = Table(title=f"Pareto front of {history.problem.task.name}", title_justify="left", box=None, pad_edge=False)
+    for name in ("design", "source", "error [m]", "torque", "base [m]", "joints", "links [m]"):
+        justify = "right" if name in ("design", "error [m]", "torque") else "left"
+        table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
+    reference = history.reference_point or (float("inf"), float("inf"))
+    inside = [m for m in history.front if m.values[0] < reference[0] and m.values[1] < reference[1]] or history.front
+    for member in inside:
+        table.add_row(
+            str(member.number),
+            member.source,
+            f"{member.values[0]:.4f}",
+            f"{member.values[1]:.4f}",
+            " ".join(f"{value:5.2f}" for value in member.design.origin),
+            member.design.joints,
+            " ".join(f"{value:.2f}" for value in member.design.links),
+        )
+    left_out = len(history.front) - len(inside)
+    if left_out:
+        table.caption = f"and {left_out} beyond the reference point (front.csv has all)"
+        table.caption_justify = "left"
+    return table
+
+
+def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
+    if proposer is None or proposer["model"] is None:
+        return
+    cost = "unknown cost" if proposer["cost_usd"] is None else f"{proposer['cost_usd']:.4f} USD"
+    failures = sum(proposer["failures"].values())
+    words = f"model {proposer['model']}: {proposer['calls']} calls, {proposer['tokens']} tokens, {cost}"
+    if failures:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in proposer["failures"].items())
+        words += f"; {failures} proposals failed and became black-box trials ({kinds})"
+    console.print(words)
+
+
+def _seconds(seconds: dict[str, float]) -> str:
+    parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
+    return f"{seconds['total']:.1f} s ({parts})"
+
+
+def _point(point: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in point) + ")"
+
+
+def _state(progress: StudyProgress) -> str:
+    volume = "-" if progress.hypervolume is None else f"{progress.hypervolume:.3f}"
+    return f"hypervolume {volume}  front {progress.front_size}"
+
+
+def _fault(progress: StudyProgress) -> str:
+    return f"trial {progress.number}: no usable proposal ({progress.fault}); a black-box trial took its place"
+
+
+def _plain(console: Console) -> Watch:
+    started = time.perf_counter()
+
+    def watch(progress: StudyProgress) -> None:
+        if progress.fault:
+            console.print(_fault(progress))
+        done = progress.iteration
+        if progress.doing == "finished" and done > 0 and (done % EVERY == 0 or done == progress.n_total):
+            spent = time.perf_counter() - started
+            console.print(f"iteration {done}/{progress.n_total}  {_state(progress)}  {progress.source}  {spent:.1f} s")
+            sys.stdout.flush()
+
+    return watch
+
+
+class _TimeLeft(ProgressColumn):
+    """The time left at the pace of this session's trials."""
+
+    def render(self, task: Task) -> Text:
+        left = task.time_remaining
+        return Text("" if left is None else f"{left // 60:.0f}:{left % 60:02.0f} left")
+
+
+@contextmanager
+def _live(console: Console) -> Generator[Watch]:
+    columns = (
+        TextColumn("iteration {task.completed}/{task.total}"),
+        BarColumn(24),
+        TextColumn("{task.fields[state]}"),
+        _TimeLeft(),
+    )
+    with Progress(*columns, console=console, transient=False) as bar:
+        line = bar.add_task("", total=None, state="starting")
+
+        def watch(progress: StudyProgress) -> None:
+            if progress.fault:
+                console.print(_fault(progress))
+            doing = f"asking {progress.source} …" if progress.doing == "proposing" else progress.source
+            bar.update(line, total=progress.n_total, completed=progress.iteration, state=f"{_state(progress)}  {doing}")
+
+        yield watch

@@ -1,0 +1,45 @@
+"""Which language model is configured. A key lying in the environment configures none: it must be named."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from platformdirs import user_config_path
+from pydantic import BaseModel
+
+from armwright.documents import read_document
+from armwright.exceptions import SettingsError
+
+
+@dataclass(frozen=True)
+class ModelName:
+    """A model (`openai-chat:gpt-4o`), the server where it is not the vendor's own, and who named it."""
+
+    model: str
+    base_url: str | None
+    named_by: str
+
+
+class _ConfigurationFile(BaseModel, frozen=True, extra="forbid"):
+    model: str | None = None
+    base_url: str | None = None
+
+
+def configuration_path() -> Path:
+    """The configuration file; it need not exist."""
+    return user_config_path("armwright", appauthor=False) / "config.yaml"
+
+
+def configured_model(model: str | None = None, base_url: str | None = None) -> ModelName | None:
+    """The model by the option, else ARMWRIGHT_MODEL, else the configuration file; None where none is named."""
+    if model:
+        return ModelName(model, base_url or os.environ.get("ARMWRIGHT_BASE_URL"), "--model")
+    named = os.environ.get("ARMWRIGHT_MODEL")
+    if named:
+        return ModelName(named, base_url or os.environ.get("ARMWRIGHT_BASE_URL"), "ARMWRIGHT_MODEL")
+    path = configuration_path()
+    if path.is_file():
+        content = read_document(path, _ConfigurationFile, SettingsError)
+        if content.model:
+            return ModelName(content.model, base_url or content.base_url, str(path))
+    return None

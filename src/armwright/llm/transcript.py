@@ -1,0 +1,85 @@
+"""Every call to a language model, one JSON line each: what was asked, what came back, what it cost."""
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import RunFolderError
+
+
+@dataclass(frozen=True)
+class Call:
+    """One call.
+
+    proposal: the id of the proposal that it belongs to.
+    step: check (may the model be used at all), reasoning (the free answer), parameters (the answer as values).
+    origin: who answered; `model` for a language model.
+    requests: requests sent to the server; above 1 where an answer was refused and asked for again.
+    error: the fault's kind and text, where there was one; then the answer may be empty.
+    """
+
+    proposal: str
+    step: str
+    model: str
+    prompt: str
+    answer: str
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cost_usd: float | None
+    seconds: float
+    error: str | None = None
+    origin: str = "model"
+
+
+class Transcript:
+    """The calls of one run, kept in a file where the run has a folder."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._calls = list(_read(path)) if path is not None else []
+
+    @property
+    def calls(self) -> tuple[Call, ...]:
+        """All calls so far, those of earlier sessions of the run included."""
+        return tuple(self._calls)
+
+    def add(self, call: Call) -> None:
+        """Keeps a call; on disk before this returns, because its answer was paid for."""
+        self._calls.append(call)
+        if self._path is None:
+            return
+        try:
+            with open(self._path, "ab") as file:
+                file.write((json.dumps(asdict(call), ensure_ascii=False) + "\n").encode())
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as fault:
+            raise RunFolderError(f"cannot write {self._path}: {fault.strerror or fault}") from fault
+
+    def answer(self, proposal: str, step: str) -> str | None:
+        """The answer that this step of a proposal got already, if it got one."""
+        found = [c.answer for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.error is None]
+        return found[-1] if found else None
+
+
+def _read(path: Path) -> Iterator[Call]:
+    """The calls of a file; a last line that a crash cut short is dropped from the file, too."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return
+    except OSError as fault:
+        raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
+    end = content.rfind(b"\n") + 1
+    if end < len(content):
+        os.truncate(path, end)
+    for number, line in enumerate(content[:end].splitlines(), start=1):
+        try:
+            record: dict[str, Any] = json.loads(line)
+            yield Call(**record)
+        except (ValueError, TypeError) as fault:
+            raise RunFolderError(f"{path}, line {number} is damaged; restore the file or delete the line") from fault

@@ -1,0 +1,319 @@
+"""The figures of one run, as .png and .pdf in its folder, for papers and for the eye."""
+
+import math
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from armwright.evaluation import Evaluation
+from armwright.exceptions import RunFolderError
+from armwright.history import FrontMember, History
+from armwright.kinematics.chain import joint_positions
+from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, RC, TARGET, Look, look
+from armwright.run_folder import FIGURES, read_run
+
+REACHED = 1e-3  # [m]; a target missed by less counts as reached
+SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
+SHOWN = 1.35  # of the reference point, the part of the plane that is drawn
+MOST_PANELS = 12
+
+
+def write_figures(folder: Path) -> list[Path]:
+    """Draws the figures of a run folder and returns their .png files."""
+    _, history = read_run(folder)
+    for stale in (folder / FIGURES).glob("arm-*"):
+        stale.unlink(missing_ok=True)
+    with matplotlib.rc_context(RC):
+        drawn = [
+            _save(draw_hypervolume(history), folder, "hypervolume"),
+            _save(draw_samples(history), folder, "samples"),
+            _save(draw_front(history), folder, "front"),
+        ]
+        chosen = chosen_members(history)
+        if chosen:
+            drawn.append(_save(draw_arms(history, chosen), folder, "arms"))
+        for title, member in chosen:
+            drawn.append(_save(draw_arm(history, title, member), folder, f"arm-{member.number:04d}"))
+    return drawn
+
+
+def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
+    """Solution 1 (least position error), the knee, Solution 2 (least torque), within the reference box.
+
+    Where the front lies outside the box, its two ends.
+    """
+    reference = _reference(history)
+    ends = solution_numbers(history.values, reference)
+    if ends is None:
+        numbers = front_numbers(history.values)
+        ends = (numbers[0], numbers[-1])
+    knee = knee_number(history.values, reference)
+    titled = {ends[0]: "Solution 1: least position error"}
+    if knee is not None:
+        titled.setdefault(knee, "Knee of the front")
+    titled.setdefault(ends[1], "Solution 2: least torque")
+    return [(title, history.member(number)) for number, title in titled.items()]
+
+
+def draw_hypervolume(history: History) -> Figure:
+    """The hypervolume over the counted trials, with the trials of the proposer marked where they enlarged it."""
+    figure, axes = _figure(5.2, 3.2)
+    curve = history.hypervolume
+    start = hypervolume(history.values[: history.n_init], _reference(history))
+    iterations = np.arange(len(curve) + 1)
+    axes.step(iterations, [start, *curve], where="post", color=FRONT, linewidth=1.4, label="hypervolume")
+    gains = np.diff(np.array([start, *curve])) > 0.0
+    for source in _sources(history):
+        hits = [i for i in range(len(curve)) if gains[i] and history.trials[history.n_init + i].source == source]
+        if hits:
+            style = look(source)
+            axes.scatter(
+                np.array(hits) + 1,
+                curve[hits],
+                s=style.size,
+                marker=style.marker,
+                **_paint(style),
+                zorder=3,
+                label=f"gained by {style.label}",
+            )
+    axes.set_xlabel(f"Iteration (after {history.n_init} random trials)")
+    axes.set_ylabel(f"Hypervolume, reference point {_pair(_reference(history))}")
+    axes.set_xlim(0, max(1, len(curve)))
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="lower right")
+    if len(curve) and curve[-1] == 0.0:
+        _say(axes, "No design lies within the reference box.")
+    return figure
+
+
+def draw_samples(history: History) -> Figure:
+    """All trials after 5, 35, 65 and 100 % of the counted ones, coloured by source, with the front."""
+    figure = Figure(figsize=(10.4, 3.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels: Sequence[Any] = figure.subplots(1, 4, sharex=True, sharey=True)
+    counted = len(history) - history.n_init
+    shown = sorted({max(1, round(share * counted)) for share in SAMPLE_SHARES}) if counted > 0 else [0]
+    for axes, iteration in zip(panels, shown, strict=False):
+        part = History(history.problem, history.trials[: history.n_init + iteration], history.n_init)
+        _scatter(axes, part, _reference(history))
+        beyond = int(np.sum(np.any(part.values > SHOWN * np.asarray(_reference(history)), axis=1)))
+        axes.set_title(f"After {iteration} iterations" + (f" ({beyond} designs outside)" if beyond else ""))
+        axes.set_xlabel(_label(history, 0))
+    for axes in panels[len(shown) :]:
+        axes.set_visible(False)
+    panels[0].set_ylabel(_label(history, 1))
+    panels[0].legend(handles=_legend(history), loc="upper right", borderaxespad=0.1, handletextpad=0.3)
+    return figure
+
+
+def draw_front(history: History) -> Figure:
+    """The front at the end, its designs by source, the chosen ones named."""
+    figure, axes = _figure(5.2, 4.2)
+    reference = _reference(history)
+    _scatter(axes, history, reference, faint=True)
+    for member in history.front:
+        style = look(member.source)
+        axes.scatter(*member.values, s=1.6 * style.size, marker=style.marker, **_paint(style), zorder=4)
+    for title, member in chosen_members(history):
+        axes.annotate(
+            f"{title.split(':')[0]}\n#{member.number}  {member.design.joints}",
+            member.values,
+            xytext=(10, 10),
+            textcoords="offset points",
+            fontsize=8,
+            zorder=5,
+            bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "#BBBBBB", "alpha": 0.9},
+            arrowprops={"arrowstyle": "-", "color": "#888888", "linewidth": 0.8},
+        )
+    axes.set_xlabel(_label(history, 0))
+    axes.set_ylabel(_label(history, 1))
+    axes.legend(handles=_legend(history), loc="upper right")
+    area = history.hypervolume[-1] if len(history.hypervolume) else 0.0
+    axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
+    return figure
+
+
+def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
+    """The chosen designs side by side, each with its postures at all targets."""
+    figure = Figure(figsize=(3.8 * len(chosen), 4.4))
+    FigureCanvasAgg(figure)
+    # The layout engines do not know how far the labels of a 3D plot reach.
+    figure.subplots_adjust(left=0.01, right=0.97, bottom=0.1, top=0.9, wspace=0.08)
+    evaluation = history.evaluation([member.number for _, member in chosen])
+    for column, (title, member) in enumerate(chosen):
+        axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
+        targets = range(len(evaluation.targets))
+        _draw_postures(axes, member, evaluation, column, targets)
+        _frame(axes, _extent(evaluation, [m for _, m in chosen]))
+        axes.set_title(f"{title}\n{_words(history, member)}", y=1.0)
+    figure.legend(handles=_arm_legend(), loc="lower center", ncols=3 if len(chosen) == 1 else 6)
+    return figure
+
+
+def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
+    """One design, a panel for each target (at most 12 of them, spread over the list)."""
+    evaluation = history.evaluation([member.number])
+    n = len(evaluation.targets)
+    shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MOST_PANELS))})
+    columns = min(4, max(2, math.ceil(math.sqrt(len(shown)))))
+    rows = -(-len(shown) // columns)
+    height = 3.1 * rows + 1.2
+    figure = Figure(figsize=(3.1 * columns, height))
+    FigureCanvasAgg(figure)
+    figure.subplots_adjust(left=0.01, right=0.96, bottom=0.55 / height, top=1 - 0.75 / height, wspace=0.08, hspace=0.12)
+    extent = _extent(evaluation, [member])
+    for place, target in enumerate(shown):
+        axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
+        _draw_postures(axes, member, evaluation, 0, [target])
+        _frame(axes, extent)
+        error = evaluation.position_error[0, target]
+        verdict = "reached" if error < REACHED else f"missed by {1e3 * error:.0f} mm"
+        axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=FRONT if error < REACHED else MISSED)
+    part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
+    figure.suptitle(f"{title}{part}\n{_words(history, member)}", fontsize=10)
+    figure.legend(handles=_arm_legend(), loc="lower center", ncols=6 if columns > 2 else 3)
+    return figure
+
+
+def _scatter(axes: Any, history: History, reference: Sequence[float], faint: bool = False) -> None:
+    values = history.values
+    for source in _sources(history):
+        style = look(source)
+        rows = values[[trial.source == source for trial in history]]
+        axes.scatter(
+            rows[:, 0], rows[:, 1], s=style.size, marker=style.marker, alpha=0.25 if faint else 0.75, **_paint(style)
+        )
+    front = values[front_numbers(values)]
+    inside = front[np.all(front < np.asarray(reference), axis=1)]
+    if len(inside):
+        x = [inside[0, 0], *inside[:, 0], reference[0]]
+        y = [reference[1], *inside[:, 1], inside[-1, 1]]
+        axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=3)
+        axes.fill_between(x, y, reference[1], step="post", color="#F0E442", alpha=0.18, linewidth=0)
+    axes.plot(*reference, marker="+", color=FRONT, markersize=9, clip_on=False)
+    axes.set_xlim(0, SHOWN * reference[0])
+    axes.set_ylim(0, SHOWN * reference[1])
+    if not len(inside):
+        _say(axes, "No design lies within the reference box.")
+
+
+def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
+    alpha = 1.0 if len(targets) == 1 else 0.75
+    for target in targets:
+        places = joint_positions(member.arm, evaluation.q[row, target])
+        axes.plot(*places.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
+        for joint, place in zip(member.arm.joints, places[:-1], strict=True):
+            axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
+        goal = evaluation.targets[target]
+        reached = evaluation.position_error[row, target] < REACHED
+        axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
+        if not reached:
+            axes.plot(*np.array([places[-1], goal]).T, color=MISSED, linewidth=1.2, linestyle=(0, (2, 2)))
+    axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
+
+
+def _frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
+    """Equal scales, so that angles and lengths look as they are."""
+    centre, half = extent
+    for name, middle in zip("xyz", centre, strict=True):
+        getattr(axes, f"set_{name}lim")(middle - half, middle + half)
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
+        getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=-6, fontsize=7)
+    axes.tick_params(labelsize=6, pad=-2)
+    axes.set_box_aspect((1, 1, 1))
+    axes.view_init(elev=22, azim=-58)
+
+
+def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.ndarray, float]:
+    bases = np.array([member.arm.base for member in members])
+    points = np.vstack([evaluation.targets, bases, evaluation.reached.reshape(-1, 3)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
+
+
+def _sources(history: History) -> list[str]:
+    """The sources that occur, in the order in which they first did."""
+    return list(dict.fromkeys(trial.source for trial in history))
+
+
+def _legend(history: History) -> list[Line2D]:
+    marks = [
+        Line2D([], [], linestyle="", marker=look(s).marker, color=look(s).colour, markersize=5, label=look(s).label)
+        for s in _sources(history)
+    ]
+    return [*marks, Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front")]
+
+
+def _arm_legend() -> list[Line2D]:
+    joints = [Line2D([], [], linestyle="", marker="o", color=JOINT[a], label=JOINT_LABEL[a]) for a in "xyz"]
+    return [
+        Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
+        *joints,
+        Line2D([], [], linestyle="", marker="*", markersize=9, color=TARGET, markeredgecolor=FRONT, label="target"),
+        Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
+    ]
+
+
+def _paint(style: Look) -> dict[str, Any]:
+    if style.marker == "x":
+        return {"color": style.colour, "linewidths": 1.0}
+    return {"color": style.colour, "edgecolors": "white", "linewidths": 0.4}
+
+
+def _words(history: History, member: FrontMember) -> str:
+    error, torque = member.values
+    length = sum(member.design.links)
+    first = f"#{member.number} ({look(member.source).label}), {member.design.joints}, length {length:.2f} m"
+    return f"{first}\nposition error {error:.3f} m, torque {torque:.3f}"
+
+
+def _label(history: History, i: int) -> str:
+    objective = history.problem.objectives[i]
+    return f"{objective.label} [{objective.unit.replace(' x ', ' × ')}]"
+
+
+def _pair(values: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"
+
+
+def _reference(history: History) -> tuple[float, float]:
+    reference = history.reference_point
+    if reference is None:
+        raise RunFolderError(f"figures need the {history.n_init} random trials; the run has only {len(history)} so far")
+    return reference
+
+
+def _say(axes: Any, words: str) -> None:
+    axes.annotate(words, (0.5, 0.5), xycoords="axes fraction", ha="center", color="#666666")
+
+
+def _figure(width: float, height: float) -> tuple[Figure, Any]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots()
+
+
+def _save(figure: Figure, folder: Path, name: str) -> Path:
+    png = folder / FIGURES / f"{name}.png"
+    with _writing(png):
+        png.parent.mkdir(exist_ok=True)
+        figure.savefig(png)
+        figure.savefig(png.with_suffix(".pdf"), metadata={"CreationDate": None})
+    return png
+
+
+@contextmanager
+def _writing(path: Path) -> Generator[None]:
+    try:
+        yield
+    except OSError as fault:
+        raise RunFolderError(f"cannot write {path}: {fault.strerror or fault}; the trials are safe") from fault

@@ -1,0 +1,51 @@
+"""Colours, shapes and words that all figures share: colour-blind safe (Okabe & Ito), readable in grey."""
+
+from typing import Any, NamedTuple
+
+from armwright.history import BBO, RANDOM
+
+
+class Look(NamedTuple):
+    """How the trials of one source are drawn."""
+
+    label: str
+    colour: str
+    marker: str
+    size: float  # [pt²]
+
+
+_LOOKS = {
+    RANDOM: Look("random", "#9A9A9A", "x", 22),
+    BBO: Look("black box", "#0072B2", "o", 20),
+    "rules": Look("rules", "#D55E00", "^", 44),
+    "llm": Look("language model", "#D55E00", "^", 44),
+}
+FRONT = "#111111"
+MISSED = "#CC0000"
+TARGET = "#CC79A7"
+LINK = "#5A5A60"
+JOINT = {"x": "#D55E00", "y": "#0072B2", "z": "#009E73"}
+JOINT_LABEL = {"x": "R (roll, x)", "y": "P (pitch, y)", "z": "Y (yaw, z)"}
+
+RC: Any = {  # read-only by custom
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "legend.fontsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "figure.dpi": 100,
+    "savefig.dpi": 160,
+    "pdf.fonttype": 42,  # fonts embedded as text, as journals ask
+    "svg.hashsalt": "armwright",
+}
+
+
+def look(source: str) -> Look:
+    """The look of a source; proposers of a user's own look like the built-in ones."""
+    return _LOOKS.get(source, Look(source, "#D55E00", "^", 44))
