@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from armwright.exceptions import ArmError
 
@@ -26,6 +26,10 @@ class Joint:
     upper: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.kind not in get_args(JointKind):
+            raise ArmError(f'joint kind "{self.kind}" is not one of {", ".join(get_args(JointKind))}')
+        if self.axis not in AXES:
+            raise ArmError(f'joint axis "{self.axis}" is not one of {", ".join(AXES)}')
         unit = "m" if self.kind == "prismatic" else "rad"
         if not (math.isfinite(self.lower) and math.isfinite(self.upper)):
             raise ArmError(f"joint limits must be finite: [{self.lower}, {self.upper}] {unit}")

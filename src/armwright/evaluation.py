@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arm import Arm
+from armwright.exceptions import TaskError
 from armwright.kinematics.arrays import stack_arms
 from armwright.kinematics.solve import solve_postures
 
@@ -37,6 +38,8 @@ def evaluate(arms: Sequence[Arm], targets: Array) -> Evaluation:
 
     targets: (T, 3) [m].
     """
+    if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
+        raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
     arrays = stack_arms(arms)
     postures = solve_postures(arrays, targets)
     reached = postures.reached.astype(np.float64)

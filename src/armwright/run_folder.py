@@ -125,7 +125,8 @@ class RunFolder:
 
     def write_config(self, config: RunConfig) -> None:
         """Replaces config.yaml in one step."""
-        self.write_text(CONFIG, yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False, allow_unicode=True))
+        content = config.model_dump(mode="json")
+        self.write_text(CONFIG, yaml.dump(content, Dumper=_ConfigDumper, sort_keys=False, allow_unicode=True))
 
     def open_trials(self, space: DesignSpace) -> list[FinishedTrial]:
         """The finished trials; a last line that a crash cut short is dropped. Opens the file for `append`."""
@@ -198,6 +199,20 @@ class RunFolder:
                 f"{name}/arm.urdf", to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}")
             )
             self.write_text(f"{name}/design.json", json.dumps(record, indent=2) + "\n")
+
+
+class _ConfigDumper(yaml.SafeDumper):
+    """YAML without aliases, points on one line."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+    def represent_sequence(self, tag: str, sequence: Any, flow_style: bool | None = None) -> yaml.Node:
+        plain = all(not isinstance(item, (dict, list)) for item in sequence)
+        return super().represent_sequence(tag, sequence, flow_style=plain)
+
+
+_ConfigDumper.add_representer(list, _ConfigDumper.represent_list)
 
 
 def read_config(path: Path) -> RunConfig:
@@ -274,7 +289,7 @@ def _trial_record(trial: FinishedTrial) -> dict[str, Any]:
         record["fault"] = trial.fault
     record["params"] = dict(trial.design.params)
     record["values"] = list(trial.values)
-    record["seconds"] = {part: round(value, 6) for part, value in trial.seconds.items()}
+    record["seconds"] = dict(trial.seconds)
     return record
 
 

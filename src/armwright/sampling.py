@@ -11,7 +11,7 @@ import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution
 from optuna.samplers import BaseSampler, RandomSampler, TPESampler
 from optuna.study import StudyDirection
-from optuna.trial import Trial, TrialState, create_trial
+from optuna.trial import Trial, create_trial
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.history import RANDOM, FinishedTrial
@@ -109,10 +109,6 @@ class BlackBox:
     def tell(self, trial: Trial, values: Iterable[float]) -> None:
         """The trial's values; from now on the sampler learns from it."""
         self._study.tell(trial, list(values))
-
-    def abandon(self, trial: Trial) -> None:
-        """Ends a trial that could not be evaluated; the sampler learns nothing from it."""
-        self._study.tell(trial, state=TrialState.FAIL)
 
 
 def _attributes(source: str, proposal: str | None) -> dict[str, Any]:

@@ -171,10 +171,10 @@ class Study:
             proposal=proposal.id if proposal is not None else None,
             fault=fault,
             seconds={
-                "total": told - started,
-                "sampling": sampled - proposed + told - evaluated,
-                "evaluation": evaluated - sampled,
-                "proposing": proposed - started,
+                "total": round(told - started, 6),
+                "sampling": round(sampled - proposed + told - evaluated, 6),
+                "evaluation": round(evaluated - sampled, 6),
+                "proposing": round(proposed - started, 6),
             },
         )
         if self.folder is not None:

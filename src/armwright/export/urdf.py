@@ -25,9 +25,9 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
     solid cylinders of uniform density from joint to joint, for inertia, collision and sight.
     """
     robot = ElementTree.Element("robot", name=name)
-    # MuJoCo would otherwise dissolve `base` and `tip`, and drop what is only to be seen.
+    # MuJoCo would otherwise dissolve `base` and `tip`, drop what is only to be seen, and refuse links without mass.
     compiler = ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler")
-    compiler.attrib.update(fusestatic="false", discardvisual="false")
+    compiler.attrib.update(fusestatic="false", discardvisual="false", boundmass="1e-12", boundinertia="1e-14")
     for material, rgba in COLOURS.items():
         ElementTree.SubElement(ElementTree.SubElement(robot, "material", name=material), "color", rgba=rgba)
     ElementTree.SubElement(robot, "link", name="world")
@@ -62,22 +62,15 @@ def _add_joint(
 def _add_link(robot: ElementTree.Element, name: str, joint: Joint, link: Link) -> None:
     element = ElementTree.SubElement(robot, "link", name=name)
     rpy = _numbers(_along(link.offset))
-    if link.mass > 0.0:
-        inertial = ElementTree.SubElement(element, "inertial")
-        ElementTree.SubElement(inertial, "origin", xyz=_numbers(link.com), rpy=rpy)
-        ElementTree.SubElement(inertial, "mass", value=_number(link.mass))
-        across = link.mass * (3.0 * link.radius**2 + link.length**2) / 12.0
-        around = link.mass * link.radius**2 / 2.0
-        ElementTree.SubElement(
-            inertial,
-            "inertia",
-            ixx=_number(across),
-            iyy=_number(across),
-            izz=_number(around),
-            ixy="0",
-            ixz="0",
-            iyz="0",
-        )
+    # Stated for a mass of 0 too: where it is not, MuJoCo takes water's density and scikit-robot takes 1 g.
+    inertial = ElementTree.SubElement(element, "inertial")
+    ElementTree.SubElement(inertial, "origin", xyz=_numbers(link.com), rpy=rpy)
+    ElementTree.SubElement(inertial, "mass", value=_number(link.mass))
+    # A cylinder without length is a disc, 2 across = around: all digits, as MuJoCo refuses what is a rounding below it.
+    around = link.mass * link.radius**2 / 2.0
+    across = around / 2.0 + link.mass * link.length**2 / 12.0
+    moments = {"ixx": f"{across:.17g}", "iyy": f"{across:.17g}", "izz": f"{around:.17g}"}
+    ElementTree.SubElement(inertial, "inertia", {**moments, "ixy": "0", "ixz": "0", "iyz": "0"})
     if link.length > 0.0:
         middle = _numbers((link.offset[0] / 2, link.offset[1] / 2, link.offset[2] / 2))
         for purpose in ("visual", "collision"):

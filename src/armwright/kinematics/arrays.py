@@ -59,14 +59,20 @@ def stack_arms(arms: Sequence[Arm]) -> ArmArrays:
     return ArmArrays(
         base=np.array([base for base, _ in rigid], dtype=np.float32),
         axis=np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.int32),
-        lower=np.array([[j.lower for j in row] for row in joints], dtype=np.float32),
-        upper=np.array([[j.upper for j in row] for row in joints], dtype=np.float32),
+        lower=-_rounded_down([[-j.lower for j in row] for row in joints]),
+        upper=_rounded_down([[j.upper for j in row] for row in joints]),
         offset=np.array([[link.offset for link in links] for _, links in rigid], dtype=np.float32),
         com=np.array([[link.com for link in links] for _, links in rigid], dtype=np.float32),
         mass=np.array([[link.mass for link in links] for _, links in rigid], dtype=np.float32),
         joint_numbers=moving,
         n_joints=len(kinds),
     )
+
+
+def _rounded_down(limits: list[list[float]]) -> Floats:
+    """In float32 and never above: float32 of 2.4 rad is 1e-7 rad more, which no kept angle may be."""
+    near = np.array(limits, dtype=np.float32)
+    return np.where(near > np.array(limits), np.nextafter(near, np.float32(-np.inf)), near)
 
 
 def _check_alike(arm: Arm, kinds: tuple[str, ...]) -> None:

@@ -116,8 +116,9 @@ def kernels(dof: int) -> Kernels:
         weight = Joints()
         pull = Joints()
         h = Joints()
-        jjt = wp.mat33()
-        jwjt = wp.mat33()
+        # In float64: the products square the condition of J, and near the limits W can make it 1e5 worse.
+        jjt = wp.mat33d()
+        jwjt = wp.mat33d()
         for j in range(D):
             lower = arms.lower[arm, j]
             upper = arms.upper[arm, j]
@@ -129,14 +130,16 @@ def kernels(dof: int) -> Kernels:
             pull[j] = w * centring(q[j], lower, upper)
             column = wp.cross(axes[j], tip - places[j])
             jacobian[j] = column
-            square = wp.outer(column, column)
+            wide = wp.vec3d(column)
+            square = wp.outer(wide, wide)
             jjt += square
-            jwjt += w * square
+            jwjt += wp.float64(w) * square
             dx -= pull[j] * column  # J# dx + (I - J# J) y = y + J# (dx - J y)
-        manipulability = wp.sqrt(wp.max(wp.determinant(jjt), 0.0))
+        manipulability = wp.sqrt(wp.max(float(wp.determinant(jjt)), 0.0))
         lack = wp.max(0.0, 1.0 - manipulability / LEAST_MANIPULABILITY)
         k = DAMPING * lack * lack
-        v = wp.inverse(jwjt + wp.diag(wp.vec3(k, k, k))) * dx
+        damping = wp.diag(wp.vec3d(wp.vec3(k, k, k)))
+        v = wp.vec3(wp.inverse(jwjt + damping) * wp.vec3d(dx))
         result = Joints()
         for j in range(D):
             step = pull[j] + weight[j] * wp.dot(jacobian[j], v)

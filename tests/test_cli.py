@@ -1,0 +1,202 @@
+"""The command line as a user meets it: in a process of its own."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.chat_server import ChatServer
+
+SHORT = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
+
+
+def armwright(*args: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "armwright", *args],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def refused(code: int, *args: str, **environment: str) -> str:
+    """The one line of an error; never a traceback."""
+    done = armwright(*args, **environment)
+    assert done.returncode == code, done.stderr
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1, done.stderr
+    assert lines[0].startswith("armwright: ")
+    return lines[0]
+
+
+def test_optimize_end_to_end(in_folder: Path) -> None:
+    done = armwright("optimize", "target-1", *SHORT)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout.splitlines()[0] == "proposer: rules (no language model is configured; --model names one)"
+    assert "iteration 6/6" in done.stdout
+    assert "a toy" in done.stdout  # wherever N m are shown for the paper's masses
+    run = in_folder / "runs" / "target-1-seed0"
+    assert f"results: runs/{run.name}/" in done.stdout
+    figures = {path.name for path in (run / "figures").iterdir()}
+    for name in ("hypervolume", "samples", "front", "arms"):
+        assert {f"{name}.png", f"{name}.pdf"} <= figures
+    assert list((run / "designs").glob("*/arm.urdf"))
+
+    again = armwright("optimize", "target-1", *SHORT)
+    assert "is finished" in again.stdout
+    assert done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4] == (
+        again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4]
+    )
+    longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
+    assert "resumed at trial 10 of 13" in longer.stdout
+    message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
+    assert "proposer.name: rules there, None asked" in message
+
+
+def test_json_is_alone_on_stdout(in_folder: Path) -> None:
+    done = armwright("optimize", "target-2", *SHORT, "--proposer", "none", "--json", "--out", "here")
+    summary = json.loads(done.stdout)
+    assert (summary["task"], summary["n_trials"], summary["folder"]) == ("target-2", 10, "here")
+    assert "proposer: none" in done.stderr
+
+
+def test_own_task_and_space(in_folder: Path) -> None:
+    (in_folder / "points.csv").write_text("x;y;z\n450;0;100\n450;200;300\n")
+    made = armwright("init", "shelf.yaml", "--from", "points.csv", "--unit", "mm", "--offset", "0", "0", "0.5")
+    assert made.returncode == 0, made.stderr
+    assert yaml.safe_load((in_folder / "shelf.yaml").read_text())["targets"] == [[0.45, 0.0, 0.6], [0.45, 0.2, 0.8]]
+    (in_folder / "space.yaml").write_text("joints: 3\nmass: {kind: per_link, kg: 0.002}\n")
+    done = armwright("optimize", "shelf.yaml", "--space", "space.yaml", "--sampler", "random", *SHORT)
+    assert done.returncode == 0, done.stderr
+    config = yaml.safe_load((in_folder / "runs/shelf-seed0/config.yaml").read_text())
+    assert config["space"]["joints"] == 3
+    assert config["reference_point"] is not None
+
+
+def test_a_model_by_option_environment_and_file(chat_server: ChatServer, in_folder: Path) -> None:
+    def first_line(*args: str, **environment: str) -> str:
+        done = armwright("optimize", "target-1", *SHORT, *args, **environment)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.splitlines()[0]
+
+    by_option = first_line("--model", "m", "--base-url", chat_server.url, "--out", "a", "--prompt", "minus")
+    assert by_option == f"proposer: llm (m at {chat_server.url}, named by --model; prompt minus)"
+    by_environment = first_line("--out", "b", ARMWRIGHT_MODEL="m", ARMWRIGHT_BASE_URL=chat_server.url)
+    assert "named by ARMWRIGHT_MODEL" in by_environment
+    config = in_folder / "config" / "armwright" / "config.yaml"
+    config.parent.mkdir(parents=True)
+    config.write_text(f"model: m\nbase_url: {chat_server.url}\n")
+    by_file = first_line("--out", "c", XDG_CONFIG_HOME=str(in_folder / "config"))
+    assert f"named by {config}" in by_file
+    assert "proposer: rules" in first_line("--out", "d", OPENAI_API_KEY="sk-lying-about")  # a key alone spends nothing
+    assert len((in_folder / "a" / "transcripts.jsonl").read_text().splitlines()) == 5
+
+
+def test_init_writes_a_file_to_edit_and_overwrites_none(in_folder: Path) -> None:
+    assert "3 targets" in armwright("init", "my-task.yaml").stdout
+    text = (in_folder / "my-task.yaml").read_text()
+    assert "# " in text
+    assert "exists already" in refused(2, "init", "my-task.yaml")
+    assert (in_folder / "my-task.yaml").read_text() == text
+    assert "ends in .yaml" in refused(2, "init", "my-task.txt")
+    assert "cannot read" in refused(2, "init", "other.yaml", "--from", "nothing.csv")
+
+
+def test_tasks_are_listed_with_points_and_provenance() -> None:
+    done = armwright("tasks")
+    for word in ("target-1", "(-0.45, -0.45, -0.45)", "reconstruction", "slideopt-wide", "arXiv 2309.14226"):
+        assert word in done.stdout
+    assert [task["name"] for task in json.loads(armwright("tasks", "--json").stdout)][0] == "target-1"
+
+
+def test_version_and_help() -> None:
+    assert armwright("--version").stdout.strip() == "0.1.0"
+    assert "optimize" in armwright("--help").stdout
+    assert "--n-step" in armwright("optimize", "--help").stdout
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("targt-1",), 'unknown task "targt-1". Did you mean "target-1"?'),
+        (("nothing.yaml",), "there is no file nothing.yaml"),
+        (("bad.yaml",), 'unknown key "target".'),
+        (("nan.yaml",), "finite number (got nan)"),
+        (("empty.yaml",), "targets is empty"),
+        (("target-1", "--space", "upside.yaml"), "upside down"),
+        (("target-1", "--space", "nothing.yaml"), "cannot read nothing.yaml"),
+        (("target-1", "--n-step", "0"), "n_step = 0: a whole number from 1 up is needed"),
+        (("target-1", "--n-total", "-5"), "n_total = -5"),
+        (("target-1", "--seed", "-1"), "seed = -1"),
+        (("target-1", "--sampler", "tpee"), 'Did you mean "tpe"?'),
+        (("target-1", "--proposer", "rule"), 'Did you mean "rules"?'),
+        (("target-1", "--proposer", "llm"), "needs a language model"),
+        (("target-1", "--model", "openai-chat:gpt-4o"), "OPENAI_API_KEY"),
+        (("target-1", "--model", "gpt-4o"), "openai-chat:gpt-4o"),
+        (("target-1", "--model", "m", "--base-url", "localhost"), "http://"),
+        (("target-1", "--base-url", "http://127.0.0.1:9"), "needs --model"),
+        (("target-1", "--model", "m", "--proposer", "none"), "uses no language model"),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--prompt", "x"), 'unknown prompt "x"'),
+    ],
+)
+def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
+    (in_folder / "bad.yaml").write_text("name: a\ntarget: [[0, 0, 0]]")
+    (in_folder / "nan.yaml").write_text("name: a\ntargets: [[0, 0, .nan]]")
+    (in_folder / "empty.yaml").write_text("name: a\ntargets: []")
+    (in_folder / "upside.yaml").write_text("link: [0.3, 0.03]")
+    assert words in refused(2, "optimize", *args)
+    assert not (in_folder / "runs").exists()
+
+
+def test_a_server_that_does_not_answer_is_code_1(in_folder: Path) -> None:
+    message = refused(1, "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1")
+    assert "--proposer rules needs none" in message
+
+
+def test_a_damaged_folder_is_code_1(in_folder: Path) -> None:
+    armwright("optimize", "target-1", *SHORT, "--out", "run")
+    (in_folder / "run" / "trials.jsonl").write_text("garbage\n")
+    assert "line 1 is damaged" in refused(1, "optimize", "target-1", *SHORT, "--out", "run")
+
+
+@pytest.mark.parametrize("place", ["file/run", "/proc/armwright"])
+def test_an_output_folder_that_cannot_be_written_is_code_1(in_folder: Path, place: str) -> None:
+    """Also as root, whom a read-only mode does not stop."""
+    (in_folder / "file").write_text("")
+    assert f"cannot write {place}" in refused(1, "optimize", "target-1", *SHORT, "--out", place)
+
+
+def test_an_unknown_option_is_code_2() -> None:
+    done = armwright("optimize", "target-1", "--nstep", "5")
+    assert done.returncode == 2
+    assert "--n-step" in done.stderr
+
+
+def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
+    command = [sys.executable, "-m", "armwright", "optimize", "target-1", "--n-total", "5000", "--out", "run"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith("iteration 10/"):
+            break
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate()
+    assert process.returncode == 130
+    assert "Traceback" not in output + errors
+    assert "Go on with:\n  armwright optimize target-1 --n-total 5000 --out run" in output
+    kept = len((in_folder / "run" / "trials.jsonl").read_text().splitlines())
+    assert kept >= 20
+
+
+def test_help_needs_no_heavy_import() -> None:
+    heavy = {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}
+    code = f"import sys; import armwright.cli; sys.exit(', '.join({heavy!r} & set(sys.modules)) or 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,152 @@
+"""The black box on Optuna, and each of the traps of asking, telling and injecting."""
+
+import optuna
+import pytest
+from optuna.samplers import BaseSampler, NSGAIISampler, RandomSampler, TPESampler
+from optuna.trial import TrialState
+
+from armwright.exceptions import DesignError, SettingsError
+from armwright.history import BBO, RANDOM, FinishedTrial
+from armwright.problem import Problem
+from armwright.sampling import BlackBox, distributions, sampler_factory
+from armwright.space import Design, paper_space
+from armwright.task import Task, load_task
+
+SPACE = paper_space()
+PROBLEM = Problem(load_task("target-1"))
+
+
+def finished(number: int, design: Design, source: str = RANDOM) -> FinishedTrial:
+    values = PROBLEM.evaluate([design])[0].tolist()
+    return FinishedTrial(number, source, design, tuple(values))
+
+
+def fill(box: BlackBox, n: int, first: int = 0) -> list[FinishedTrial]:
+    trials: list[FinishedTrial] = []
+    for number in range(first, first + n):
+        trial, design = box.draw(number, RANDOM if number < 10 else BBO)
+        trials.append(finished(number, design))
+        box.tell(trial, trials[-1].values)
+    return trials
+
+
+def test_distributions_are_the_spaces_parameters() -> None:
+    found = distributions(SPACE)
+    assert list(found) == [parameter.name for parameter in SPACE.parameters]
+    assert len(found) == 2 * 4 + 3
+
+
+@pytest.mark.parametrize(("name", "value"), [("link_3", 1.4), ("joint_2", "Z"), ("origin_x", float("nan"))])
+def test_what_is_outside_the_space_never_enters_the_study(name: str, value: float | str) -> None:
+    """Optuna takes an out-of-range value with a warning; an unknown category leaves its trial RUNNING."""
+    box = BlackBox(SPACE, "tpe", seed=0)
+    wrong = Design({**SPACE.sample(1, 0)[0].params, name: value})
+    with pytest.raises(DesignError, match=name):
+        box.inject(wrong, 0, "rules", "rules-0000")
+    assert box.study.get_trials(deepcopy=False) == []
+
+
+def test_an_injected_design_is_evaluated_as_it_is_and_marked() -> None:
+    box = BlackBox(SPACE, "tpe", seed=0)
+    design = SPACE.sample(1, 3)[0]
+    trial = box.inject(design, 0, "rules", "rules-0000")
+    box.tell(trial, (1.0, 2.0))
+    kept = box.study.trials[0]
+    assert kept.state is TrialState.COMPLETE
+    assert kept.params == dict(design.params)
+    assert kept.user_attrs == {"source": "rules", "proposal": "rules-0000"}
+
+
+def test_the_sampler_learns_from_injected_designs() -> None:
+    """The same seed draws another design once an injected one has been told."""
+    plain, taught = BlackBox(SPACE, "tpe", seed=0), BlackBox(SPACE, "tpe", seed=0)
+    for box in (plain, taught):
+        fill(box, 12)
+    for box, values in ((plain, (9.0, 9.0)), (taught, (0.1, 0.1))):
+        box.tell(box.inject(SPACE.sample(1, 7)[0], 12, "rules", "rules-0012"), values)
+    assert plain.draw(13, BBO)[1] != taught.draw(13, BBO)[1]
+
+
+def test_injected_designs_count_towards_the_startup_trials_of_tpe() -> None:
+    """TPE draws at random until it has 10 trials, whoever made them."""
+    for n, random in ((9, True), (10, False)):
+        box = BlackBox(SPACE, "tpe", seed=0)
+        for number, design in enumerate(SPACE.sample(n, 1)):
+            box.tell(box.inject(design, number, "rules", f"rules-{number}"), (1.0 + number, 2.0))
+        drawn = box.draw(n, BBO)[1]
+        assert (drawn == box.__class__(SPACE, "random", seed=0).draw(n, BBO)[1]) is random
+
+
+def test_a_restored_study_goes_on_as_if_it_had_never_stopped() -> None:
+    whole = BlackBox(SPACE, "tpe", seed=5)
+    trials = fill(whole, 25)
+    resumed = BlackBox(SPACE, "tpe", seed=5)
+    resumed.restore(trials[:17])
+    assert [trial.design for trial in fill(resumed, 8, first=17)] == [trial.design for trial in trials[17:]]
+
+
+def test_no_draw_repeats_another() -> None:
+    """One seed for the whole run would repeat its first draws after every resume."""
+    designs = [trial.design for trial in fill(BlackBox(SPACE, "random", seed=0), 50)]
+    assert len(set(designs)) == 50
+
+
+def test_random_trials_do_not_depend_on_the_sampler() -> None:
+    """So that methods that are compared by seed begin alike."""
+    a = fill(BlackBox(SPACE, "tpe", seed=3), 10)
+    b = fill(BlackBox(SPACE, "random", seed=3), 10)
+    assert [trial.design for trial in a] == [trial.design for trial in b]
+
+
+def test_genetic_samplers_take_injected_designs_as_parents() -> None:
+    """NSGA-II passes over enqueued trials unless they were given a generation."""
+
+    def nsga2(seed: int) -> BaseSampler:
+        return NSGAIISampler(population_size=4, mutation_prob=0.0, crossover_prob=0.0, seed=seed)
+
+    box = BlackBox(SPACE, nsga2, seed=0)
+    injected = SPACE.sample(4, 11)
+    for number, design in enumerate(injected):
+        box.tell(box.inject(design, number, "rules", f"rules-{number}"), (1.0 + number, 5.0 - number))
+    generations = [
+        value
+        for trial in box.study.trials
+        for name, value in trial.system_attrs.items()
+        if name.endswith("generation")
+    ]
+    assert generations == [0, 0, 0, 0]
+    child = box.draw(4, BBO)[1]
+    assert child in injected  # without crossover and mutation a child is a parent
+
+
+def test_a_target_out_of_reach_is_a_finite_objective_not_a_failure() -> None:
+    """FAILED trials would teach the sampler nothing."""
+    problem = Problem(Task(name="far", targets=((50.0, 0.0, 0.0),)))
+    box = BlackBox(SPACE, "tpe", seed=0)
+    trial, design = box.draw(0, RANDOM)
+    box.tell(trial, problem.evaluate([design])[0].tolist())
+    assert box.study.trials[0].state is TrialState.COMPLETE
+    assert 40.0 < box.study.trials[0].values[0] < 60.0
+
+
+def test_tpe_is_the_papers() -> None:
+    sampler = sampler_factory("tpe")(0)
+    assert isinstance(sampler, TPESampler)
+    assert isinstance(sampler_factory("random")(0), RandomSampler)
+    assert sampler_factory(lambda seed: RandomSampler(seed=seed))(0) is not None
+
+
+def test_an_unknown_sampler_is_refused_by_name() -> None:
+    with pytest.raises(SettingsError, match='unknown sampler "tp".*Did you mean "tpe"'):
+        sampler_factory("tp")
+
+
+def test_the_users_optuna_verbosity_is_left_as_it_was(capfd: pytest.CaptureFixture[str]) -> None:
+    before = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.INFO)
+    try:
+        BlackBox(SPACE, "tpe", seed=0)
+        assert optuna.logging.get_verbosity() == optuna.logging.INFO
+        assert capfd.readouterr().err == ""
+    finally:
+        optuna.logging.set_verbosity(before)

@@ -1,0 +1,145 @@
+"""The design space: what it holds, what it builds, what it refuses."""
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armwright.exceptions import DesignError, SpaceError
+from armwright.space import Design, DesignSpace, FloatParameter, MassOfTube, MassPerLink, load_space, paper_space
+
+GOOD = paper_space().sample(1, 0)[0].params
+
+
+def test_the_papers_space() -> None:
+    space = paper_space(joints=4)
+    names = [parameter.name for parameter in space.parameters]
+    joints = [f"joint_{j}" for j in (1, 2, 3, 4)]
+    assert names == ["origin_x", "origin_y", "origin_z", *joints, "link_1", "link_2", "link_3", "link_4"]
+    assert [(p.low, p.high) for p in space.parameters if isinstance(p, FloatParameter)] == [(-1, 1)] * 3 + [
+        (0.03, 0.30)
+    ] * 4
+
+
+@pytest.mark.parametrize("joints", range(1, 9))
+def test_there_are_2d_plus_3_parameters(joints: int) -> None:
+    assert len(paper_space(joints).parameters) == 2 * joints + 3
+
+
+def test_a_design_builds_the_arm_of_its_values() -> None:
+    space = paper_space()
+    design = space.clipped((0.1, -0.2, 0.3), "YPRP", (0.1, 0.2, 0.05, 0.3))
+    arm = space.arm(design)
+    assert arm.base == (0.1, -0.2, 0.3)
+    assert [joint.axis for joint in arm.joints] == ["z", "y", "x", "y"]
+    assert {(joint.kind, joint.lower, joint.upper) for joint in arm.joints} == {("revolute", -2.4, 2.4)}
+    assert [link.offset for link in arm.links] == [(0, 0, 0.1), (0, 0, 0.2), (0, 0, 0.05), (0, 0, 0.3)]
+    assert [link.mass for link in arm.links] == pytest.approx([0.00121, 0.00242, 0.000605, 0.00363])
+    assert arm.links[1].com == (0, 0, 0.1)
+    assert arm.reach == pytest.approx(0.65)
+    assert (design.origin, design.joints, design.links) == ((0.1, -0.2, 0.3), "YPRP", (0.1, 0.2, 0.05, 0.3))
+
+
+def test_the_mass_model_is_a_switch() -> None:
+    design = paper_space().clipped((0, 0, 0), "YPRP", (0.1, 0.2, 0.05, 0.3))
+    per_link = paper_space().model_copy(update={"mass": MassPerLink(kind="per_link")})
+    assert [link.mass for link in per_link.arm(design).links] == [0.002] * 4
+    tube = MassOfTube(kind="tube", density=2700, outer_diameter=0.03, wall=0.002)
+    assert tube.mass(1.0) == pytest.approx(2700 * math.pi * (0.015**2 - 0.013**2))
+    assert "a toy" in paper_space().mass_note
+    assert "a toy" not in paper_space().model_copy(update={"mass": tube}).mass_note
+
+
+@given(seed=st.integers(0, 2**31), joints=st.integers(1, 8))
+def test_samples_lie_in_the_space(seed: int, joints: int) -> None:
+    space = paper_space(joints)
+    for design in space.sample(3, seed):
+        assert space.design(design.params) == design
+
+
+def test_samples_depend_on_the_seed_alone() -> None:
+    assert paper_space().sample(5, 1) == paper_space().sample(5, 1) != paper_space().sample(5, 2)
+
+
+@given(st.lists(st.floats(-10, 10), min_size=7, max_size=7))
+def test_clipped_is_always_in_the_space(values: list[float]) -> None:
+    design = paper_space().clipped(values[:3], "YPRP", values[3:])
+    assert paper_space().design(design.params) == design
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"link_3": 1.4}, "link_3 = 1.4 m is outside 0.03 <= link_3 <= 0.3 m"),
+        ({"link_3": 0.029}, "link_3 = 0.029 m is outside"),
+        ({"origin_x": float("nan")}, "origin_x = nan is not a finite number [m]"),
+        ({"origin_x": True}, "origin_x = True is not a finite number [m]"),
+        ({"origin_x": "0.1"}, "origin_x = '0.1' is not a finite number [m]"),
+        ({"joint_1": "Z"}, "joint_1 = 'Z' is not one of R, P, Y"),
+        ({"joint_1": ["R"]}, "joint_1 = ['R'] is not one of R, P, Y"),
+        ({"orgin_x": 0.0}, 'unknown parameter "orgin_x".*Did you mean "origin_x"?'),
+    ],
+)
+def test_what_a_space_refuses_it_names(change: dict[str, object], message: str) -> None:
+    with pytest.raises(DesignError) as refusal:
+        paper_space().design({**GOOD, **change})
+    for part in message.split(".*"):
+        assert part in str(refusal.value)
+
+
+def test_missing_parameters_are_named() -> None:
+    with pytest.raises(DesignError, match="missing: link_4"):
+        paper_space().design({name: value for name, value in GOOD.items() if name != "link_4"})
+
+
+def test_a_file_changes_what_it_names_and_keeps_the_rest(tmp_path: Path) -> None:
+    file = tmp_path / "space.yaml"
+    file.write_text(
+        "name: six\njoints: 6\nlink: [0.1, 0.5]\norigin_z: [0, 0]\n"
+        "mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}\n"
+    )
+    space = load_space(file)
+    assert (space.joints, space.link, space.origin_z, space.origin_x) == (6, (0.1, 0.5), (0.0, 0.0), (-1.0, 1.0))
+    assert space.design(space.sample(1, 0)[0].params).params["origin_z"] == 0.0
+    assert DesignSpace.model_validate(space.model_dump(mode="json")) == space
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("joints: 0", "joints"),
+        ("joints: 9", "less than or equal to 8"),
+        ("link: [0.3, 0.03]", "link = [0.3, 0.03] m is upside down"),
+        ("origin_x: [1, -1]", "origin_x = [1, -1] m is upside down"),
+        ("link: [0, 0.3]", "longer than 0 m"),
+        ("joint_range: [0.5, 2.4]", "must hold 0"),
+        ("joint_range: [0, 0.01]", "narrower than 3 degrees"),
+        ("joint_types: [R, R]", "names a type twice"),
+        ("joint_types: []", "joint_types"),
+        ("joint_types: [R, X]", "joint_types"),
+        ("links: [0.03, 0.3]", 'unknown key "links".'),
+        ("mass: {kind: lead}", "mass"),
+        ("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.02}", "more than half"),
+        ("origin_x: [-.inf, 1]", "finite"),
+        ("origin_x: [-1.0e308, 1]", "beyond"),
+        ("- a\n- list", "keys and values"),
+        ("a: [", "not valid YAML"),
+        ("a: &x 1\nb: *x", "aliases"),
+        ("joints: 4\njoints: 5", "twice"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "space.yaml"
+    file.write_text(text)
+    with pytest.raises(SpaceError) as refusal:
+        load_space(file)
+    assert words in str(refusal.value)
+    assert str(file) in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_designs_are_values() -> None:
+    assert Design(GOOD) == Design(dict(GOOD))
+    assert len({Design(GOOD), Design(dict(GOOD))}) == 1

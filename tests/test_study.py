@@ -1,0 +1,204 @@
+"""The study: schedule, reference point, hypervolume, resume."""
+
+import json
+from pathlib import Path
+
+import moocore
+import numpy as np
+import pytest
+from optuna.samplers import BaseSampler, RandomSampler
+
+from armwright.exceptions import ProposalError, RunConflictError, RunFolderError, SettingsError
+from armwright.history import History
+from armwright.problem import Problem
+from armwright.proposers.proposer import Proposal, Proposer
+from armwright.study import Progress, Run, optimize
+from armwright.task import Task, load_task
+
+PROBLEM = Problem(load_task("target-1"))
+OPEN = Problem(Task(name="open", targets=((0.3, 0.0, 0.3), (0.3, 0.2, 0.5))))  # states no reference point
+
+
+class Listed(Proposer):
+    """Proposes uniform designs, or fails where `faulty` says so."""
+
+    name = "listed"
+
+    def __init__(self, faulty: tuple[int, ...] = ()) -> None:
+        self.faulty = faulty
+
+    def propose(self, history: History, seed: int) -> Proposal:
+        if len(history) in self.faulty:
+            raise ProposalError("timeout", "it did not answer")
+        return Proposal(history.problem.space.sample(1, seed)[0], f"listed-{len(history)}")
+
+
+def short(out: Path | None = None, problem: Problem = PROBLEM, proposer: Proposer | str = "none", n_total: int = 8) -> Run:
+    return optimize(problem, proposer=proposer, n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
+
+
+def designs(run: Run) -> list[object]:
+    return [(trial.source, trial.design, trial.values, trial.proposal) for trial in run.trials]
+
+
+def test_schedule() -> None:
+    """n_init random trials, then blocks of n_step whose first trial is the proposer's."""
+    run = short(proposer=Listed())
+    assert [trial.source for trial in run.trials] == ["random"] * 5 + ["listed", "bbo", "bbo", "bbo"] * 2
+    assert [trial.number for trial in run.trials] == list(range(13))
+
+
+def test_every_trial_can_be_the_proposers() -> None:
+    run = optimize(PROBLEM, proposer=Listed(), n_init=2, n_step=1, n_total=3)
+    assert [trial.source for trial in run.trials] == ["random"] * 2 + ["listed"] * 3
+
+
+def test_values_are_those_of_the_problem_and_the_curve_is_moocores() -> None:
+    run = short(n_total=30)
+    values = np.array([trial.values for trial in run.trials])
+    assert values == pytest.approx(PROBLEM.evaluate([trial.design for trial in run.trials]), abs=0)
+    expected = [
+        moocore.hypervolume(np.minimum(values[: 5 + i], 5.0), ref=[5.0, 5.0]) for i in range(1, 31)
+    ]  # a point moved onto the reference point's lines dominates no area
+    assert run.hypervolume == pytest.approx(np.array(expected))
+    assert run.summary["hypervolume"]["final"] == pytest.approx(expected[-1])
+    assert run.summary["hypervolume"]["mean"] == pytest.approx(np.mean(expected))
+    assert np.all(np.diff(run.hypervolume) >= 0.0)
+
+
+def test_front_members_are_the_non_dominated_trials_with_their_arms() -> None:
+    run = short(n_total=30)
+    values = np.array([trial.values for trial in run.trials])
+    assert [m.number for m in run.front] == sorted(np.flatnonzero(moocore.is_nondominated(values)), key=lambda n: values[n, 0])
+    assert run.front[0].values == run.trials[run.front[0].number].values
+    assert run.front[0].arm == PROBLEM.arm(run.front[0].design)
+
+
+def test_the_same_seed_gives_the_same_run() -> None:
+    assert designs(short()) == designs(short())
+    other = optimize(PROBLEM, proposer="none", n_init=5, n_total=8, seed=1)
+    assert other.trials[0].design != short().trials[0].design
+
+
+def test_a_reference_point_that_the_task_leaves_open_is_frozen(tmp_path: Path) -> None:
+    run = short(tmp_path / "run", OPEN)
+    first = np.array([trial.values for trial in run.trials[:5]])
+    expected = 1.1 * first[moocore.is_nondominated(first)].max(axis=0)
+    assert run.config.reference_point == pytest.approx(expected)
+    more = short(tmp_path / "run", OPEN, n_total=16)
+    assert more.config.reference_point == run.config.reference_point
+    assert more.hypervolume[:8] == pytest.approx(run.hypervolume)
+
+
+def test_a_proposal_that_fails_becomes_a_black_box_trial() -> None:
+    run = short(proposer=Listed(faulty=(9,)))
+    assert (run.trials[9].source, run.trials[9].fault, run.trials[9].proposal) == ("bbo", "timeout", None)
+    assert run.summary["proposer"]["failures"] == {"timeout": 1}
+
+
+def test_a_proposer_that_never_worked_is_an_error_that_loses_nothing(tmp_path: Path) -> None:
+    with pytest.raises(Exception, match="did not answer"):
+        short(tmp_path / "run", proposer=Listed(faulty=(5,)))
+    assert len((tmp_path / "run" / "trials.jsonl").read_text().splitlines()) == 5
+    assert short(tmp_path / "run", proposer=Listed()).resumed == 5
+
+
+@pytest.mark.parametrize("proposer", ["none", "rules", Listed()])
+@pytest.mark.parametrize("stop", [3, 5, 6, 12])
+def test_a_resumed_run_equals_an_uninterrupted_one(tmp_path: Path, proposer: Proposer | str, stop: int) -> None:
+    whole = optimize(PROBLEM, proposer=proposer, n_init=5, n_step=4, n_total=20, seed=0)
+
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == stop:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        optimize(
+            PROBLEM, proposer=proposer, n_init=5, n_step=4, n_total=20, seed=0, out=tmp_path / "run", watch=interrupt
+        )
+    resumed = optimize(PROBLEM, proposer=proposer, n_init=5, n_step=4, n_total=20, seed=0, out=tmp_path / "run")
+    assert resumed.resumed == stop + 1
+    assert designs(resumed) == designs(whole)
+
+
+def test_a_larger_n_total_extends_and_a_finished_run_is_only_read(tmp_path: Path) -> None:
+    short(tmp_path / "run", n_total=8)
+    content = (tmp_path / "run" / "trials.jsonl").read_bytes()
+    again = short(tmp_path / "run", n_total=8)
+    assert (again.resumed, len(again.trials)) == (13, 13)
+    assert (tmp_path / "run" / "trials.jsonl").read_bytes() == content
+    longer = short(tmp_path / "run", n_total=12)
+    assert longer.resumed == 13
+    assert designs(longer) == designs(short(n_total=12))
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["n_trials"] == 17
+
+
+def test_other_settings_are_refused_with_their_differences(tmp_path: Path) -> None:
+    short(tmp_path / "run", n_total=8)
+    with pytest.raises(RunConflictError) as refusal:
+        optimize(PROBLEM, proposer=Listed(), n_init=5, n_step=2, n_total=6, seed=3, out=tmp_path / "run")
+    for difference in (
+        "n_step: 4 there, 2 asked",
+        "seed: 0 there, 3 asked",
+        "proposer.name: None there, listed asked",
+        "n_total: 8 there, 6 asked (it can only grow)",
+    ):
+        assert difference in str(refusal.value)
+
+
+def test_two_processes_cannot_write_one_run(tmp_path: Path) -> None:
+    def second(progress: Progress) -> None:
+        with pytest.raises(RunFolderError, match="in use by another"):
+            short(tmp_path / "run")
+
+    optimize(PROBLEM, proposer="none", n_init=2, n_total=1, out=tmp_path / "run", watch=second)
+
+
+def test_any_optuna_sampler_by_a_factory(tmp_path: Path) -> None:
+    def uniform(seed: int) -> BaseSampler:
+        return RandomSampler(seed=seed)
+
+    run = optimize(PROBLEM, proposer="none", sampler=uniform, n_init=2, n_total=3, out=tmp_path / "run")
+    named = optimize(PROBLEM, proposer="none", sampler="random", n_init=2, n_total=3)
+    assert designs(run) == designs(named)
+    assert run.config.method.sampler.endswith("uniform")
+
+
+def test_progress_tells_the_standing() -> None:
+    seen: list[Progress] = []
+    run = optimize(OPEN, proposer=Listed(), n_init=3, n_step=2, n_total=4, watch=seen.append)
+    finished = [progress for progress in seen if progress.doing == "finished"]
+    assert [progress.iteration for progress in finished] == [0, 0, 0, 1, 2, 3, 4]
+    assert [progress.hypervolume for progress in finished[:2]] == [None, None]
+    assert [progress.hypervolume for progress in finished[3:]] == pytest.approx(run.hypervolume.tolist())
+    assert finished[-1].front_size == len(run.front)
+    assert [progress.source for progress in seen if progress.doing == "proposing"] == ["listed"] * 2
+
+
+@pytest.mark.parametrize(
+    "settings", [{"n_step": 0}, {"n_init": 0}, {"n_total": 0}, {"seed": -1}, {"n_total": 1.5}, {"n_step": True}]
+)
+def test_settings_that_make_no_sense_are_refused(settings: dict[str, int]) -> None:
+    with pytest.raises(SettingsError, match=f"{next(iter(settings))} = "):
+        optimize(PROBLEM, proposer="none", **settings)
+
+
+def test_a_front_outside_the_reference_box_counts_nothing() -> None:
+    problem = Problem(Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0)))
+    run = short(problem=problem)
+    assert run.hypervolume.tolist() == [0.0] * 8
+    assert run.front
+
+
+def test_more_joints_and_other_masses_run_too() -> None:
+    for joints in (1, 8):
+        space = PROBLEM.space.model_copy(update={"joints": joints})
+        run = optimize(Problem(PROBLEM.task, space), proposer="rules", n_init=3, n_step=2, n_total=4)
+        assert len(run.trials) == 7
+
+
+def test_history_evaluates_finished_trials_again_to_the_same_values() -> None:
+    history = short().history
+    assert PROBLEM.values(history.evaluation(range(13))).tolist() == [list(trial.values) for trial in history]
+
+
