@@ -51,8 +51,9 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
 
     again = armwright("optimize", "target-1", *SHORT)
     assert "is finished" in again.stdout
-    assert done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4] == (
-        again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4]
+    assert (
+        done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4]
+        == (again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4])
     )
     longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
     assert "resumed at trial 10 of 13" in longer.stdout

@@ -109,10 +109,7 @@ def test_genetic_samplers_take_injected_designs_as_parents() -> None:
     for number, design in enumerate(injected):
         box.tell(box.inject(design, number, "rules", f"rules-{number}"), (1.0 + number, 5.0 - number))
     generations = [
-        value
-        for trial in box.study.trials
-        for name, value in trial.system_attrs.items()
-        if name.endswith("generation")
+        value for trial in box.study.trials for name, value in trial.system_attrs.items() if name.endswith("generation")
     ]
     assert generations == [0, 0, 0, 0]
     child = box.draw(4, BBO)[1]

@@ -33,7 +33,9 @@ class Listed(Proposer):
         return Proposal(history.problem.space.sample(1, seed)[0], f"listed-{len(history)}")
 
 
-def short(out: Path | None = None, problem: Problem = PROBLEM, proposer: Proposer | str = "none", n_total: int = 8) -> Run:
+def short(
+    out: Path | None = None, problem: Problem = PROBLEM, proposer: Proposer | str = "none", n_total: int = 8
+) -> Run:
     return optimize(problem, proposer=proposer, n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
 
 
@@ -69,7 +71,9 @@ def test_values_are_those_of_the_problem_and_the_curve_is_moocores() -> None:
 def test_front_members_are_the_non_dominated_trials_with_their_arms() -> None:
     run = short(n_total=30)
     values = np.array([trial.values for trial in run.trials])
-    assert [m.number for m in run.front] == sorted(np.flatnonzero(moocore.is_nondominated(values)), key=lambda n: values[n, 0])
+    assert [m.number for m in run.front] == sorted(
+        np.flatnonzero(moocore.is_nondominated(values)), key=lambda n: values[n, 0]
+    )
     assert run.front[0].values == run.trials[run.front[0].number].values
     assert run.front[0].arm == PROBLEM.arm(run.front[0].design)
 
@@ -200,5 +204,3 @@ def test_more_joints_and_other_masses_run_too() -> None:
 def test_history_evaluates_finished_trials_again_to_the_same_values() -> None:
     history = short().history
     assert PROBLEM.values(history.evaluation(range(13))).tolist() == [list(trial.values) for trial in history]
-
-

@@ -1,31 +1,50 @@
-"""The kernels: forward kinematics, inverse kinematics and gravity torque, in Warp, float32.
+"""The kernels: forward kinematics, inverse kinematics and gravity torque, in Warp.
 
-One kernel solves one (arm, target) pair per thread; a factory makes it for each number of joints D, so
-that all loops over joints are unrolled. The equations are those of docs/method.md; the
-inverse kinematics is the solver of Chan & Dubey (1995) and Sugiura et al. (2007).
+Each thread solves one arm for 8 targets side by side, one in each lane of a vector, so that the compiler's
+vector instructions do the work of eight. What differs between lanes is arithmetic, never a branch: a condition
+is a mask of zeros and ones. The axes of an arm are the same in all lanes, so they may branch.
+
+The equations are those of docs/method.md; the inverse kinematics is the solver of Chan & Dubey (1995) and
+Sugiura et al. (2007). Angles, positions and torques are float32. The 3 x 3 system is float64: its matrix squares
+the condition of the Jacobian, and near the joint limits the weights make it up to 1e5 worse.
 """
 
-# Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does,
-# and `float(0.0)` declares a variable that a loop may change.
+# Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import warp as wp
+
+from armwright.kinematics.arrays import MOST_JOINTS
+
+LANES = 8
 
 LONGEST_STEP = wp.constant(0.1)  # [m] of the error that one update tries to close
 LEAST_MANIPULABILITY = wp.constant(0.1)  # below it the update is damped
 DAMPING = wp.constant(0.001)
-LIMIT_MARGIN = wp.constant(0.017453293)  # [rad] = 1°, keeps the limit weight finite
+LIMIT_MARGIN = wp.constant(0.017453293)  # [rad] = 1°, keeps the limit gradient finite
 CENTRING_GAIN = wp.constant(0.01)
 GRAVITY = wp.constant(9.81)  # [m/s²] along -z
-LARGEST = wp.constant(3.0e38)
+LARGEST = wp.constant(1.0e30)
+
+Lane: Any = wp.types.vector(length=LANES, dtype=wp.float32)
+Wide: Any = wp.types.vector(length=LANES, dtype=wp.float64)
+Joints: Any = wp.types.matrix(shape=(MOST_JOINTS, LANES), dtype=wp.float32)  # row j: joint j in all lanes
+
+# At -O2, Warp's default, LLVM leaves most lanes scalar: three times slower.
+_OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
+
+
+def _kernel(function: Any) -> Any:
+    """A Warp kernel in a module of its own: the fewer its callers, the more willingly LLVM inlines a function."""
+    return wp.kernel(function, enable_backward=False, module="unique", module_options=_OPTIONS)
 
 
 @wp.struct
 class Arms:
     """`ArmArrays` on the device."""
 
+    dof: int
     base: wp.array(dtype=wp.vec3)  # (N,)
     axis: wp.array2d(dtype=int)  # (N, D)
     lower: wp.array2d(dtype=float)  # (N, D)
@@ -35,189 +54,319 @@ class Arms:
     mass: wp.array2d(dtype=float)  # (N, D)
 
 
-class Kernels(NamedTuple):
-    """For one number of joints D.
+@wp.func
+def roots(x: Lane):
+    """Square roots."""
+    result = Lane()
+    for i in range(LANES):
+        result[i] = wp.sqrt(x[i])
+    return result
 
-    solve: (arms, targets, updates, first arm) -> kept angles, reached point, gravity torque.
-    update: one update of the inverse kinematics from given angles, for tests.
+
+@wp.func
+def at_least(a: Lane, b: Lane):
+    """1 where a >= b, else 0."""
+    return 0.5 * (wp.sign(a - b) + Lane(1.0))
+
+
+@wp.func
+def chosen(mask: Lane, a: Lane, b: Lane):
+    """a where the mask is 1, b where it is 0, both to the bit."""
+    return wp.cw_mul(mask, a) + wp.cw_mul(Lane(1.0) - mask, b)
+
+
+@wp.func
+def sine_cosine(angle: Lane):
+    """Sine and cosine for |angle| <= 2π, to 1e-6: polynomials for a quarter of the angle, doubled twice.
+
+    The coefficients interpolate (sin h / h - 1) / h² and (cos h - 1 + h²/2) / h⁴ at Chebyshev's nodes of
+    |h| <= π/2; they are within 3e-8.
     """
-
-    solve: Any
-    update: Any
-    joints: Any  # the vector type of D joint values
+    h = 0.25 * angle
+    x = wp.cw_mul(h, h)
+    s = 2.634756392e-06 * x - Lane(1.982273949e-04)
+    s = wp.cw_mul(s, x) + Lane(8.333242135e-03)
+    s = wp.cw_mul(s, x) - Lane(1.666666596e-01)
+    s = wp.cw_mul(s, wp.cw_mul(x, h)) + h
+    c = -2.654606581e-07 * x + Lane(2.478608244e-05)
+    c = wp.cw_mul(c, x) - Lane(1.388881255e-03)
+    c = wp.cw_mul(c, x) + Lane(4.166666608e-02)
+    c = wp.cw_mul(c, x) - Lane(0.5)
+    c = wp.cw_mul(c, x) + Lane(1.0)
+    s2 = 2.0 * wp.cw_mul(s, c)
+    c2 = Lane(1.0) - 2.0 * wp.cw_mul(s, s)
+    return 2.0 * wp.cw_mul(s2, c2), Lane(1.0) - 2.0 * wp.cw_mul(s2, s2)
 
 
 @wp.func
-def turned(frame: wp.mat33, axis: int, angle: float):
-    """The frame (its rows are the local x, y, z in the world) turned about its own axis."""
-    s = wp.sin(angle)
-    c = wp.cos(angle)
-    x = frame[0]
-    y = frame[1]
-    z = frame[2]
+def turned(axis: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
+    """One world component of the frame's axes x, y, z, turned about its own `axis`; last, that axis."""
     if axis == 0:
-        return wp.matrix_from_rows(x, c * y + s * z, c * z - s * y)
+        return x, wp.cw_mul(c, y) + wp.cw_mul(s, z), wp.cw_mul(c, z) - wp.cw_mul(s, y), x
     if axis == 1:
-        return wp.matrix_from_rows(c * x - s * z, y, c * z + s * x)
-    return wp.matrix_from_rows(c * x + s * y, c * y - s * x, z)
+        return wp.cw_mul(c, x) - wp.cw_mul(s, z), y, wp.cw_mul(c, z) + wp.cw_mul(s, x), y
+    return wp.cw_mul(c, x) + wp.cw_mul(s, y), wp.cw_mul(c, y) - wp.cw_mul(s, x), z, z
 
 
 @wp.func
-def to_world(frame: wp.mat33, v: wp.vec3):
-    """A vector of the local frame in the world's."""
-    return v[0] * frame[0] + v[1] * frame[1] + v[2] * frame[2]
+def determinant(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide):
+    """Of a symmetric 3 x 3 matrix."""
+    return (
+        wp.cw_mul(xx, wp.cw_mul(yy, zz) - wp.cw_mul(yz, yz))
+        - wp.cw_mul(xy, wp.cw_mul(xy, zz) - wp.cw_mul(yz, xz))
+        + wp.cw_mul(xz, wp.cw_mul(xy, yz) - wp.cw_mul(yy, xz))
+    )
 
 
 @wp.func
-def limit_gradient(q: float, lower: float, upper: float):
-    """H of docs/method.md §2: how steeply the joint-limit criterion rises at q."""
-    inside = wp.clamp(q, lower + LIMIT_MARGIN, upper - LIMIT_MARGIN)
-    room = (upper - inside) * (inside - lower)
-    span = upper - lower
-    return wp.abs(span * span * (2.0 * inside - upper - lower) / (4.0 * room * room))
+def damping(det_jjt: Lane):
+    """k: 0 where the manipulability sqrt(det J Jᵀ) is large enough."""
+    manipulability = roots(wp.max(det_jjt, Lane(0.0)))
+    lack = wp.max(Lane(0.0), Lane(1.0) - (1.0 / LEAST_MANIPULABILITY) * manipulability)
+    return DAMPING * wp.cw_mul(lack, lack)
 
 
 @wp.func
-def centring(q: float, lower: float, upper: float):
-    """The pull to mid-range, before its weight."""
-    r = (lower + upper - 2.0 * q) / (upper - lower)
-    return CENTRING_GAIN * r * wp.abs(r)
+def solved(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide, x: Wide, y: Wide, z: Wide):
+    """The solution of a symmetric 3 x 3 system by its adjugate."""
+    cxx = wp.cw_mul(yy, zz) - wp.cw_mul(yz, yz)
+    cxy = wp.cw_mul(xz, yz) - wp.cw_mul(xy, zz)
+    cxz = wp.cw_mul(xy, yz) - wp.cw_mul(xz, yy)
+    cyy = wp.cw_mul(xx, zz) - wp.cw_mul(xz, xz)
+    cyz = wp.cw_mul(xy, xz) - wp.cw_mul(xx, yz)
+    czz = wp.cw_mul(xx, yy) - wp.cw_mul(xy, xy)
+    scale = wp.cw_div(Wide(wp.float64(1.0)), wp.cw_mul(xx, cxx) + wp.cw_mul(xy, cxy) + wp.cw_mul(xz, cxz))
+    vx = wp.cw_mul(scale, wp.cw_mul(cxx, x) + wp.cw_mul(cxy, y) + wp.cw_mul(cxz, z))
+    vy = wp.cw_mul(scale, wp.cw_mul(cxy, x) + wp.cw_mul(cyy, y) + wp.cw_mul(cyz, z))
+    vz = wp.cw_mul(scale, wp.cw_mul(cxz, x) + wp.cw_mul(cyz, y) + wp.cw_mul(czz, z))
+    return Lane(vx), Lane(vy), Lane(vz)
 
 
-@cache
-def kernels(dof: int) -> Kernels:
-    """The kernels for arms of `dof` moving joints."""
-    D = wp.constant(dof)
-    Joints = wp.types.vector(length=dof, dtype=float)
-    Rows = wp.types.matrix(shape=(dof, 3), dtype=float)
+@wp.func
+def square_of(x: Lane, y: Lane, z: Lane):
+    """The square of a vector's length."""
+    return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
 
-    @wp.func
-    def forward(arms: Arms, arm: int, q: Joints):
-        """The tip, the joint axes and the joint positions in the world."""
-        frame = wp.identity(n=3, dtype=float)
-        tip = arms.base[arm]
-        axes = Rows()
-        places = Rows()
-        for j in range(D):
+
+@wp.func
+def limit_fraction(away: Lane, half: float):
+    """H as a fraction n / d, for joints `away` from the middle of a range of half width `half` [rad]."""
+    inside = wp.min(wp.max(away, Lane(LIMIT_MARGIN - half)), Lane(half - LIMIT_MARGIN))
+    room = Lane(half * half) - wp.cw_mul(inside, inside)
+    return (2.0 * half * half) * wp.abs(inside), wp.cw_mul(room, room)
+
+
+@_kernel
+def descend(
+    arms: Arms,
+    targets: wp.array2d(dtype=Lane),
+    updates: int,
+    first: int,
+    q_last: wp.array3d(dtype=Lane),
+    h_last: wp.array3d(dtype=Lane),
+    q_kept: wp.array3d(dtype=Lane),
+):
+    """Inverse kinematics of arm first + i at a group of targets.
+
+    targets: (groups, 3) [m].  q_last: (N, groups, D), the start's angles, then those after the last update [rad].
+    h_last: (N, groups, D), the limit gradients H before the first, then of the last update.
+    q_kept: (N, groups, D), the angles nearest to the target of all but the last.
+
+    One long function on purpose: the arrays over joints live in its registers and stack, and handing them to
+    functions copies them, which was measured to be three times slower.
+    """
+    i, group = wp.tid()
+    arm = first + i
+    base = arms.base[arm]
+    q, kept = Joints(), Joints()
+    limit_n, limit_d = Joints(), Joints()  # H of the update before, n / d: fractions compare without division
+    ux, uy, uz = Joints(), Joints(), Joints()  # joint axes, then the columns of the Jacobian J
+    ox, oy, oz = Joints(), Joints(), Joints()  # joint positions
+    weight, pull = Joints(), Joints()
+    for j in range(arms.dof):
+        q[j] = q_last[arm, group, j]
+        limit_n[j] = h_last[arm, group, j]
+        limit_d[j] = Lane(1.0)
+    nearest = Lane(LARGEST)
+    for _ in range(updates):
+        # Forward kinematics. xx, xy, xz: the local x axis in the world, and so on.
+        xx, xy, xz = Lane(1.0), Lane(0.0), Lane(0.0)
+        yx, yy, yz = Lane(0.0), Lane(1.0), Lane(0.0)
+        zx, zy, zz = Lane(0.0), Lane(0.0), Lane(1.0)
+        px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
+        for j in range(arms.dof):
+            s, c = sine_cosine(q[j])
             axis = arms.axis[arm, j]
-            frame = turned(frame, axis, q[j])
-            axes[j] = frame[axis]
-            places[j] = tip
-            tip += to_world(frame, arms.offset[arm, j])
-        return tip, axes, places
+            xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
+            xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
+            xz, yz, zz, az = turned(axis, xz, yz, zz, s, c)
+            ux[j] = ax
+            uy[j] = ay
+            uz[j] = az
+            ox[j] = px
+            oy[j] = py
+            oz[j] = pz
+            offset = arms.offset[arm, j]
+            px += offset[0] * xx + offset[1] * yx + offset[2] * zx
+            py += offset[0] * xy + offset[1] * yy + offset[2] * zy
+            pz += offset[0] * xz + offset[1] * yz + offset[2] * zz
 
-    @wp.func
-    def updated(
-        arms: Arms, arm: int, q: Joints, h_before: Joints, error: wp.vec3, tip: wp.vec3, axes: Rows, places: Rows
-    ):
-        """Angles after one update, and the limit gradients H that the next one compares with."""
-        dx = error * wp.min(1.0, LONGEST_STEP / wp.max(wp.length(error), 1.0e-12))
-        jacobian = Rows()  # column j of J as row j
-        weight = Joints()
-        pull = Joints()
-        h = Joints()
-        # In float64: the products square the condition of J, and near the limits W can make it 1e5 worse.
-        jjt = wp.mat33d()
-        jwjt = wp.mat33d()
-        for j in range(D):
+        # The posture nearest to the target is kept, the earliest of equals.
+        ex = targets[group, 0] - px
+        ey = targets[group, 1] - py
+        ez = targets[group, 2] - pz
+        square = square_of(ex, ey, ez)
+        nearer = Lane(1.0) - at_least(square, nearest)
+        nearest = wp.min(nearest, square)
+        for j in range(arms.dof):
+            kept[j] = chosen(nearer, q[j], kept[j])
+
+        # dx, shortened; J Jᵀ as a.., J W Jᵀ as b..; the pull y is taken out of dx, because
+        # J# dx + (I - J# J) y = y + J# (dx - J y).
+        shorten = wp.cw_div(Lane(LONGEST_STEP), wp.max(roots(square), Lane(LONGEST_STEP)))
+        dx = wp.cw_mul(ex, shorten)
+        dy = wp.cw_mul(ey, shorten)
+        dz = wp.cw_mul(ez, shorten)
+        axx, axy, axz, ayy, ayz, azz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
+        bxx, bxy, bxz, byy, byz, bzz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
+        for j in range(arms.dof):
             lower = arms.lower[arm, j]
             upper = arms.upper[arm, j]
-            h[j] = limit_gradient(q[j], lower, upper)
-            w = 1.0
-            if h[j] >= h_before[j]:
-                w = 1.0 / (1.0 + h[j])
+            half = 0.5 * (upper - lower)
+            away = q[j] - Lane(0.5 * (lower + upper))
+            n, d = limit_fraction(away, half)
+            rises = at_least(wp.cw_mul(n, limit_d[j]), wp.cw_mul(limit_n[j], d))
+            w = wp.cw_div(d, d + wp.cw_mul(rises, n))  # 1 / (1 + H) where H rises, else 1
+            limit_n[j] = n
+            limit_d[j] = d
+            share = (1.0 / half) * away
+            y = -CENTRING_GAIN * wp.cw_mul(w, wp.cw_mul(share, wp.abs(share)))
+
+            rx = px - ox[j]
+            ry = py - oy[j]
+            rz = pz - oz[j]
+            jx = wp.cw_mul(uy[j], rz) - wp.cw_mul(uz[j], ry)
+            jy = wp.cw_mul(uz[j], rx) - wp.cw_mul(ux[j], rz)
+            jz = wp.cw_mul(ux[j], ry) - wp.cw_mul(uy[j], rx)
+            dx -= wp.cw_mul(jx, y)
+            dy -= wp.cw_mul(jy, y)
+            dz -= wp.cw_mul(jz, y)
+            ux[j] = jx
+            uy[j] = jy
+            uz[j] = jz
             weight[j] = w
-            pull[j] = w * centring(q[j], lower, upper)
-            column = wp.cross(axes[j], tip - places[j])
-            jacobian[j] = column
-            wide = wp.vec3d(column)
-            square = wp.outer(wide, wide)
-            jjt += square
-            jwjt += wp.float64(w) * square
-            dx -= pull[j] * column  # J# dx + (I - J# J) y = y + J# (dx - J y)
-        manipulability = wp.sqrt(wp.max(float(wp.determinant(jjt)), 0.0))
-        lack = wp.max(0.0, 1.0 - manipulability / LEAST_MANIPULABILITY)
-        k = DAMPING * lack * lack
-        damping = wp.diag(wp.vec3d(wp.vec3(k, k, k)))
-        v = wp.vec3(wp.inverse(jwjt + damping) * wp.vec3d(dx))
-        result = Joints()
-        for j in range(D):
-            step = pull[j] + weight[j] * wp.dot(jacobian[j], v)
-            result[j] = wp.clamp(q[j] + step, arms.lower[arm, j], arms.upper[arm, j])
-        return result, h
+            pull[j] = y
 
-    @wp.func
-    def gravity_torque(arms: Arms, arm: int, q: Joints):
-        """What each joint must hold against gravity, +dV/dq [N m]."""
-        frame = wp.identity(n=3, dtype=float)
-        place = arms.base[arm]
-        axes = Rows()
-        places = Rows()
-        coms = Rows()
-        for j in range(D):
-            axis = arms.axis[arm, j]
-            frame = turned(frame, axis, q[j])
-            axes[j] = frame[axis]
-            places[j] = place
-            coms[j] = place + to_world(frame, arms.com[arm, j])
-            place += to_world(frame, arms.offset[arm, j])
-        torque = Joints()
-        carried = 0.0  # mass beyond joint j
-        moment = wp.vec3()  # mass times position beyond joint j
-        for i in range(D):
-            j = D - 1 - i
-            carried += arms.mass[arm, j]
-            moment += arms.mass[arm, j] * coms[j]
-            lever = moment - carried * places[j]
-            torque[j] = GRAVITY * (axes[j][0] * lever[1] - axes[j][1] * lever[0])
-        return torque
+            jxw, jyw, jzw = Wide(jx), Wide(jy), Wide(jz)
+            ww = Wide(w)
+            wx = wp.cw_mul(ww, jxw)
+            wy = wp.cw_mul(ww, jyw)
+            wz = wp.cw_mul(ww, jzw)
+            axx += wp.cw_mul(jxw, jxw)
+            axy += wp.cw_mul(jxw, jyw)
+            axz += wp.cw_mul(jxw, jzw)
+            ayy += wp.cw_mul(jyw, jyw)
+            ayz += wp.cw_mul(jyw, jzw)
+            azz += wp.cw_mul(jzw, jzw)
+            bxx += wp.cw_mul(wx, jxw)
+            bxy += wp.cw_mul(wx, jyw)
+            bxz += wp.cw_mul(wx, jzw)
+            byy += wp.cw_mul(wy, jyw)
+            byz += wp.cw_mul(wy, jzw)
+            bzz += wp.cw_mul(wz, jzw)
 
-    @wp.kernel(enable_backward=False, module="unique")
-    def solve(
-        arms: Arms,
-        targets: wp.array(dtype=wp.vec3),
-        updates: int,
-        first: int,
-        kept: wp.array2d(dtype=Joints),
-        reached: wp.array2d(dtype=wp.vec3),
-        torque: wp.array2d(dtype=Joints),
-    ):
-        i, t = wp.tid()
-        arm = first + i
-        target = targets[t]
-        q = Joints()
-        best_q = Joints()
-        h = Joints()
-        for j in range(D):
-            h[j] = LARGEST
-        tip, axes, places = forward(arms, arm, q)
-        best_tip = tip
-        best = wp.length(target - tip)
-        for _ in range(updates):
-            q, h = updated(arms, arm, q, h, target - tip, tip, axes, places)
-            tip, axes, places = forward(arms, arm, q)
-            distance = wp.length(target - tip)
-            if distance < best:
-                best = distance
-                best_q = q
-                best_tip = tip
-        kept[arm, t] = best_q
-        reached[arm, t] = best_tip
-        torque[arm, t] = gravity_torque(arms, arm, best_q)
+        k = Wide(damping(Lane(determinant(axx, axy, axz, ayy, ayz, azz))))
+        vx, vy, vz = solved(bxx + k, bxy, bxz, byy + k, byz, bzz + k, Wide(dx), Wide(dy), Wide(dz))
+        for j in range(arms.dof):
+            column = wp.cw_mul(ux[j], vx) + wp.cw_mul(uy[j], vy) + wp.cw_mul(uz[j], vz)
+            moved = q[j] + pull[j] + wp.cw_mul(weight[j], column)
+            q[j] = wp.min(wp.max(moved, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
 
-    @wp.kernel(enable_backward=False, module="unique")
-    def update(
-        arms: Arms,
-        targets: wp.array(dtype=wp.vec3),
-        q: wp.array(dtype=Joints),
-        h_before: wp.array(dtype=Joints),
-        q_after: wp.array(dtype=Joints),
-        h_after: wp.array(dtype=Joints),
-    ):
-        arm = wp.tid()
-        tip, axes, places = forward(arms, arm, q[arm])
-        q_new, h_new = updated(arms, arm, q[arm], h_before[arm], targets[arm] - tip, tip, axes, places)
-        q_after[arm] = q_new
-        h_after[arm] = h_new
+    for j in range(arms.dof):
+        q_last[arm, group, j] = q[j]
+        h_last[arm, group, j] = wp.cw_div(limit_n[j], limit_d[j])
+        q_kept[arm, group, j] = kept[j]
 
-    return Kernels(solve, update, Joints)
+
+@wp.func
+def tip(arms: Arms, arm: int, group: int, q: wp.array3d(dtype=Lane)):
+    """The tip's position at angles q (N, groups, D)."""
+    base = arms.base[arm]
+    xx, xy, xz = Lane(1.0), Lane(0.0), Lane(0.0)
+    yx, yy, yz = Lane(0.0), Lane(1.0), Lane(0.0)
+    zx, zy, zz = Lane(0.0), Lane(0.0), Lane(1.0)
+    px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
+    for j in range(arms.dof):
+        s, c = sine_cosine(q[arm, group, j])
+        axis = arms.axis[arm, j]
+        xx, yx, zx, _x = turned(axis, xx, yx, zx, s, c)
+        xy, yy, zy, _y = turned(axis, xy, yy, zy, s, c)
+        xz, yz, zz, _z = turned(axis, xz, yz, zz, s, c)
+        offset = arms.offset[arm, j]
+        px += offset[0] * xx + offset[1] * yx + offset[2] * zx
+        py += offset[0] * xy + offset[1] * yy + offset[2] * zy
+        pz += offset[0] * xz + offset[1] * yz + offset[2] * zz
+    return px, py, pz
+
+
+@_kernel
+def hold(
+    arms: Arms,
+    targets: wp.array2d(dtype=Lane),
+    first: int,
+    q_last: wp.array3d(dtype=Lane),
+    q_kept: wp.array3d(dtype=Lane),
+    reached: wp.array3d(dtype=Lane),
+    torque: wp.array3d(dtype=Lane),
+):
+    """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
+
+    q_last, q_kept: (N, groups, D) [rad].  reached: (N, groups, 3) [m].  torque: (N, groups, D), +dV/dq [N m].
+    """
+    i, group = wp.tid()
+    arm = first + i
+    tx, ty, tz = targets[group, 0], targets[group, 1], targets[group, 2]
+    lx, ly, lz = tip(arms, arm, group, q_last)
+    kx, ky, kz = tip(arms, arm, group, q_kept)
+    farther = at_least(square_of(tx - lx, ty - ly, tz - lz), square_of(tx - kx, ty - ky, tz - kz))
+    reached[arm, group, 0] = chosen(farther, kx, lx)
+    reached[arm, group, 1] = chosen(farther, ky, ly)
+    reached[arm, group, 2] = chosen(farther, kz, lz)
+
+    base = arms.base[arm]
+    ux, uy = Joints(), Joints()  # joint axes; only what a vertical force needs
+    ox, oy = Joints(), Joints()  # joint positions
+    mx, my = Joints(), Joints()  # mass times position of what joint j carries up to the next
+    xx, xy = Lane(1.0), Lane(0.0)
+    yx, yy = Lane(0.0), Lane(1.0)
+    zx, zy = Lane(0.0), Lane(0.0)
+    px, py = Lane(base[0]), Lane(base[1])
+    for j in range(arms.dof):
+        q = chosen(farther, q_kept[arm, group, j], q_last[arm, group, j])
+        q_kept[arm, group, j] = q
+        s, c = sine_cosine(q)
+        axis = arms.axis[arm, j]
+        xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
+        xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
+        ux[j] = ax
+        uy[j] = ay
+        ox[j] = px
+        oy[j] = py
+        com = arms.com[arm, j]
+        mass = arms.mass[arm, j]
+        mx[j] = mass * (px + com[0] * xx + com[1] * yx + com[2] * zx)
+        my[j] = mass * (py + com[0] * xy + com[1] * yy + com[2] * zy)
+        offset = arms.offset[arm, j]
+        px += offset[0] * xx + offset[1] * yx + offset[2] * zx
+        py += offset[0] * xy + offset[1] * yy + offset[2] * zy
+
+    mass_beyond = float(0.0)  # noqa: UP018 (declares a variable that the loop changes)
+    beyond_x, beyond_y = Lane(), Lane()  # and its mass times position
+    for step in range(arms.dof):
+        j = arms.dof - 1 - step
+        mass_beyond += arms.mass[arm, j]
+        beyond_x += mx[j]
+        beyond_y += my[j]
+        lever_x = beyond_x - mass_beyond * ox[j]
+        lever_y = beyond_y - mass_beyond * oy[j]
+        torque[arm, group, j] = GRAVITY * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x))

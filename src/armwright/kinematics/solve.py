@@ -4,7 +4,7 @@ import os
 from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -15,7 +15,7 @@ from armwright.kinematics.arrays import ArmArrays, Floats
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
 DEVICE = "cpu"
-SMALLEST_CHUNK = 256  # (arm, target) pairs; below it a thread costs more than it brings
+SMALLEST_CHUNK = 32  # groups of targets; below it a thread costs more than it brings
 
 
 @dataclass(frozen=True)
@@ -32,40 +32,78 @@ def solve_postures(arms: ArmArrays, targets: NDArray[np.float64], updates: int =
 
     targets: (T, 3) [m].  The same arm and target give the same bits whatever is solved beside them.
     """
-    wp, made = _ready(arms.dof)
-    n, t = len(arms), len(targets)
-    device_arms = _to_device(arms)
-    device_targets = wp.array(np.ascontiguousarray(targets, dtype=np.float32), dtype=wp.vec3, device=DEVICE)
-    q = wp.empty((n, t), dtype=made.joints, device=DEVICE)
-    reached = wp.empty((n, t), dtype=wp.vec3, device=DEVICE)
-    torque = wp.empty((n, t), dtype=made.joints, device=DEVICE)
+    solved = _solve(arms, _in_lanes(targets[None])[0], updates, start=None)
+    q, reached, torque = (_from_lanes(values.numpy())[:, : len(targets)] for values in solved[:3])
+    return Postures(q, reached, torque)
+
+
+def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats) -> tuple[Floats, Floats]:
+    """One update of the inverse kinematics of each arm at a target of its own, from given angles.
+
+    targets: (N, 3) [m].  q, the limit gradients h_before, and both results: (N, D).
+    """
+    # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
+    moved = replace(arms, base=np.asarray(arms.base - targets, dtype=np.float32))
+    start = _in_lanes(q[:, None]), _in_lanes(h_before[:, None])
+    solved = _solve(moved, _in_lanes(np.zeros((1, 1, 3)))[0], 1, start)
+    q_last, h_last = (_from_lanes(values.numpy())[:, 0] for values in solved[3:])
+    return q_last, h_last
+
+
+def _solve(arms: ArmArrays, targets: Floats, updates: int, start: tuple[Floats, Floats] | None) -> tuple[Any, ...]:
+    """Kept angles, reached points, torques, last angles and last limit gradients, on the device.
+
+    targets: (G, 3, L) in lanes.  start: angles and limit gradients, (N, G, D, L) each.
+    """
+    wp, kernels = _ready()
+    n, groups, dof = len(arms), len(targets), arms.dof
+
+    def array(values: Floats) -> Any:
+        return wp.array(values, dtype=kernels.Lane, device=DEVICE)
+
+    def empty(columns: int) -> Any:
+        return wp.empty((n, groups, columns), dtype=kernels.Lane, device=DEVICE)
+
+    if start is None:
+        shape = (n, groups, dof, kernels.LANES)
+        start = np.zeros(shape, np.float32), np.full(shape, kernels.LARGEST, np.float32)
+    device_arms, device_targets = _to_device(arms), array(targets)
+    q_last, h_last = array(start[0]), array(start[1])
+    q_kept, reached, torque = empty(dof), empty(3), empty(dof)
 
     def launch(first: int, count: int) -> None:
-        inputs = [device_arms, device_targets, updates, first, q, reached, torque]
-        wp.launch(made.solve, dim=(count, t), inputs=inputs, device=DEVICE)
+        inputs = [device_arms, device_targets, updates, first, q_last, h_last, q_kept]
+        wp.launch(kernels.descend, dim=(count, groups), inputs=inputs, device=DEVICE)
+        inputs = [device_arms, device_targets, first, q_last, q_kept, reached, torque]
+        wp.launch(kernels.hold, dim=(count, groups), inputs=inputs, device=DEVICE)
 
-    chunks = _chunks(n, t)
+    chunks = _chunks(n, groups)
     if len(chunks) == 1:
         launch(*chunks[0])
     else:
         for launched in [_pool().submit(launch, *chunk) for chunk in chunks]:
             launched.result()
-    return Postures(q=q.numpy(), reached=reached.numpy(), torque=torque.numpy())
+    return q_kept, reached, torque, q_last, h_last
 
 
-def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats) -> tuple[Floats, Floats]:
-    """One update of the inverse kinematics from given angles; targets (N, 3), the rest (N, D)."""
-    wp, made = _ready(arms.dof)
-    arrays = [wp.array(np.float32(values), dtype=made.joints, device=DEVICE) for values in (q, h_before)]
-    results = [wp.empty(len(arms), dtype=made.joints, device=DEVICE) for _ in range(2)]
-    goals = wp.array(np.float32(targets), dtype=wp.vec3, device=DEVICE)
-    wp.launch(made.update, dim=len(arms), inputs=[_to_device(arms), goals, *arrays, *results], device=DEVICE)
-    return results[0].numpy(), results[1].numpy()
+def _in_lanes(values: NDArray[Any]) -> Floats:
+    """(N, T, C) as (N, G, C, L): targets in groups of L lanes, the last one repeated to fill its group."""
+    lanes = _ready()[1].LANES
+    n, t, columns = values.shape
+    groups = -(-t // lanes)
+    filled = np.concatenate([values, np.repeat(values[:, -1:], groups * lanes - t, axis=1)], axis=1)
+    return np.ascontiguousarray(filled.reshape(n, groups, lanes, columns).swapaxes(2, 3), dtype=np.float32)
 
 
-def _chunks(n: int, t: int) -> list[tuple[int, int]]:
+def _from_lanes(values: Floats) -> Floats:
+    """(N, G, C, L) as (N, G L, C)."""
+    n, groups, columns, lanes = values.shape
+    return values.swapaxes(2, 3).reshape(n, groups * lanes, columns)
+
+
+def _chunks(n: int, groups: int) -> list[tuple[int, int]]:
     """(first, count) of the arms that each launch takes: some chunks a core, none too small."""
-    size = max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // t))
+    size = max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups))
     return [(first, min(size, n - first)) for first in range(0, n, size)]
 
 
@@ -80,18 +118,18 @@ def _pool() -> ThreadPoolExecutor:
 
 
 @cache
-def _ready(dof: int) -> tuple[Any, Any]:
-    """Warp and the kernels for `dof` joints, compiled and loaded, so that threads only launch."""
+def _ready() -> tuple[Any, Any]:
+    """Warp and the kernels, compiled and loaded, so that threads only launch."""
     import warp as wp
 
     wp.config.log_level = wp.LOG_ERROR
     with _silent_stderr():
         wp.init()
-    from armwright.kinematics.kernels import kernels
+    from armwright.kinematics import kernels
 
-    made = kernels(dof)
-    made.solve.module.load(DEVICE)
-    return wp, made
+    for kernel in (kernels.descend, kernels.hold):
+        kernel.module.load(DEVICE)
+    return wp, kernels
 
 
 @contextmanager
@@ -121,6 +159,7 @@ def _to_device(arms: ArmArrays) -> Any:
     from armwright.kinematics.kernels import Arms
 
     on_device = Arms()
+    on_device.dof = arms.dof
     on_device.base = wp.array(arms.base, dtype=wp.vec3, device=DEVICE)
     on_device.axis = wp.array(arms.axis, dtype=int, device=DEVICE)
     on_device.lower = wp.array(arms.lower, dtype=float, device=DEVICE)

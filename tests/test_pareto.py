@@ -1,0 +1,194 @@
+"""Fronts and hypervolumes against pymoo, and by what must hold for any points."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from pymoo.indicators.hv import HV
+from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+from armwright.pareto import (
+    FrontTracker,
+    default_reference_point,
+    front_mask,
+    front_numbers,
+    hypervolume,
+    hypervolume_history,
+    knee_number,
+    solution_numbers,
+)
+
+REFERENCE = (5.0, 5.0)
+EXAMPLES = settings(deadline=None, max_examples=200, derandomize=True, database=None)
+
+# A coarse grid, so that duplicates, ties in one objective and points on the box's edge are common.
+POINTS = arrays(float, st.tuples(st.integers(1, 25), st.just(2)), elements=st.integers(0, 24).map(lambda i: i / 4))
+# And points anywhere, in and out of the box.
+ANYWHERE = arrays(float, st.tuples(st.integers(1, 40), st.just(2)), elements=st.floats(0.0, 10.0))
+
+
+def dominates(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.all(a <= b) and np.any(a < b))
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_front_is_pymoos_without_later_duplicates(values: np.ndarray) -> None:
+    front = set(NonDominatedSorting().do(values, only_non_dominated_front=True).tolist())
+    first = {i for i in front if not any(np.array_equal(values[i], values[k]) for k in range(i))}
+    assert set(np.flatnonzero(front_mask(values)).tolist()) == first
+
+
+@EXAMPLES
+@given(POINTS)
+def test_front_by_its_definition(values: np.ndarray) -> None:
+    """Nothing beats a member; whatever is left out is beaten by a member, or equal to an earlier one."""
+    mask = front_mask(values)
+    for i, row in enumerate(values):
+        if mask[i]:
+            assert not any(dominates(other, row) for other in values)
+        else:
+            members = np.flatnonzero(mask)
+            assert any(dominates(values[k], row) or (k < i and np.array_equal(values[k], row)) for k in members)
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_front_numbers_rise_in_the_first_objective_and_fall_in_the_second(values: np.ndarray) -> None:
+    front = values[front_numbers(values)]
+    assert np.all(np.diff(front[:, 0]) > 0)
+    assert np.all(np.diff(front[:, 1]) < 0)
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_hypervolume_is_pymoos(values: np.ndarray) -> None:
+    inside = values[np.all(values < REFERENCE, axis=1)]
+    expected = HV(ref_point=np.array(REFERENCE))(inside) if len(inside) else 0.0
+    assert hypervolume(values, REFERENCE) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE, st.randoms(use_true_random=False))
+def test_order_and_duplicates_do_not_matter(values: np.ndarray, random: object) -> None:
+    order = list(range(len(values))) * 2
+    random.shuffle(order)
+    again = values[order]
+    assert hypervolume(again, REFERENCE) == pytest.approx(hypervolume(values, REFERENCE), rel=1e-12)
+    assert {tuple(row) for row in again[front_mask(again)]} == {tuple(row) for row in values[front_mask(values)]}
+    assert front_mask(again).sum() == front_mask(values).sum()
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_points_outside_the_box_count_nothing(values: np.ndarray) -> None:
+    """On its edge neither: they bound no area."""
+    inside = values[np.all(values < REFERENCE, axis=1)]
+    assert hypervolume(values, REFERENCE) == hypervolume(inside, REFERENCE)
+    outside = values[~np.all(values < REFERENCE, axis=1)]
+    assert hypervolume(outside, REFERENCE) == 0.0
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_history_is_the_hypervolume_of_every_beginning(values: np.ndarray) -> None:
+    history = hypervolume_history(values, REFERENCE)
+    assert history == pytest.approx([hypervolume(values[: i + 1], REFERENCE) for i in range(len(values))], rel=1e-12)
+    assert np.all(np.diff(history) >= -1e-12)
+    assert np.all((history >= 0.0) & (history <= 25.0))
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_tracker_holds_the_front_at_every_moment(values: np.ndarray) -> None:
+    tracker = FrontTracker(2, None)
+    for i, row in enumerate(values):
+        tracker.add(row)
+        assert tracker.hypervolume is None
+        assert tracker.size == front_mask(values[: i + 1]).sum()
+    for bound in (REFERENCE, (3.0, 8.0)):
+        tracker.set_reference_point(bound)
+        assert tracker.hypervolume == pytest.approx(hypervolume(values, bound), rel=1e-12)
+
+
+@EXAMPLES
+@given(POINTS)
+def test_inputs_are_left_as_they_are(values: np.ndarray) -> None:
+    before = values.copy()
+    values.flags.writeable = False
+    front_mask(values)
+    front_numbers(values)
+    hypervolume(values, REFERENCE)
+    hypervolume_history(values, REFERENCE)
+    default_reference_point(values)
+    knee_number(values, REFERENCE)
+    solution_numbers(values, REFERENCE)
+    assert np.array_equal(values, before)
+
+
+def test_closed_forms() -> None:
+    """One point: a rectangle. A staircase: the sum of its steps. Three objectives: a box."""
+    assert hypervolume(np.array([[2.0, 1.0]]), REFERENCE) == pytest.approx(12.0)
+    staircase = np.array([[1.0, 3.0], [2.0, 2.0], [4.0, 1.0]])
+    assert hypervolume(staircase, REFERENCE) == pytest.approx(1.0 * 2.0 + 2.0 * 3.0 + 1.0 * 4.0)
+    assert hypervolume(np.array([[1.0, 2.0, 3.0]]), (5.0, 5.0, 5.0)) == pytest.approx(24.0)
+
+
+def test_nothing_evaluated_yet() -> None:
+    nothing = np.empty((0, 2))
+    assert front_mask(nothing).shape == (0,)
+    assert front_numbers(nothing) == []
+    assert hypervolume(nothing, REFERENCE) == 0.0
+    assert hypervolume_history(nothing, REFERENCE).shape == (0,)
+    assert knee_number(nothing, REFERENCE) is None
+    assert solution_numbers(nothing, REFERENCE) is None
+    assert FrontTracker(2, REFERENCE).size == 0
+    assert FrontTracker(2, REFERENCE).hypervolume == 0.0
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_default_reference_point_bounds_the_front(values: np.ndarray) -> None:
+    """1.1 times the worst values on the front; what is dominated does not move it; never 0."""
+    point = default_reference_point(values)
+    front = NonDominatedSorting().do(values, only_non_dominated_front=True)
+    assert point == pytest.approx(np.maximum(1.1 * values[front].max(axis=0), 1e-9), rel=1e-12)
+    assert default_reference_point(values[front]) == point
+    assert min(point) > 0.0
+    if values[front].min() > 1e-6:
+        assert hypervolume(values, point) > 0.0
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_solutions_are_the_ends_of_the_front_in_the_box(values: np.ndarray) -> None:
+    """docs/method.md §7: the front's designs of least E_pos and of least E_torque within the reference box."""
+    inside = [i for i in np.flatnonzero(front_mask(values)) if np.all(values[i] < REFERENCE)]
+    solutions = solution_numbers(values, REFERENCE)
+    if not inside:
+        assert solutions is None
+        return
+    assert solutions == (min(inside, key=lambda i: values[i, 0]), min(inside, key=lambda i: values[i, 1]))
+    assert all(type(number) is int for number in solutions)
+
+
+@EXAMPLES
+@given(POINTS | ANYWHERE)
+def test_knee_is_farthest_below_the_line_between_the_ends(values: np.ndarray) -> None:
+    inside = [i for i in front_numbers(values) if np.all(values[i] < REFERENCE)]
+    knee = knee_number(values, REFERENCE)
+    if len(inside) < 3:
+        assert knee is None
+        return
+    first, last = values[inside[0]], values[inside[-1]]
+    normal = np.array([first[1] - last[1], last[0] - first[0]])  # towards greater values, in the units of both
+    below = {i: float((first - values[i]) @ normal) / float(normal[0] * normal[1]) for i in inside}
+    assert knee in inside
+    assert below[knee] == pytest.approx(max(below.values()), abs=1e-9)
+
+
+def test_knee_of_a_bent_front() -> None:
+    values = np.array([[0.0, 4.0], [0.5, 0.5], [4.0, 0.0], [4.9, 4.9]])
+    assert knee_number(values, REFERENCE) == 1
+    assert knee_number(values, (0.6, 5.0)) is None
