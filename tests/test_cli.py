@@ -114,7 +114,7 @@ def test_tasks_are_listed_with_points_and_provenance() -> None:
     done = armwright("tasks")
     for word in ("target-1", "(-0.45, -0.45, -0.45)", "reconstruction", "slideopt-wide", "arXiv 2309.14226"):
         assert word in done.stdout
-    assert [task["name"] for task in json.loads(armwright("tasks", "--json").stdout)][0] == "target-1"
+    assert json.loads(armwright("tasks", "--json").stdout)[0]["name"] == "target-1"
 
 
 def test_version_and_help() -> None:

@@ -17,7 +17,7 @@ def test_all_is_honest() -> None:
         assert thing is getattr(import_module(f"armwright.{place}"), name)
         assert thing.__doc__
     with pytest.raises(AttributeError, match="nothing"):
-        aw.nothing  # noqa: B018
+        aw.nothing
 
 
 def test_type_checkers_see_the_same_names() -> None:

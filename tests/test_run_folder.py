@@ -9,11 +9,11 @@ import pytest
 import yaml
 
 from armwright.exceptions import RunFolderError
+from armwright.export.urdf import to_urdf
 from armwright.problem import Problem
 from armwright.run_folder import read_run, read_summary
 from armwright.study import Run, optimize
 from armwright.task import load_task
-from armwright.export.urdf import to_urdf
 
 PROBLEM = Problem(load_task("target-1"))
 

@@ -134,7 +134,7 @@ def test_tpe_is_the_papers() -> None:
 
 
 def test_an_unknown_sampler_is_refused_by_name() -> None:
-    with pytest.raises(SettingsError, match='unknown sampler "tp".*Did you mean "tpe"'):
+    with pytest.raises(SettingsError, match=r'unknown sampler "tp".*Did you mean "tpe"'):
         sampler_factory("tp")
 
 

@@ -85,8 +85,10 @@ def _check_alike(arm: Arm, kinds: tuple[str, ...]) -> None:
             raise ArmError(f"joint {number}: the inverse kinematics starts at 0 rad, which its limits exclude")
 
 
-def _rigid_groups(arm: Arm, moving: tuple[int, ...]) -> tuple[Vector, list[Link]]:
+def _rigid_groups(arm: Arm, moving: tuple[int, ...]) -> tuple[Vector, Sequence[Link]]:
     """The first moving joint's position, and one link for each moving joint with all fixed ones after it."""
+    if len(moving) == len(arm.joints):
+        return arm.base, arm.links
     base = np.array(arm.base)
     for link in arm.links[: moving[0]]:
         base = base + link.offset
