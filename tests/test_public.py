@@ -1,8 +1,10 @@
 """The public face: what `import armwright as aw` offers."""
 
 import ast
+import re
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,16 +28,23 @@ def test_type_checkers_see_the_same_names() -> None:
     assert set(aw.__all__) == imported - {"Any", "TYPE_CHECKING", "import_module"}
 
 
-def test_the_dozen_lines_of_the_readme(in_folder: Path) -> None:
-    problem = aw.Problem(space=aw.paper_space(joints=4), task=aw.load_task("target-1"))
-    designs = problem.space.sample(1000, seed=0)
-    values = problem.evaluate(designs)
-    assert values.shape == (1000, 2)
-    assert np.all(np.isfinite(values))
-    run = aw.optimize(problem, proposer="rules", n_total=20, n_step=10, seed=0, out="runs/mine")
-    assert run.hypervolume.shape == (20,)
-    assert set(run.front[0].design.params) == {p.name for p in problem.space.parameters}
-    assert len(run.front[0].values) == 2
-    assert aw.to_urdf(run.front[0].arm).startswith("<?xml")
+def test_the_python_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert names["values"].shape == (1000, 2)
+    assert np.all(np.isfinite(names["values"]))
+    run = names["run"]
+    assert run.hypervolume.shape == (200,)
+    assert set(run.front[0].design.params) == {p.name for p in names["problem"].space.parameters}
+    assert capsys.readouterr().out.rstrip().endswith("</robot>")
     assert (in_folder / "runs" / "mine" / "summary.json").exists()
     assert {"hypervolume.png", "front.png"} <= {path.name for path in aw.write_figures(Path("runs/mine"))}
+
+
+def test_the_space_file_of_the_readme_loads(in_folder: Path) -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    (text,) = re.findall(r"```yaml\n(.*?)```", readme, re.DOTALL)
+    (in_folder / "space.yaml").write_text(text)
+    assert aw.load_space("space.yaml").joints == 6

@@ -84,8 +84,8 @@ def stderr_console() -> Console:
 
 def _front_table(history: History) -> Table:
     table = Table(title=f"Pareto front of {history.problem.task.name}", title_justify="left", box=None, pad_edge=False)
-    for name in ("design", "source", "error [m]", "torque", "base [m]", "joints", "links [m]"):
-        justify = "right" if name in ("design", "error [m]", "torque") else "left"
+    for name in ("#", "source", "error [m]", "torque", "base [m]", "joints", "links [m]"):
+        justify = "right" if name in ("#", "error [m]", "torque") else "left"
         table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
     reference = history.reference_point or (float("inf"), float("inf"))
     inside = [m for m in history.front if m.values[0] < reference[0] and m.values[1] < reference[1]] or history.front
@@ -93,8 +93,8 @@ def _front_table(history: History) -> Table:
         table.add_row(
             str(member.number),
             member.source,
-            f"{member.values[0]:.4f}",
-            f"{member.values[1]:.4f}",
+            f"{member.values[0]:.3f}",
+            f"{member.values[1]:.3f}",
             " ".join(f"{value:5.2f}" for value in member.design.origin),
             member.design.joints,
             " ".join(f"{value:.2f}" for value in member.design.links),
