@@ -1,13 +1,228 @@
-"""Under way."""
+"""The rules proposer: a designer's knowledge without a model.
 
-from armwright.history import History
+First the structures that a designer would try, sized and placed by geometry alone; then the feedback of
+finished trials: the widest gap of the front is filled, a joint that hardly moves gets another axis, the
+link that weighs most on the joints is shortened.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.evaluation import Array
+from armwright.history import FrontMember, History
+from armwright.pareto import hypervolume_history
 from armwright.proposers.proposer import Proposal, Proposer
+from armwright.proposers.structures import OPENING, fitted
+from armwright.space import Design
+
+PULL = 0.1  # [m] of base motion if all targets were missed in one direction
+REACHED = 0.005  # [m]; a nearer target pulls no more
+BENT = 0.35  # [rad] mean angle from which a joint counts as bent
+MIDDLE = (0.35, 0.65)  # of a gap
+TRIM = 0.8  # of a link's length
+LEAST_SCALE, MOST_SCALE = 0.4, 1.6
+# What a rule is taken to bring before it has been tried, as a share of the hypervolume.
+EXPECTED = {"fill": 0.01, "trim": 0.002, "swap": 0.002}
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A step of the front: the area that a perfect design between its two sides would add.
+
+    low, high: the members on its sides, of less position error and of less torque; None at the box's edge.
+    more, less: the torque of the sides, α-scaled.
+    """
+
+    area: float
+    low: FrontMember | None
+    high: FrontMember | None
+    more: float
+    less: float
+
+    @property
+    def words(self) -> str:
+        if self.low is None:
+            return "the front's end of least position error"
+        if self.high is None:
+            return "the front's end of least torque"
+        return f"the front's gap between trials {self.low.number} and {self.high.number}"
 
 
 class RulesProposer(Proposer):
-    """Under way."""
+    """Designs by rules of geometry, mechanics and feedback; it needs no network and no key."""
 
     name = "rules"
 
     def propose(self, history: History, seed: int) -> Proposal:
-        return Proposal(history.problem.space.sample(1, seed)[0], f"rules-{len(history):04d}", "stub")
+        """The next structure of the opening, then what the rule that has brought most says."""
+        rng = np.random.default_rng(seed)
+        earlier = sum(trial.source == self.name for trial in history)
+        inside = members_inside(history)
+        if earlier < len(OPENING) or not inside:
+            rule, (design, reason) = "open", open_with(history, earlier, rng)
+        else:
+            rule = most_promising(history, self.name)
+            design, reason = RULES[rule](history, inside, rng)
+        return Proposal(distinct(design, history, rng), f"{self.name}-{len(history):04d}-{rule}", reason)
+
+
+def bounds(history: History) -> tuple[float, ...]:
+    """The reference point; unbounded as long as there is none."""
+    return history.reference_point or (np.inf, np.inf)
+
+
+def members_inside(history: History) -> list[FrontMember]:
+    """The front's designs within the reference box, by rising position error; none as long as there is no box."""
+    if history.reference_point is None:
+        return []
+    return [member for member in history.front if np.all(np.array(member.values) < bounds(history))]
+
+
+def most_promising(history: History, name: str) -> str:
+    """The rule whose proposals, one imagined among them, have added most hypervolume on average."""
+    volume = hypervolume_history(history.values, bounds(history))
+    gain = np.diff(volume, prepend=0.0)
+    added = {rule: [expected * float(volume[-1])] for rule, expected in EXPECTED.items()}
+    for trial in history:
+        rule = (trial.proposal or "").rpartition("-")[2]
+        if trial.source == name and rule in added:
+            added[rule].append(float(gain[trial.number]))
+    return max(added, key=lambda rule: float(np.mean(added[rule])))
+
+
+def open_with(history: History, earlier: int, rng: np.random.Generator) -> tuple[Design, str]:
+    """A structure of the opening; from the second round on, of another size."""
+    structure = OPENING[earlier % len(OPENING)]
+    torque = bounds(history)[1]
+    if earlier >= len(OPENING):
+        torque *= rng.uniform(0.1, 1.0) ** 2
+    design = fitted(structure, history.problem, torque)
+    return design, f"{structure.name}: {structure.why}; {described(design)}"
+
+
+def fill(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
+    """A design for the middle of a wide gap of the front.
+
+    Two sides of one structure are interpolated. Else one side is scaled: torque grows with the square of the
+    length. Its base goes towards the targets that it misses.
+    """
+    gap = wide_gap(inside, bounds(history), rng)
+    share = float(rng.uniform(*MIDDLE))
+    low, high = gap.low, gap.high
+    if low is not None and high is not None and low.design.joints == high.design.joints:
+        design = between(low.design, high.design, share, history)
+        return design, f"fills {gap.words}: between the two; {described(design)}"
+    sides = [side for side in (low, high) if side is not None]
+    side = sides[int(rng.integers(len(sides)))]
+    torque = share * gap.more + (1.0 - share) * gap.less
+    scale = float(np.clip(np.sqrt(torque / max(side.values[1], 1e-9)), LEAST_SCALE, MOST_SCALE))
+    design = scaled(history, side, scale)
+    return design, f"fills {gap.words}: trial {side.number} at {scale:.2f} of its size; {described(design)}"
+
+
+def trim(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
+    """A design of the front whose link that weighs most on the joints is shortened.
+
+    A link counts by its length times the torque of the joints up to it.
+    """
+    member = inside[int(rng.integers(len(inside)))]
+    carried = np.abs(history.evaluation([member.number]).joint_torques[0]).mean(axis=0)  # (D,) [N m]
+    links = np.array(member.design.links)
+    j = int(np.argmax(links * np.cumsum(carried)))
+    links[j] *= TRIM
+    space = history.problem.space
+    design = space.clipped(towards_missed(history, member), member.design.joints, links)
+    return design, f"trims link {j + 1} of trial {member.number}, which weighs most on its joints; {described(design)}"
+
+
+def swap(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
+    """A design of the front whose least used joint gets another axis: Y where it can, as yaw costs no torque."""
+    member = inside[int(rng.integers(len(inside)))]
+    angles = history.evaluation([member.number]).q[0]  # (T, D) [rad]
+    j = int(np.argmin(np.ptp(angles, axis=0)))
+    joints, types = member.design.joints, history.problem.space.joint_types
+    others = [kind for kind in types if kind != joints[j]] or [joints[j]]
+    other = "Y" if "Y" in others and rng.random() < 0.5 else others[int(rng.integers(len(others)))]
+    design = history.problem.space.clipped(
+        towards_missed(history, member), joints[:j] + other + joints[j + 1 :], member.design.links
+    )
+    return design, f"turns joint {j + 1} of trial {member.number}, the least used, into {other}; {described(design)}"
+
+
+Rule = Callable[[History, list[FrontMember], np.random.Generator], tuple[Design, str]]
+RULES: dict[str, Rule] = {"fill": fill, "trim": trim, "swap": swap}
+
+
+def wide_gap(inside: list[FrontMember], reference_point: tuple[float, ...], rng: np.random.Generator) -> Gap:
+    """A step of the front, those at the edges of the reference box included, by chance: as the area's square.
+
+    By chance, since the widest one may be wide because no design can fill it.
+    """
+    sides: list[FrontMember | None] = [None, *inside, None]
+    corners = [(0.0, reference_point[1]), *((m.values[0], m.values[1]) for m in inside), (reference_point[0], 0.0)]
+    gaps: list[Gap] = []
+    for k, ((error, torque), (more_error, less_torque)) in enumerate(itertools.pairwise(corners)):
+        area = (more_error - error) * (torque - less_torque)
+        gaps.append(Gap(area, sides[k], sides[k + 1], torque, less_torque))
+    chance = np.array([gap.area for gap in gaps]) ** 2 + 1e-12  # never nothing at all
+    return gaps[int(rng.choice(len(gaps), p=chance / chance.sum()))]
+
+
+def between(a: Design, b: Design, share: float, history: History) -> Design:
+    """From `b` (share 0) to `a` (1), two designs of one structure."""
+    origin, links = (
+        share * np.array(u) + (1.0 - share) * np.array(v) for u, v in ((a.origin, b.origin), (a.links, b.links))
+    )
+    return history.problem.space.clipped(origin, a.joints, links)
+
+
+def scaled(history: History, member: FrontMember, scale: float) -> Design:
+    """The member with all links scaled about its shoulder, its base moved towards what it misses."""
+    height = standing(member.design, history.evaluation([member.number]).q[0])
+    origin = towards_missed(history, member) + np.array([0.0, 0.0, (1.0 - scale) * height])
+    return history.problem.space.clipped(origin, member.design.joints, scale * np.array(member.design.links))
+
+
+def standing(design: Design, angles: Array) -> float:
+    """The height [m] of the links that stay upright at all targets, up to the first bent R or P joint.
+
+    angles: (T, D) [rad].
+    """
+    height = 0.0
+    for kind, bend, link in zip(design.joints, np.abs(angles).mean(axis=0), design.links, strict=True):
+        if kind != "Y" and bend > BENT:
+            break
+        height += link
+    return height
+
+
+def towards_missed(history: History, member: FrontMember) -> Array:
+    """(3,) the base moved along the mean direction to the missed targets: down the slope of the summed error [m]."""
+    evaluation = history.evaluation([member.number])
+    miss = evaluation.targets - evaluation.reached[0]  # (T, 3)
+    error = evaluation.position_error[0][:, None]  # (T, 1)
+    direction = np.where(error > REACHED, miss / np.maximum(error, REACHED), 0.0)
+    return np.array(member.design.origin) + PULL * direction.mean(axis=0)
+
+
+def distinct(design: Design, history: History, rng: np.random.Generator) -> Design:
+    """The design, a little changed where it has been tried; the same where the space leaves no other."""
+    tried = {trial.design for trial in history}
+    space, spread = history.problem.space, 0.01
+    for _ in range(20):
+        if design not in tried:
+            break
+        origin = np.array(design.origin) + rng.normal(0.0, spread, 3)
+        links = np.array(design.links) * np.exp(rng.normal(0.0, spread, space.joints))
+        design = space.clipped(origin, design.joints, links)
+        spread *= 1.5
+    return design
+
+
+def described(design: Design) -> str:
+    """Joints, total length and base, for a reason's end."""
+    x, y, z = design.origin
+    return f"{design.joints}, {sum(design.links):.2f} m long, base at ({x:.2f}, {y:.2f}, {z:.2f}) m"
