@@ -44,7 +44,8 @@ def proposals(history: History, n: int) -> list[Proposal]:
         proposal = RulesProposer().propose(history, seed=k)
         assert RulesProposer().propose(history, seed=k) == proposal
         history.problem.space.design(proposal.design.params)
-        assert proposal.reason and "\n" not in proposal.reason
+        assert proposal.reason
+        assert "\n" not in proposal.reason
         made.append(proposal)
         history = with_proposal(history, proposal)
     return made
@@ -98,7 +99,8 @@ def test_every_rule_proposes_within_the_space(rule: str) -> None:
     for seed in range(5):
         design, reason = RULES[rule](history, members_inside(history), np.random.default_rng(seed))
         history.problem.space.design(design.params)
-        assert reason and "\n" not in reason
+        assert reason
+        assert "\n" not in reason
         assert design not in {trial.design for trial in history}
     assert set(RULES) == set(EXPECTED)
 

@@ -140,6 +140,12 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str
     assert "\n" not in str(refusal.value)
 
 
+def test_a_copy_with_other_ranges_has_its_own_parameters() -> None:
+    space = paper_space()
+    assert len(space.parameters) == 11
+    assert len(space.model_copy(update={"joints": 2}).parameters) == 7
+
+
 def test_designs_are_values() -> None:
     assert Design(GOOD) == Design(dict(GOOD))
     assert len({Design(GOOD), Design(dict(GOOD))}) == 1

@@ -7,7 +7,7 @@ joint, one length for each link. Every number of it can be changed in a YAML fil
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -199,14 +199,10 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(f"joint_types names a type twice: {', '.join(self.joint_types)}")
         return self
 
-    @cached_property
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters in their fixed order: origin, joint types, link lengths."""
-        ranges: dict[str, Range] = {"x": self.origin_x, "y": self.origin_y, "z": self.origin_z}
-        origin = [FloatParameter(f"origin_{axis}", *limits, "m") for axis, limits in ranges.items()]
-        joints = [CategoricalParameter(f"joint_{j}", self.joint_types) for j in range(1, self.joints + 1)]
-        links = [FloatParameter(f"link_{j}", *self.link, "m") for j in range(1, self.joints + 1)]
-        return (*origin, *joints, *links)
+        return _parameters(self)
 
     def design(self, params: Mapping[str, Any]) -> Design:
         """The design with these values, in the space's order; DesignError where they are not in the space."""
@@ -254,6 +250,16 @@ def paper_space(joints: int = 4) -> DesignSpace:
 def load_space(path: str | Path) -> DesignSpace:
     """The design space of a YAML file; keys that it leaves out are as in the paper."""
     return read_document(Path(path), DesignSpace, SpaceError)
+
+
+@cache
+def _parameters(space: DesignSpace) -> tuple[Parameter, ...]:
+    # Not a cached property: a copy of the space with other ranges would take its value along.
+    ranges: dict[str, Range] = {"x": space.origin_x, "y": space.origin_y, "z": space.origin_z}
+    origin = [FloatParameter(f"origin_{axis}", *limits, "m") for axis, limits in ranges.items()]
+    joints = [CategoricalParameter(f"joint_{j}", space.joint_types) for j in range(1, space.joints + 1)]
+    links = [FloatParameter(f"link_{j}", *space.link, "m") for j in range(1, space.joints + 1)]
+    return (*origin, *joints, *links)
 
 
 def _clip(parameter: Parameter, value: Any) -> ParameterValue:
