@@ -48,12 +48,15 @@ def test_drawing_again_leaves_no_figure_of_a_former_choice(tmp_path: Path) -> No
     assert arms == {f"arm-{member.number:04d}.png" for _, member in chosen_members(run.history)}
 
 
-def test_the_chosen_designs_lie_on_the_front_within_the_box(tmp_path: Path) -> None:
-    history = short(tmp_path, Problem(load_task("target-1")), n_total=40).history
-    chosen = [member for _, member in chosen_members(history)]
-    inside = [m for m in history.front if m.values[0] < 5 and m.values[1] < 5]
-    assert chosen[0] == inside[0]
-    assert chosen[-1] == inside[-1]
+def test_the_chosen_designs_are_the_fronts_ends_within_the_box_and_the_most_precise(tmp_path: Path) -> None:
+    tight = load_task("target-1").model_copy(update={"reference_point": (5.0, 2.5)})
+    history = short(tmp_path, Problem(tight), n_total=40).history
+    chosen = dict(chosen_members(history))
+    inside = [m for m in history.front if m.values[0] < 5.0 and m.values[1] < 2.5]
+    assert chosen["Solution 1: least position error"] == inside[0]
+    assert chosen["Solution 2: least torque"] == inside[-1]
+    assert inside[0] != history.front[0]
+    assert chosen["Most precise of all, beyond the reference point"] == history.front[0]
 
 
 def test_the_curve_begins_with_the_random_trials_and_ends_at_the_final_value(tmp_path: Path) -> None:

@@ -97,6 +97,8 @@ def optimize(
                 watch=watch,
             )
         finished_before = run.resumed == len(run.trials)
+        if not finished_before:
+            words.print("drawing the figures")
         figures = _figures(folder, redraw=not finished_before)
     except KeyboardInterrupt:
         again = shlex.join(["armwright", *sys.argv[1:]])

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Table
@@ -18,6 +19,7 @@ from armwright.study import Run
 from armwright.task import Task as DesignTask
 
 EVERY = 10  # counted trials between two plain lines
+MOST_ROWS = 16  # of the front; front.csv has all
 
 
 class Watch(Protocol):
@@ -89,7 +91,8 @@ def _front_table(history: History) -> Table:
         table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
     reference = history.reference_point or (float("inf"), float("inf"))
     inside = [m for m in history.front if m.values[0] < reference[0] and m.values[1] < reference[1]] or history.front
-    for member in inside:
+    shown = sorted({round(i) for i in np.linspace(0, len(inside) - 1, min(len(inside), MOST_ROWS))})
+    for member in (inside[i] for i in shown):
         table.add_row(
             str(member.number),
             member.source,
@@ -99,9 +102,10 @@ def _front_table(history: History) -> Table:
             member.design.joints,
             " ".join(f"{value:.2f}" for value in member.design.links),
         )
-    left_out = len(history.front) - len(inside)
+    left_out = len(history.front) - len(shown)
     if left_out:
-        table.caption = f"and {left_out} beyond the reference point (front.csv has all)"
+        beyond = len(history.front) - len(inside)
+        table.caption = f"and {left_out} more" + (f", {beyond} of them beyond the reference point" if beyond else "")
         table.caption_justify = "left"
     return table
 

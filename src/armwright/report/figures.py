@@ -47,20 +47,23 @@ def write_figures(folder: Path) -> list[Path]:
 
 
 def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
-    """Solution 1 (least position error), the knee, Solution 2 (least torque), within the reference box.
+    """Solution 1 (least position error), the knee, Solution 2 (least torque), all within the reference box.
 
-    Where the front lies outside the box, its two ends.
+    Before them the most precise design of all, where it lies beyond the box.
     """
     reference = _reference(history)
-    ends = solution_numbers(history.values, reference)
-    if ends is None:
-        numbers = front_numbers(history.values)
-        ends = (numbers[0], numbers[-1])
+    numbers = front_numbers(history.values)
+    solutions = solution_numbers(history.values, reference)
+    if solutions is None:
+        titled = {numbers[0]: "Least position error of all", numbers[-1]: "Least torque of all"}
+        return [(title, history.member(number)) for number, title in titled.items()]
+    titled = {solutions[0]: "Solution 1: least position error"}
+    if numbers[0] != solutions[0]:
+        titled = {numbers[0]: "Most precise of all, beyond the reference point", **titled}
     knee = knee_number(history.values, reference)
-    titled = {ends[0]: "Solution 1: least position error"}
     if knee is not None:
         titled.setdefault(knee, "Knee of the front")
-    titled.setdefault(ends[1], "Solution 2: least torque")
+    titled.setdefault(solutions[1], "Solution 2: least torque")
     return [(title, history.member(number)) for number, title in titled.items()]
 
 
@@ -97,7 +100,7 @@ def draw_hypervolume(history: History) -> Figure:
 
 def draw_samples(history: History) -> Figure:
     """All trials after 5, 35, 65 and 100 % of the counted ones, coloured by source, with the front."""
-    figure = Figure(figsize=(10.4, 3.0), layout="constrained")
+    figure = Figure(figsize=(10.4, 3.4), layout="constrained")
     FigureCanvasAgg(figure)
     panels: Sequence[Any] = figure.subplots(1, 4, sharex=True, sharey=True)
     counted = len(history) - history.n_init
@@ -106,12 +109,12 @@ def draw_samples(history: History) -> Figure:
         part = History(history.problem, history.trials[: history.n_init + iteration], history.n_init)
         _scatter(axes, part, _reference(history))
         beyond = int(np.sum(np.any(part.values > SHOWN * np.asarray(_reference(history)), axis=1)))
-        axes.set_title(f"After {iteration} iterations" + (f" ({beyond} designs outside)" if beyond else ""))
+        axes.set_title(f"After {iteration} iterations" + (f"\n({beyond} designs outside the view)" if beyond else ""))
         axes.set_xlabel(_label(history, 0))
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     panels[0].set_ylabel(_label(history, 1))
-    panels[0].legend(handles=_legend(history), loc="upper right", borderaxespad=0.1, handletextpad=0.3)
+    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_sources(history)) + 1)
     return figure
 
 
@@ -124,8 +127,10 @@ def draw_front(history: History) -> Figure:
         style = look(member.source)
         axes.scatter(*member.values, s=1.6 * style.size, marker=style.marker, **_paint(style), zorder=4)
     for title, member in chosen_members(history):
+        if np.any(np.array(member.values) > SHOWN * np.array(reference)):
+            continue
         axes.annotate(
-            f"{title.split(':')[0]}\n#{member.number}  {member.design.joints}",
+            f"{title.split(':')[0].split(',')[0]}\n#{member.number}  {member.design.joints}",
             member.values,
             xytext=(10, 10),
             textcoords="offset points",
@@ -190,15 +195,21 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
         style = look(source)
         rows = values[[trial.source == source for trial in history]]
         axes.scatter(
-            rows[:, 0], rows[:, 1], s=style.size, marker=style.marker, alpha=0.25 if faint else 0.75, **_paint(style)
+            rows[:, 0],
+            rows[:, 1],
+            s=style.size,
+            marker=style.marker,
+            alpha=0.25 if faint else 0.85,
+            zorder=3,
+            **_paint(style),
         )
     front = values[front_numbers(values)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside):
         x = [inside[0, 0], *inside[:, 0], reference[0]]
         y = [reference[1], *inside[:, 1], inside[-1, 1]]
-        axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=3)
-        axes.fill_between(x, y, reference[1], step="post", color="#F0E442", alpha=0.18, linewidth=0)
+        axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
+        axes.fill_between(x, y, reference[1], step="post", color="#F0E442", alpha=0.18, linewidth=0, zorder=0.5)
     axes.plot(*reference, marker="+", color=FRONT, markersize=9, clip_on=False)
     axes.set_xlim(0, SHOWN * reference[0])
     axes.set_ylim(0, SHOWN * reference[1])
