@@ -1,11 +1,13 @@
 """The language model as a proposer, over the real protocol, against a server of our own on 127.0.0.1."""
 
 import json
+import threading
 from pathlib import Path
 
 import pytest
 
 from armwright.exceptions import ModelError, SettingsError
+from armwright.llm import chat
 from armwright.llm.transcript import Transcript
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -128,6 +130,20 @@ def test_a_server_that_is_not_there_is_an_error() -> None:
     proposer = LlmProposer("test-model", "http://127.0.0.1:9/v1")
     with pytest.raises(ModelError, match="test-model"):
         optimize(PROBLEM, proposer=proposer, n_total=1)
+
+
+def test_a_server_that_hangs_is_an_error(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    released = threading.Event()
+
+    def answer(request: Request) -> Answer:
+        released.wait(30)
+        return designer(request)
+
+    chat_server.answer = answer
+    monkeypatch.setattr(chat, "CHECK_SECONDS", 0.2)
+    with pytest.raises(ModelError, match="test-model"):
+        run(chat_server)
+    released.set()
 
 
 def test_an_answer_that_was_paid_for_is_not_asked_again(chat_server: ChatServer, tmp_path: Path) -> None:

@@ -40,7 +40,8 @@ def test_the_files_of_a_run(run: Run) -> None:
 def test_trials_are_one_json_line_each(run: Run) -> None:
     lines = [json.loads(line) for line in (folder(run) / "trials.jsonl").read_text().splitlines()]
     for line, trial in zip(lines, run.trials, strict=True):
-        assert list(line) == ["number", "source", "proposal", "params", "values", "seconds"]
+        reason = ["reason"] if trial.source == "rules" else []
+        assert list(line) == ["number", "source", "proposal", *reason, "params", "values", "seconds"]
         assert line["number"] == trial.number
         assert line["params"] == dict(trial.design.params)
         assert line["values"] == list(trial.values)
@@ -93,6 +94,7 @@ def test_designs_of_the_front(run: Run) -> None:
         record = json.loads((place / "design.json").read_text())
         assert record["params"] == dict(member.design.params)
         assert record["source"] == member.source
+        assert bool(record["reason"]) == (member.source == "rules")
         assert (record["objectives"]["position_error"], record["objectives"]["torque"]) == member.values
         assert sum(target["position_error"] for target in record["targets"]) == pytest.approx(member.values[0])
         norms = [sum(t**2 for t in target["joint_torques"]) ** 0.5 for target in record["targets"]]

@@ -21,7 +21,7 @@ class FinishedTrial:
     """One evaluated design.
 
     source: `random`, `bbo`, or the name of the proposer.
-    proposal: the proposal's id, where a proposer made the design.
+    proposal, reason: the proposal's id and reason, where a proposer made the design.
     fault: why a trial that was a proposer's became a black-box one.
     seconds: wall time by part (proposing, sampling, evaluation).
     """
@@ -31,6 +31,7 @@ class FinishedTrial:
     design: Design
     values: tuple[float, ...]
     proposal: str | None = None
+    reason: str = ""
     fault: str | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
 

@@ -180,6 +180,7 @@ class RunFolder:
             record = {
                 "number": member.number,
                 "source": member.source,
+                "reason": history.trials[member.number].reason,
                 "params": dict(member.design.params),
                 "objectives": _objective_record(history, member.values),
                 "masses": history.problem.space.mass_note,
@@ -285,6 +286,8 @@ def _design_name(number: int) -> str:
 
 def _trial_record(trial: FinishedTrial) -> dict[str, Any]:
     record: dict[str, Any] = {"number": trial.number, "source": trial.source, "proposal": trial.proposal}
+    if trial.reason:
+        record["reason"] = trial.reason
     if trial.fault:
         record["fault"] = trial.fault
     record["params"] = dict(trial.design.params)
@@ -327,6 +330,7 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
         design=space.design(record["params"]),
         values=values,
         proposal=record["proposal"],
+        reason=str(record.get("reason", "")),
         fault=record.get("fault"),
         seconds={str(part): float(value) for part, value in record["seconds"].items()},
     )

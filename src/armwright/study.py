@@ -169,6 +169,7 @@ class Study:
             design=design,
             values=values,
             proposal=proposal.id if proposal is not None else None,
+            reason=proposal.reason if proposal is not None else "",
             fault=fault,
             seconds={
                 "total": round(told - started, 6),
