@@ -11,7 +11,8 @@ import yaml
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.problem import Problem
-from armwright.run_folder import read_run, read_summary
+from armwright.results import read_summary
+from armwright.run_folder import read_run
 from armwright.study import Run, optimize
 from armwright.task import load_task
 

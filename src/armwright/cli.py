@@ -162,14 +162,10 @@ def init(
 
 def _figures(folder: Path, redraw: bool) -> list[Path]:
     """The figures of a run, drawn where they are missing or the run went on."""
-    from armwright.run_folder import FIGURES
+    from armwright.report.figures import FIGURES, write_figures
 
     there = sorted((folder / FIGURES).glob("*.png"))
-    if there and not redraw:
-        return there
-    from armwright.report.figures import write_figures
-
-    return write_figures(folder)
+    return there if there and not redraw else write_figures(folder)
 
 
 def _print_json(content: Any) -> None:

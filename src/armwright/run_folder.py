@@ -1,26 +1,22 @@
-"""What a run leaves on disk: written, read and checked here and nowhere else.
+"""The run folder: a run's settings and finished trials on disk, written, read and checked here.
 
     config.yaml        everything needed to repeat the run
-    trials.jsonl       one line a finished trial, flushed before the next begins: the truth
-    transcripts.jsonl  every call to a language model
-    trials.csv, front.csv, summary.json, designs/NNNN/{arm.urdf, design.json}, figures/
+    trials.jsonl       one line a finished trial, written before the next begins: the truth
+    transcripts.jsonl  every call to a language model (llm/transcript.py)
+    trials.csv, front.csv, summary.json, designs/NNNN/ (results.py) and figures/ (report/figures.py)
 
-Everything below trials.jsonl is made from it and may be deleted.
+What stands in the last line is made from the finished trials, and can be made again.
 """
 
-import csv
-import io
 import json
 import math
 import os
 import platform
-import shutil
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, cast
+from typing import Any, BinaryIO, Self, cast
 
 import yaml
 from filelock import FileLock, Timeout
@@ -28,21 +24,14 @@ from pydantic import BaseModel, Field
 
 from armwright.documents import parse_document
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
-from armwright.export.urdf import to_urdf
 from armwright.history import FinishedTrial, History
 from armwright.problem import Problem
-from armwright.proposers.proposer import ProposerSummary
 from armwright.space import DesignSpace
 from armwright.task import Task
 
 CONFIG = "config.yaml"
 TRIALS = "trials.jsonl"
-TRANSCRIPTS = "transcripts.jsonl"
-SUMMARY = "summary.json"
-FIGURES = "figures"
-DESIGNS = "designs"
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang")
-PARTS = ("total", "sampling", "evaluation", "proposing")
 
 
 class Method(BaseModel, frozen=True, extra="forbid"):
@@ -85,7 +74,7 @@ class RunFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._lock = FileLock(path / ".lock")
-        self._trials: io.FileIO | None = None
+        self._trials: BinaryIO | None = None
 
     def __enter__(self) -> Self:
         try:
@@ -133,7 +122,7 @@ class RunFolder:
         path = self.path / TRIALS
         trials, intact = _read_trials(path, space)
         try:
-            self._trials = open(path, "ab", buffering=0)  # noqa: SIM115 (closed in __exit__)
+            self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
             self._trials.truncate(intact)
         except OSError as fault:
             raise _write_error(path, fault) from fault
@@ -160,46 +149,6 @@ class RunFolder:
             os.replace(part, target)
         except OSError as fault:
             raise _write_error(target, fault) from fault
-
-    def write_results(self, history: History, summary: Mapping[str, Any]) -> None:
-        """Writes all that is made from the finished trials; the summary last, as the sign that all is there."""
-        self.write_text("trials.csv", _csv(_trial_rows(history)))
-        on_front = {member.number for member in history.front}
-        self.write_text("front.csv", _csv(row for row in _trial_rows(history) if row["number"] in on_front))
-        self._write_designs(history)
-        self.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
-
-    def _write_designs(self, history: History) -> None:
-        folder = self.path / DESIGNS
-        numbers = [member.number for member in history.front]
-        evaluation = history.evaluation(numbers)
-        for stale in folder.glob("[0-9]*"):
-            if stale.name not in {_design_name(number) for number in numbers}:
-                shutil.rmtree(stale, ignore_errors=True)
-        for row, member in enumerate(history.front):
-            record = {
-                "number": member.number,
-                "source": member.source,
-                "reason": history.trials[member.number].reason,
-                "params": dict(member.design.params),
-                "objectives": _objective_record(history, member.values),
-                "masses": history.problem.space.mass_note,
-                "targets": [
-                    {
-                        "target": evaluation.targets[t].tolist(),
-                        "q": evaluation.q[row, t].tolist(),
-                        "reached": evaluation.reached[row, t].tolist(),
-                        "position_error": float(evaluation.position_error[row, t]),
-                        "joint_torques": evaluation.joint_torques[row, t].tolist(),
-                    }
-                    for t in range(len(evaluation.targets))
-                ],
-            }
-            name = f"{DESIGNS}/{_design_name(member.number)}"
-            self.write_text(
-                f"{name}/arm.urdf", to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}")
-            )
-            self.write_text(f"{name}/design.json", json.dumps(record, indent=2) + "\n")
 
 
 class _ConfigDumper(yaml.SafeDumper):
@@ -231,57 +180,6 @@ def read_run(path: Path) -> tuple[RunConfig, History]:
     config = read_config(path)
     trials, _ = _read_trials(path / TRIALS, config.space)
     return config, History(config.problem, trials, config.method.n_init)
-
-
-def read_summary(path: Path) -> dict[str, Any] | None:
-    """summary.json, or None where the run has not ended (or the file is damaged; it can be made again)."""
-    try:
-        summary: dict[str, Any] = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-        return summary if summary.keys() >= {"n_trials", "hypervolume"} else None
-    except (OSError, ValueError, AttributeError):
-        return None
-
-
-def summarize(history: History, config: RunConfig, proposer: ProposerSummary | None) -> dict[str, Any]:
-    """What a run came to, as summary.json says it."""
-    curve = history.hypervolume
-    seconds: Counter[str] = Counter()
-    for trial in history:
-        seconds.update(trial.seconds)
-    faults = Counter(trial.fault for trial in history if trial.fault)
-    return {
-        "task": history.problem.task.name,
-        "seed": config.seed,
-        "n_trials": len(history),
-        "by_source": dict(Counter(trial.source for trial in history)),
-        "hypervolume": {
-            "reference_point": list(history.reference_point or ()),
-            "final": float(curve[-1]) if len(curve) else None,
-            "mean": float(curve.mean()) if len(curve) else None,
-            "history": curve.tolist(),
-        },
-        "front_size": len(history.front),
-        "proposer": None
-        if proposer is None
-        else {
-            "name": proposer.name,
-            "model": proposer.model,
-            "calls": proposer.calls,
-            "failures": dict(faults),
-            "tokens": proposer.tokens,
-            "cost_usd": proposer.cost_usd,
-        },
-        "seconds": {part: round(seconds[part], 6) for part in PARTS},
-        "versions": dict(config.versions),
-    }
-
-
-def _objective_record(history: History, values: Sequence[float]) -> dict[str, float]:
-    return {o.name: value for o, value in zip(history.problem.objectives, values, strict=True)}
-
-
-def _design_name(number: int) -> str:
-    return f"{number:04d}"
 
 
 def _trial_record(trial: FinishedTrial) -> dict[str, Any]:
@@ -338,27 +236,6 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
 
 def _words(fault: Exception) -> str:
     return f"{fault} is missing" if isinstance(fault, KeyError) else str(fault)
-
-
-def _trial_rows(history: History) -> Iterable[dict[str, Any]]:
-    for trial in history:
-        yield {
-            "number": trial.number,
-            "source": trial.source,
-            **trial.design.params,
-            **_objective_record(history, trial.values),
-        }
-
-
-def _csv(rows: Iterable[Mapping[str, Any]]) -> str:
-    out = io.StringIO()
-    writer: csv.DictWriter[str] | None = None
-    for row in rows:
-        if writer is None:
-            writer = csv.DictWriter(out, fieldnames=list(row), lineterminator="\n")
-            writer.writeheader()
-        writer.writerow(row)
-    return out.getvalue()
 
 
 def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:

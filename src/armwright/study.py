@@ -17,7 +17,8 @@ from armwright.pareto import Array, FrontTracker
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.run_folder import Method, RunConfig, RunFolder, read_summary, summarize, versions
+from armwright.results import read_summary, summarize, write_results
+from armwright.run_folder import Method, RunConfig, RunFolder, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_factory
 from armwright.seeding import derived_seed
 
@@ -239,7 +240,7 @@ class Study:
             folder = self.folder.path
             there = read_summary(folder)
             if resumed < len(self.trials) or there is None or there.get("n_trials") != len(self.trials):
-                self.folder.write_results(history, summary)
+                write_results(self.folder, history, summary)
         return Run(history, self.config, summary, folder, resumed)
 
 

@@ -19,8 +19,9 @@ from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, RC, TARGET, Look, look
-from armwright.run_folder import FIGURES, read_run
+from armwright.run_folder import read_run
 
+FIGURES = "figures"
 REACHED = 1e-3  # [m]; a target missed by less counts as reached
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # of the reference point, the part of the plane that is drawn

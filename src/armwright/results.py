@@ -1,0 +1,134 @@
+"""What is made from the finished trials of a run folder: the summary, tables, and the front's designs.
+
+summary.json              what the run came to
+trials.csv, front.csv     all trials, and those of the front
+designs/NNNN/arm.urdf     each design of the front, for simulators
+designs/NNNN/design.json  and its postures, errors and torques at every target
+"""
+
+import csv
+import io
+import json
+import shutil
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from armwright.export.urdf import to_urdf
+from armwright.history import FrontMember, History
+from armwright.proposers.proposer import ProposerSummary
+from armwright.run_folder import RunConfig, RunFolder
+
+SUMMARY = "summary.json"
+DESIGNS = "designs"
+PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
+
+
+def write_results(folder: RunFolder, history: History, summary: Mapping[str, Any]) -> None:
+    """Writes all of it; the summary last, as the sign that all is there."""
+    folder.write_text("trials.csv", _csv(_rows(history)))
+    on_front = {member.number for member in history.front}
+    folder.write_text("front.csv", _csv(row for row in _rows(history) if row["number"] in on_front))
+    _write_designs(folder, history)
+    folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
+
+
+def read_summary(path: Path) -> dict[str, Any] | None:
+    """summary.json of a run folder, or None where the run has not ended (or the file is damaged)."""
+    try:
+        summary: dict[str, Any] = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
+        return summary if summary.keys() >= {"n_trials", "hypervolume"} else None
+    except (OSError, ValueError, AttributeError):
+        return None
+
+
+def summarize(history: History, config: RunConfig, proposer: ProposerSummary | None) -> dict[str, Any]:
+    """What a run came to, as summary.json says it."""
+    curve = history.hypervolume
+    seconds: Counter[str] = Counter()
+    for trial in history:
+        seconds.update(trial.seconds)
+    return {
+        "task": history.problem.task.name,
+        "seed": config.seed,
+        "n_trials": len(history),
+        "by_source": dict(Counter(trial.source for trial in history)),
+        "hypervolume": {
+            "reference_point": list(history.reference_point or ()),
+            "final": float(curve[-1]) if len(curve) else None,
+            "mean": float(curve.mean()) if len(curve) else None,
+            "history": curve.tolist(),
+        },
+        "front_size": len(history.front),
+        "proposer": None if proposer is None else _proposer_record(history, proposer),
+        "seconds": {part: round(seconds[part], 6) for part in PARTS},
+        "versions": dict(config.versions),
+    }
+
+
+def _proposer_record(history: History, proposer: ProposerSummary) -> dict[str, Any]:
+    return {
+        "name": proposer.name,
+        "model": proposer.model,
+        "calls": proposer.calls,
+        "failures": dict(Counter(trial.fault for trial in history if trial.fault)),
+        "tokens": proposer.tokens,
+        "cost_usd": proposer.cost_usd,
+    }
+
+
+def _write_designs(folder: RunFolder, history: History) -> None:
+    names = {member.number: f"{member.number:04d}" for member in history.front}
+    for stale in (folder.path / DESIGNS).glob("[0-9]*"):
+        if stale.name not in names.values():
+            shutil.rmtree(stale, ignore_errors=True)
+    for member, record in zip(history.front, _design_records(history, history.front), strict=True):
+        place = f"{DESIGNS}/{names[member.number]}"
+        urdf = to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}")
+        folder.write_text(f"{place}/arm.urdf", urdf)
+        folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
+
+
+def _design_records(history: History, members: Sequence[FrontMember]) -> Iterable[dict[str, Any]]:
+    evaluation = history.evaluation([member.number for member in members])
+    for row, member in enumerate(members):
+        yield {
+            "number": member.number,
+            "source": member.source,
+            "reason": history.trials[member.number].reason,
+            "params": dict(member.design.params),
+            "objectives": _objectives(history, member.values),
+            "masses": history.problem.space.mass_note,
+            "targets": [
+                {
+                    "target": evaluation.targets[t].tolist(),
+                    "q": evaluation.q[row, t].tolist(),
+                    "reached": evaluation.reached[row, t].tolist(),
+                    "position_error": float(evaluation.position_error[row, t]),
+                    "joint_torques": evaluation.joint_torques[row, t].tolist(),
+                }
+                for t in range(len(evaluation.targets))
+            ],
+        }
+
+
+def _rows(history: History) -> Iterable[dict[str, Any]]:
+    for trial in history:
+        objectives = _objectives(history, trial.values)
+        yield {"number": trial.number, "source": trial.source, **trial.design.params, **objectives}
+
+
+def _objectives(history: History, values: Sequence[float]) -> dict[str, float]:
+    return {o.name: value for o, value in zip(history.problem.objectives, values, strict=True)}
+
+
+def _csv(rows: Iterable[Mapping[str, Any]]) -> str:
+    out = io.StringIO()
+    writer: csv.DictWriter[str] | None = None
+    for row in rows:
+        if writer is None:
+            writer = csv.DictWriter(out, fieldnames=list(row), lineterminator="\n")
+            writer.writeheader()
+        writer.writerow(row)
+    return out.getvalue()
