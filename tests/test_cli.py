@@ -1,5 +1,6 @@
 """The command line as a user meets it: in a process of its own."""
 
+import io
 import json
 import os
 import signal
@@ -9,7 +10,12 @@ from pathlib import Path
 
 import pytest
 import yaml
+from rich.console import Console
 
+from armwright.console import watching
+from armwright.problem import Problem
+from armwright.study import optimize
+from armwright.task import load_task
 from tests.chat_server import ChatServer
 
 SHORT = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
@@ -133,7 +139,7 @@ def test_version_and_help() -> None:
         (("empty.yaml",), "targets is empty"),
         (("target-1", "--space", "upside.yaml"), "upside down"),
         (("target-1", "--space", "nothing.yaml"), "cannot read nothing.yaml"),
-        (("target-1", "--n-step", "0"), "n_step = 0: a whole number from 1 up is needed"),
+        (("target-1", "--n-step", "0"), "n_step = 0: a whole number from 1 to"),
         (("target-1", "--n-total", "-5"), "n_total = -5"),
         (("target-1", "--seed", "-1"), "seed = -1"),
         (("target-1", "--sampler", "tpee"), 'Did you mean "tpe"?'),
@@ -181,7 +187,19 @@ def test_an_unknown_option_is_code_2() -> None:
 
 
 def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
-    command = [sys.executable, "-m", "armwright", "optimize", "target-1", "--n-total", "5000", "--out", "run"]
+    settings = [
+        "optimize",
+        "target-1",
+        "--sampler",
+        "random",
+        "--proposer",
+        "none",
+        "--n-total",
+        "2000",
+        "--out",
+        "run",
+    ]
+    command = [sys.executable, "-m", "armwright", *settings]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
     for line in process.stdout:
@@ -191,9 +209,23 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
     output, errors = process.communicate()
     assert process.returncode == 130
     assert "Traceback" not in output + errors
-    assert "Go on with:\n  armwright optimize target-1 --n-total 5000 --out run" in output
-    kept = len((in_folder / "run" / "trials.jsonl").read_text().splitlines())
-    assert kept >= 20
+    assert f"Go on with:\n  python -m armwright {' '.join(settings)}" in output
+    kept = (in_folder / "run" / "trials.jsonl").read_text()
+    assert 20 <= len(kept.splitlines()) < 2010
+    done = armwright(*settings)
+    assert f"resumed at trial {len(kept.splitlines())} of 2010" in done.stdout
+    assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
+
+
+@pytest.mark.parametrize("width", [60, 120])
+def test_progress_in_a_terminal(width: int) -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=width, markup=False, highlight=False)
+    with watching(console) as watch:
+        optimize(Problem(load_task("target-1")), proposer="rules", n_init=3, n_step=5, n_total=7, watch=watch)
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "iteration 7/7" in shown
+    assert "hypervolume" in shown
+    assert "None" not in shown
 
 
 def test_help_needs_no_heavy_import() -> None:

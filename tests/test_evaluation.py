@@ -60,15 +60,6 @@ def test_limits_are_kept_exactly() -> None:
     assert np.abs(evaluate(paper_arms(500, 4, 33), TARGETS).q).max() <= 2.4
 
 
-def test_slicing_takes_rows() -> None:
-    result = evaluate(paper_arms(5, 4, 34), TARGETS)
-    part = result[1:3]
-    assert len(part) == 2
-    assert np.array_equal(part.targets, result.targets)
-    for name in ("q", "reached", "position_error", "joint_torques"):
-        assert np.array_equal(getattr(part, name), getattr(result, name)[1:3])
-
-
 def test_evaluating_changes_no_input() -> None:
     targets = TARGETS.copy()
     evaluate(paper_arms(3, 4, 35), targets)

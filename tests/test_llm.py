@@ -192,7 +192,7 @@ def test_feedback_shows_at_most_five_of_each_and_depends_on_the_seed_alone(chat_
     prompts: list[str] = []
     for seed in (1, 1, 2):
         proposer.propose(history, seed)
-        proposer.prepare(None)  # forgets the answer
+        proposer.open(None)  # forgets the answer
         prompts.append([prompt for prompt in chat_server.prompts() if "TARGET" in prompt][-1])
     assert prompts[0] == prompts[1] != prompts[2]
     assert prompts[0].count("\nDesign ") == 10

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import resource
 from pathlib import Path
 
@@ -150,9 +151,13 @@ def test_everything_but_config_and_trials_can_be_deleted(run: Run, tmp_path: Pat
         (lambda lines: [*lines[:3], lines[2], *lines[3:]], "line 4 is damaged (number 2 where 3 is due)"),
         (lambda lines: [*lines[:3], lines[3].replace(b'"values": [', b'"values": [NaN, '), *lines[4:]], "line 4"),
         (lambda lines: [*lines[:3], lines[3].replace(b'"link_1": 0.', b'"link_1": 7.'), *lines[4:]], "link_1 = 7."),
-        (lambda lines: [*lines[:3], lines[3].replace(b'"params"', b'"parms"'), *lines[4:]], "'params' is missing"),
+        (lambda lines: [*lines[:3], lines[3].replace(b'"params"', b'"parms"'), *lines[4:]], "params: Field required"),
         (lambda lines: [b"\x00\xff\n", *lines[1:]], "line 1 is damaged"),
         (lambda lines: [b"3\n", *lines[1:]], "line 1 is damaged"),
+        (lambda lines: [b"[" * 100_000 + b"\n", *lines[1:]], "line 1 is damaged"),
+        (lambda lines: [lines[0].replace(b'"values": [', b'"values": [1' + b"0" * 400 + b", "), *lines[1:]], "line 1"),
+        (lambda lines: [lines[0].replace(b'"proposal": null', b'"proposal": 5'), *lines[1:]], "proposal"),
+        (lambda lines: [re.sub(rb'"seconds": .*', b'"seconds": 3}', lines[0]), *lines[1:]], "seconds"),
     ],
 )
 def test_damaged_trials_are_named_by_line_and_left_alone(run: Run, tmp_path: Path, damage: object, words: str) -> None:
@@ -174,7 +179,7 @@ def test_a_damaged_config_is_named(run: Run, tmp_path: Path) -> None:
 
 def test_trials_without_their_config_are_not_taken_over(run: Run, tmp_path: Path) -> None:
     (folder(run) / "config.yaml").unlink()
-    with pytest.raises(RunFolderError, match=r"no config.yaml"):
+    with pytest.raises(RunFolderError, match=r"cannot read config.yaml"):
         short(tmp_path / "run")
 
 

@@ -8,7 +8,8 @@ from optuna.trial import TrialState
 from armwright.exceptions import DesignError, SettingsError
 from armwright.history import BBO, RANDOM, FinishedTrial
 from armwright.problem import Problem
-from armwright.sampling import BlackBox, distributions, sampler_factory
+from armwright.sampling import SAMPLING, BlackBox, distributions, sampler_factory
+from armwright.seeding import derived_seed
 from armwright.space import Design, paper_space
 from armwright.task import Task, load_task
 
@@ -49,7 +50,8 @@ def test_what_is_outside_the_space_never_enters_the_study(name: str, value: floa
 def test_an_injected_design_is_evaluated_as_it_is_and_marked() -> None:
     box = BlackBox(SPACE, "tpe", seed=0)
     design = SPACE.sample(1, 3)[0]
-    trial = box.inject(design, 0, "rules", "rules-0000")
+    trial, taken = box.inject(design, 0, "rules", "rules-0000")
+    assert taken == design
     box.tell(trial, (1.0, 2.0))
     kept = box.study.trials[0]
     assert kept.state is TrialState.COMPLETE
@@ -63,7 +65,7 @@ def test_the_sampler_learns_from_injected_designs() -> None:
     for box in (plain, taught):
         fill(box, 12)
     for box, values in ((plain, (9.0, 9.0)), (taught, (0.1, 0.1))):
-        box.tell(box.inject(SPACE.sample(1, 7)[0], 12, "rules", "rules-0012"), values)
+        box.tell(box.inject(SPACE.sample(1, 7)[0], 12, "rules", "rules-0012")[0], values)
     assert plain.draw(13, BBO)[1] != taught.draw(13, BBO)[1]
 
 
@@ -72,7 +74,7 @@ def test_injected_designs_count_towards_the_startup_trials_of_tpe() -> None:
     for n, random in ((9, True), (10, False)):
         box = BlackBox(SPACE, "tpe", seed=0)
         for number, design in enumerate(SPACE.sample(n, 1)):
-            box.tell(box.inject(design, number, "rules", f"rules-{number}"), (1.0 + number, 2.0))
+            box.tell(box.inject(design, number, "rules", f"rules-{number}")[0], (1.0 + number, 2.0))
         drawn = box.draw(n, BBO)[1]
         assert (drawn == box.__class__(SPACE, "random", seed=0).draw(n, BBO)[1]) is random
 
@@ -85,10 +87,13 @@ def test_a_restored_study_goes_on_as_if_it_had_never_stopped() -> None:
     assert [trial.design for trial in fill(resumed, 8, first=17)] == [trial.design for trial in trials[17:]]
 
 
-def test_no_draw_repeats_another() -> None:
-    """One seed for the whole run would repeat its first draws after every resume."""
-    designs = [trial.design for trial in fill(BlackBox(SPACE, "random", seed=0), 50)]
-    assert len(set(designs)) == 50
+def test_a_resumed_sampler_does_not_repeat_its_first_draws() -> None:
+    """One seed for the whole run would: a sampler made anew begins at its beginning."""
+    first = fill(BlackBox(SPACE, "random", seed=0), 20)
+    resumed = BlackBox(SPACE, "random", seed=0)
+    resumed.restore(first)
+    again = fill(resumed, 20, first=20)
+    assert not {trial.design for trial in first} & {trial.design for trial in again}
 
 
 def test_random_trials_do_not_depend_on_the_sampler() -> None:
@@ -107,7 +112,7 @@ def test_genetic_samplers_take_injected_designs_as_parents() -> None:
     box = BlackBox(SPACE, nsga2, seed=0)
     injected = SPACE.sample(4, 11)
     for number, design in enumerate(injected):
-        box.tell(box.inject(design, number, "rules", f"rules-{number}"), (1.0 + number, 5.0 - number))
+        box.tell(box.inject(design, number, "rules", f"rules-{number}")[0], (1.0 + number, 5.0 - number))
     generations = [
         value for trial in box.study.trials for name, value in trial.system_attrs.items() if name.endswith("generation")
     ]
@@ -127,10 +132,15 @@ def test_a_target_out_of_reach_is_a_finite_objective_not_a_failure() -> None:
 
 
 def test_tpe_is_the_papers() -> None:
-    sampler = sampler_factory("tpe")(0)
-    assert isinstance(sampler, TPESampler)
-    assert isinstance(sampler_factory("random")(0), RandomSampler)
-    assert sampler_factory(lambda seed: RandomSampler(seed=seed))(0) is not None
+    """The same draws as a plain Optuna study with the sampler that docs/method.md §5 pins."""
+    box, plain = BlackBox(SPACE, "tpe", seed=4), optuna.create_study(directions=["minimize"] * 2)
+    for trial in fill(box, 30):
+        seed = derived_seed(4, SAMPLING, trial.number)
+        pinned = TPESampler(n_startup_trials=10, multivariate=False, constant_liar=False, seed=seed)
+        plain.sampler = RandomSampler(seed=seed) if trial.number < 10 else pinned
+        asked = plain.ask(distributions(SPACE))
+        assert asked.params == dict(trial.design.params)
+        plain.tell(asked, trial.values)
 
 
 def test_an_unknown_sampler_is_refused_by_name() -> None:

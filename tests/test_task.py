@@ -119,10 +119,11 @@ def test_points_from_csv(tmp_path: Path, text: str, unit: str, expected: list[tu
     ("text", "words"),
     [
         ("x,y,z\n", "no points"),
-        ("1,2\n3,4\n", "line 2"),
+        ("1,2\n3,4\n", "line 1"),
         ("1,2,3\n4,five,6\n", "line 2"),
         ("1,2,nan\n", "finite"),
         ("a,b,c\nd,e,f\n", "line 2"),
+        ("O.1,0.2,0.3\n0.1,0.2,0.3\n", "line 1"),
     ],
 )
 def test_bad_csv_is_refused_by_line(tmp_path: Path, text: str, words: str) -> None:
@@ -138,9 +139,9 @@ def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_template_is_a_task() -> None:
-    task = parse_document(task_template("mine", ((0.1, 0.2, 0.3),)), Task, TaskError, "it")
-    assert (task.name, task.targets) == ("mine", ((0.1, 0.2, 0.3),))
-    assert len(parse_document(task_template("mine"), Task, TaskError, "it").targets) == 3
+    task = parse_document(task_template(Path("mine.yaml"), ((0.1, 0.2345678, 0.3),)), Task, TaskError, "it")
+    assert (task.name, task.targets) == ("mine", ((0.1, 0.2345678, 0.3),))
+    assert len(parse_document(task_template(Path("12.yaml")), Task, TaskError, "it").targets) == 3
 
 
 def test_random_tasks_follow_their_recipe() -> None:

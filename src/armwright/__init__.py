@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from armwright.history import FinishedTrial, FrontMember, History
     from armwright.pareto import hypervolume
     from armwright.problem import Problem
+    from armwright.proposers.llm import LlmProposer
     from armwright.proposers.proposer import Proposal, Proposer
+    from armwright.proposers.rules import RulesProposer
     from armwright.report.figures import write_figures
     from armwright.run_folder import read_run
     from armwright.space import Design, DesignSpace, load_space, paper_space
@@ -39,10 +41,12 @@ _PLACES = {
     "History": "history",
     "Joint": "arm",
     "Link": "arm",
+    "LlmProposer": "proposers.llm",
     "Problem": "problem",
     "Proposal": "proposers.proposer",
     "ProposalError": "exceptions",
     "Proposer": "proposers.proposer",
+    "RulesProposer": "proposers.rules",
     "Run": "study",
     "Task": "task",
     "UsageError": "exceptions",
@@ -72,10 +76,12 @@ __all__ = [
     "History",
     "Joint",
     "Link",
+    "LlmProposer",
     "Problem",
     "Proposal",
     "ProposalError",
     "Proposer",
+    "RulesProposer",
     "Run",
     "Task",
     "UsageError",

@@ -11,6 +11,7 @@ Axis = Literal["x", "y", "z"]
 Vector = tuple[float, float, float]
 
 AXES: tuple[Axis, ...] = ("x", "y", "z")
+GRAVITY = 9.81  # [m/s²] along -z
 
 
 @dataclass(frozen=True, slots=True)

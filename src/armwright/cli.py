@@ -1,5 +1,6 @@
 """The command line: parses, calls, prints. Heavy imports wait until a command needs them."""
 
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from armwright.exceptions import ArmwrightError, RunFolderError, TaskError
+from armwright.exceptions import ArmwrightError, FailureError, TaskError
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -27,6 +28,9 @@ def main() -> NoReturn:
     except ArmwrightError as error:
         print(f"armwright: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
+    except OSError as fault:
+        print(f"armwright: {fault.strerror or fault}: {fault.filename or 'a file'}", file=sys.stderr)
+        sys.exit(1)
     sys.exit(0)
 
 
@@ -99,10 +103,10 @@ def optimize(
         finished_before = run.resumed == len(run.trials)
         if not finished_before:
             words.print("drawing the figures")
-        figures = _figures(folder, redraw=not finished_before)
+        figures = _figures(folder)
     except KeyboardInterrupt:
-        again = shlex.join(["armwright", *sys.argv[1:]])
-        words.print(f"\nstopped; every finished trial is in {folder}/. Go on with:\n  {again}")
+        kept = f"every finished trial is in {folder}/" if folder.exists() else "nothing was begun"
+        words.print(f"\nstopped; {kept}. Go on with:\n  {_same_command()}")
         sys.exit(INTERRUPTED)
     if json_:
         _print_json({"folder": str(folder), **run.summary})
@@ -146,26 +150,34 @@ def init(
 
     if file.suffix not in (".yaml", ".yml"):
         raise TaskError(f"{file}: a task file ends in .yaml, such as {file.stem}.yaml")
-    if file.exists():
+    if os.path.lexists(file):
         raise TaskError(f"{file} exists already; give another name, or delete it first")
     targets = None if points is None else read_points(points, unit, offset)
-    text = task_template(file.stem, targets)
+    text = task_template(file, targets)
     task = parse_document(text, Task, TaskError, str(file))
     try:
         file.write_text(text, encoding="utf-8")
     except OSError as fault:
-        raise RunFolderError(f"cannot write {file}: {fault.strerror or fault}") from fault
+        raise FailureError(f"cannot write {file}: {fault.strerror or fault}") from fault
     print(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )
 
 
-def _figures(folder: Path, redraw: bool) -> list[Path]:
-    """The figures of a run, drawn where they are missing or the run went on."""
-    from armwright.report.figures import FIGURES, write_figures
+def _figures(folder: Path) -> list[Path]:
+    """The figures of a finished run, drawn where they are missing."""
+    from armwright.report.figures import write_figures
+    from armwright.results import FIGURES
 
     there = sorted((folder / FIGURES).glob("*.png"))
-    return there if there and not redraw else write_figures(folder)
+    return there or write_figures(folder)
+
+
+def _same_command() -> str:
+    """The command that was given, for a shell."""
+    program = sys.argv[0]
+    called = ["python", "-m", "armwright"] if Path(program).name == "__main__.py" else [program]
+    return shlex.join([*called, *sys.argv[1:]])
 
 
 def _print_json(content: Any) -> None:

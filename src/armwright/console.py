@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from armwright.history import History
+from armwright.objectives import TORQUE_SCALE
 from armwright.study import Progress as StudyProgress
 from armwright.study import Run
 from armwright.task import Task as DesignTask
@@ -55,7 +56,9 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
         )
     console.print(f"{summary['n_trials']} trials: {sources}; {_seconds(summary['seconds'])}")
     _show_proposer(console, summary["proposer"])
-    console.print(f"torque = 40 x the sum over the targets of |joint torques|; {history.problem.space.mass_note}")
+    console.print(
+        f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; {history.problem.space.mass_note}"
+    )
     if run.folder is not None:
         console.print(f"results: {run.folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
         if figures:
@@ -76,12 +79,12 @@ def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
 
 def stdout_console() -> Console:
     """Words on stdout, as plain text where stdout is no terminal."""
-    return Console(highlight=False, soft_wrap=True)
+    return Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def stderr_console() -> Console:
     """Words on stderr, where stdout is for a program."""
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+    return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def _front_table(history: History) -> Table:
@@ -91,7 +94,7 @@ def _front_table(history: History) -> Table:
         table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
     reference = history.reference_point or (float("inf"), float("inf"))
     inside = [m for m in history.front if m.values[0] < reference[0] and m.values[1] < reference[1]] or history.front
-    shown = sorted({round(i) for i in np.linspace(0, len(inside) - 1, min(len(inside), MOST_ROWS))})
+    shown: list[int] = np.unique(np.linspace(0, len(inside) - 1, MOST_ROWS).round().astype(int)).tolist()
     for member in (inside[i] for i in shown):
         table.add_row(
             str(member.number),
@@ -166,18 +169,24 @@ class _TimeLeft(ProgressColumn):
 @contextmanager
 def _live(console: Console) -> Generator[Watch]:
     columns = (
-        TextColumn("iteration {task.completed}/{task.total}"),
+        TextColumn("{task.fields[count]}"),
         BarColumn(24),
         TextColumn("{task.fields[state]}"),
         _TimeLeft(),
     )
     with Progress(*columns, console=console, transient=False) as bar:
-        line = bar.add_task("", total=None, state="starting")
+        line = bar.add_task("", total=None, count="starting", state="")
 
         def watch(progress: StudyProgress) -> None:
             if progress.fault:
                 console.print(_fault(progress))
             doing = f"asking {progress.source} …" if progress.doing == "proposing" else progress.source
-            bar.update(line, total=progress.n_total, completed=progress.iteration, state=f"{_state(progress)}  {doing}")
+            bar.update(
+                line,
+                total=progress.n_total,
+                completed=progress.iteration,
+                count=f"iteration {progress.iteration}/{progress.n_total}",
+                state=f"{_state(progress)}  {doing}",
+            )
 
         yield watch

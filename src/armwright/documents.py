@@ -35,7 +35,12 @@ def parse_document(text: str, schema: type[Schema], error: type[ArmwrightError],
         raise error(f"{where} is not valid YAML: {_yaml_fault(fault)}") from fault
     if not isinstance(data, dict):
         raise error(f"{where} must hold keys and values ({', '.join(schema.model_fields)}), one a line")
-    for key in cast("dict[Any, Any]", data):
+    return check_document(cast("dict[Any, Any]", data), schema, error, where)
+
+
+def check_document(data: dict[Any, Any], schema: type[Schema], error: type[ArmwrightError], where: str) -> Schema:
+    """`data` as a value of `schema`; `where` names it in messages."""
+    for key in data:
         if key not in schema.model_fields:
             allowed = ", ".join(schema.model_fields)
             raise error(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
 from armwright.exceptions import TaskError
@@ -27,17 +27,13 @@ class Evaluation:
     def __len__(self) -> int:
         return len(self.q)
 
-    def __getitem__(self, rows: slice) -> "Evaluation":
-        return Evaluation(
-            self.targets, self.q[rows], self.reached[rows], self.position_error[rows], self.joint_torques[rows]
-        )
 
-
-def evaluate(arms: Sequence[Arm], targets: Array) -> Evaluation:
+def evaluate(arms: Sequence[Arm], targets: ArrayLike) -> Evaluation:
     """Every arm at every target. Not reaching a target is a result, never an exception.
 
     targets: (T, 3) [m].
     """
+    targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
     arrays = stack_arms(arms)

@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation
-from armwright.pareto import default_reference_point, front_numbers, hypervolume_history
+from armwright.pareto import front_numbers, hypervolume_history
 from armwright.problem import Problem
 from armwright.space import Design
 
@@ -24,6 +25,7 @@ class FinishedTrial:
     proposal, reason: the proposal's id and reason, where a proposer made the design.
     fault: why a trial that was a proposer's became a black-box one.
     seconds: wall time by part (proposing, sampling, evaluation).
+    sampler_attrs: what the sampler noted on its trial (a genetic one: the generation), needed to resume.
     """
 
     number: int
@@ -34,6 +36,7 @@ class FinishedTrial:
     reason: str = ""
     fault: str | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
+    sampler_attrs: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True)
@@ -49,11 +52,15 @@ class FrontMember:
 
 @dataclass(frozen=True)
 class History:
-    """The finished trials of a study in the order of their numbers; the first `n_init` are random."""
+    """The finished trials of a study in the order of their numbers; the first `n_init` are random.
+
+    frozen_reference_point: the one that the run found for itself, where the task states none.
+    """
 
     problem: Problem
     trials: Sequence[FinishedTrial]
     n_init: int
+    frozen_reference_point: tuple[float, float] | None = None
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -66,12 +73,10 @@ class History:
         """(N, 2) position error [m] and torque [α-scaled]."""
         return np.array([trial.values for trial in self.trials]).reshape(len(self.trials), len(self.problem.objectives))
 
-    @cached_property
+    @property
     def reference_point(self) -> tuple[float, float] | None:
-        """The problem's own, else 1.1 times the worst non-dominated values of the first n_init trials."""
-        if self.problem.reference_point is not None:
-            return self.problem.reference_point
-        return default_reference_point(self.values[: self.n_init]) if len(self.trials) >= self.n_init else None
+        """The task's own, else the frozen one; None before the first n_init trials."""
+        return self.problem.reference_point or self.frozen_reference_point
 
     @cached_property
     def front(self) -> list[FrontMember]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,11 +15,11 @@ from armwright.task import Task
 
 @dataclass(frozen=True)
 class Problem:
-    """Which arm of `space` serves `task` best, by `objectives` (position error and torque)."""
+    """Which arm of `space` serves `task` best, by position error and torque."""
 
     task: Task
     space: DesignSpace = field(default_factory=paper_space)
-    objectives: tuple[Objective, ...] = PAPER_OBJECTIVES
+    objectives: ClassVar[tuple[Objective, ...]] = PAPER_OBJECTIVES
 
     @property
     def reference_point(self) -> tuple[float, float] | None:

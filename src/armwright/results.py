@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.history import FrontMember, History
 from armwright.proposers.proposer import ProposerSummary
@@ -22,6 +23,8 @@ from armwright.run_folder import RunConfig, RunFolder
 
 SUMMARY = "summary.json"
 DESIGNS = "designs"
+FIGURES = "figures"  # drawn by report/figures.py
+TABLES = ("trials.csv", "front.csv")
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
 
 
@@ -32,6 +35,24 @@ def write_results(folder: RunFolder, history: History, summary: Mapping[str, Any
     folder.write_text("front.csv", _csv(row for row in _rows(history) if row["number"] in on_front))
     _write_designs(folder, history)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
+
+
+def results_are_there(path: Path, history: History) -> bool:
+    """Whether a run folder holds all results of these trials."""
+    summary = read_summary(path)
+    files = [path / name for name in TABLES]
+    files += [path / DESIGNS / _name(m) / name for m in history.front for name in ("arm.urdf", "design.json")]
+    return summary is not None and summary["n_trials"] == len(history) and all(file.is_file() for file in files)
+
+
+def discard_results(path: Path) -> None:
+    """Takes away what says that a run is finished: its summary and its figures."""
+    try:
+        (path / SUMMARY).unlink(missing_ok=True)
+        if (path / FIGURES).exists():
+            shutil.rmtree(path / FIGURES)
+    except OSError as fault:
+        raise RunFolderError(f"cannot remove the old results in {path}: {fault.strerror or fault}") from fault
 
 
 def read_summary(path: Path) -> dict[str, Any] | None:
@@ -79,15 +100,19 @@ def _proposer_record(history: History, proposer: ProposerSummary) -> dict[str, A
 
 
 def _write_designs(folder: RunFolder, history: History) -> None:
-    names = {member.number: f"{member.number:04d}" for member in history.front}
+    names = {_name(member) for member in history.front}
     for stale in (folder.path / DESIGNS).glob("[0-9]*"):
-        if stale.name not in names.values():
-            shutil.rmtree(stale, ignore_errors=True)
+        if stale.name not in names:
+            shutil.rmtree(stale)
     for member, record in zip(history.front, _design_records(history, history.front), strict=True):
-        place = f"{DESIGNS}/{names[member.number]}"
+        place = f"{DESIGNS}/{_name(member)}"
         urdf = to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}")
         folder.write_text(f"{place}/arm.urdf", urdf)
         folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
+
+
+def _name(member: FrontMember) -> str:
+    return f"{member.number:04d}"
 
 
 def _design_records(history: History, members: Sequence[FrontMember]) -> Iterable[dict[str, Any]]:

@@ -9,10 +9,10 @@ What stands in the last line is made from the finished trials, and can be made a
 """
 
 import json
-import math
 import os
 import platform
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, Self, cast
 
 import yaml
 from filelock import FileLock, Timeout
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, ValidationError
 
 from armwright.documents import parse_document
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
@@ -31,7 +31,7 @@ from armwright.task import Task
 
 CONFIG = "config.yaml"
 TRIALS = "trials.jsonl"
-PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang")
+PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim")
 
 
 class Method(BaseModel, frozen=True, extra="forbid"):
@@ -56,6 +56,7 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     method: Method
     seed: int
     versions: dict[str, str]
+    earlier_versions: list[dict[str, str]] = []  # of sessions that made earlier trials, where they were others
 
     @property
     def problem(self) -> Problem:
@@ -65,7 +66,11 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
 
 def versions() -> dict[str, str]:
     """The versions that the numbers of a run depend on."""
-    return {"python": platform.python_version(), **{name: metadata.version(name) for name in PACKAGES}}
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        with suppress(metadata.PackageNotFoundError):  # an extra
+            found[package] = metadata.version(package)
+    return found
 
 
 class RunFolder:
@@ -97,20 +102,20 @@ class RunFolder:
         self._lock.release()
 
     def adopt(self, config: RunConfig) -> RunConfig:
-        """The folder's configuration: `config` for a new folder or one whose run it extends.
+        """The folder's configuration: `config` for a folder without trials, or for one whose run it extends.
 
         RunConflictError with the differences where the folder holds a run with other settings.
         """
-        if (self.path / CONFIG).exists():
-            there = read_config(self.path)
-            _check_same_run(self.path, there, config)
-            config = config.model_copy(update={"reference_point": there.reference_point, "versions": there.versions})
-            if config == there:
-                return there
-        elif (self.path / TRIALS).exists():
-            raise RunFolderError(f"{self.path} holds {TRIALS} but no {CONFIG}; restore it, or give another --out DIR")
-        self.write_config(config)
-        return config
+        trials = self.path / TRIALS
+        if not (trials.is_file() and b"\n" in trials.read_bytes()):  # nothing there that could be lost
+            self.write_config(config)
+            return config
+        there = read_config(self.path)
+        _check_same_run(self.path, there, config)
+        if config.method.n_total != there.method.n_total:
+            there = there.model_copy(update={"method": config.method})
+            self.write_config(there)
+        return there
 
     def write_config(self, config: RunConfig) -> None:
         """Replaces config.yaml in one step."""
@@ -131,7 +136,7 @@ class RunFolder:
     def append(self, trial: FinishedTrial) -> None:
         """Writes one finished trial: a single write, so that a crash leaves a whole line or a cut last one."""
         assert self._trials is not None, "open_trials comes first"
-        line = (json.dumps(_trial_record(trial)) + "\n").encode()
+        line = _trial_line(trial)
         try:
             written = self._trials.write(line)
             if written != len(line):
@@ -179,19 +184,36 @@ def read_run(path: Path) -> tuple[RunConfig, History]:
     """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
     config = read_config(path)
     trials, _ = _read_trials(path / TRIALS, config.space)
-    return config, History(config.problem, trials, config.method.n_init)
+    return config, History(config.problem, trials, config.method.n_init, config.reference_point)
 
 
-def _trial_record(trial: FinishedTrial) -> dict[str, Any]:
-    record: dict[str, Any] = {"number": trial.number, "source": trial.source, "proposal": trial.proposal}
-    if trial.reason:
-        record["reason"] = trial.reason
-    if trial.fault:
-        record["fault"] = trial.fault
-    record["params"] = dict(trial.design.params)
-    record["values"] = list(trial.values)
-    record["seconds"] = dict(trial.seconds)
-    return record
+class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, strict=True):
+    """One line of trials.jsonl."""
+
+    number: int
+    source: str
+    proposal: str | None
+    reason: str = ""
+    fault: str | None = None
+    params: dict[str, float | str]
+    values: list[float] = Field(min_length=2, max_length=2)
+    seconds: dict[str, float]
+    sampler_attrs: dict[str, Any] = {}
+
+
+def _trial_line(trial: FinishedTrial) -> bytes:
+    record = _TrialRecord(
+        number=trial.number,
+        source=trial.source,
+        proposal=trial.proposal,
+        reason=trial.reason,
+        fault=trial.fault,
+        params=dict(trial.design.params),
+        values=list(trial.values),
+        seconds=dict(trial.seconds),
+        sampler_attrs=dict(trial.sampler_attrs),
+    )
+    return json.dumps(record.model_dump(exclude_defaults=True)).encode() + b"\n"
 
 
 def _read_trials(path: Path, space: DesignSpace) -> tuple[list[FinishedTrial], int]:
@@ -204,10 +226,10 @@ def _read_trials(path: Path, space: DesignSpace) -> tuple[list[FinishedTrial], i
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
     end = content.rfind(b"\n") + 1
     trials: list[FinishedTrial] = []
-    for number, line in enumerate(content[:end].splitlines()):
+    for number, line in enumerate(content[:end].split(b"\n")[:-1]):
         try:
             trials.append(_parse_trial(line, number, space))
-        except (ValueError, KeyError, TypeError, DesignError) as fault:
+        except (ValueError, DesignError) as fault:
             raise RunFolderError(
                 f"{path}, line {number + 1} is damaged ({_words(fault)}); restore the file, or delete this line and "
                 "all after it: the same command then goes on from there"
@@ -216,26 +238,27 @@ def _read_trials(path: Path, space: DesignSpace) -> tuple[list[FinishedTrial], i
 
 
 def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
-    record = json.loads(line)
-    if record["number"] != number:
-        raise ValueError(f"number {record['number']} where {number} is due")
-    values = tuple(float(value) for value in record["values"])
-    if len(values) != 2 or not all(math.isfinite(value) for value in values):
-        raise ValueError(f"values {record['values']} are not two finite numbers")
+    record = _TrialRecord.model_validate_json(line)
+    if record.number != number:
+        raise ValueError(f"number {record.number} where {number} is due")
     return FinishedTrial(
         number=number,
-        source=str(record["source"]),
-        design=space.design(record["params"]),
-        values=values,
-        proposal=record["proposal"],
-        reason=str(record.get("reason", "")),
-        fault=record.get("fault"),
-        seconds={str(part): float(value) for part, value in record["seconds"].items()},
+        source=record.source,
+        design=space.design(record.params),
+        values=tuple(record.values),
+        proposal=record.proposal,
+        reason=record.reason,
+        fault=record.fault,
+        seconds=record.seconds,
+        sampler_attrs=record.sampler_attrs,
     )
 
 
 def _words(fault: Exception) -> str:
-    return f"{fault} is missing" if isinstance(fault, KeyError) else str(fault)
+    if not isinstance(fault, ValidationError):
+        return str(fault)
+    first = fault.errors(include_url=False, include_context=False, include_input=False)[0]
+    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
 
 
 def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
@@ -258,7 +281,7 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     content = config.model_dump(mode="json")
     content["task"] = {key: content["task"][key] for key in ("name", "targets", "reference_point")}
     method = content.pop("method")
-    del content["versions"], content["reference_point"], method["n_total"]
+    del content["versions"], content["earlier_versions"], content["reference_point"], method["n_total"]
     return _flat({**content, **method})
 
 

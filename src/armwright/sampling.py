@@ -79,36 +79,48 @@ class BlackBox:
                     distributions=self._distributions,
                     values=list(trial.values),
                     user_attrs=_attributes(trial.source, trial.proposal),
+                    system_attrs=dict(trial.sampler_attrs),
                 )
             )
 
     def draw(self, number: int, source: str) -> tuple[Trial, Design]:
         """The sampler's next design; uniformly random where source is `random`."""
         seed = derived_seed(self._seed, SAMPLING, number)
-        self._study.sampler = _random(seed) if source == RANDOM else self._factory(seed)
+        sampler = self._factory(seed)
+        self._study.sampler = _random(seed) if source == RANDOM else sampler
         trial = self._study.ask(self._distributions)
+        self._enlist(sampler, trial)
         for name, value in _attributes(source, None).items():
             trial.set_user_attr(name, value)
         return trial, Design(trial.params)
 
-    def inject(self, design: Design, number: int, source: str, proposal: str) -> Trial:
-        """A trial for a design from elsewhere, which the sampler will learn from."""
+    def inject(self, design: Design, number: int, source: str, proposal: str) -> tuple[Trial, Design]:
+        """A trial for a design from elsewhere, which the sampler will learn from, and the design as the space has it.
+
+        DesignError where it is not in the space.
+        """
         # Checked here because Optuna takes out-of-range values with only a warning, and leaves a trial with an
         # unknown category RUNNING for ever.
         checked = self._space.design(design.params)
         sampler = self._study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
         self._study.enqueue_trial(dict(checked.params), user_attrs=_attributes(source, proposal))
         trial = self._study.ask(self._distributions)
-        # Genetic samplers pass over trials that belong to no generation, and they assign one only to those
-        # whose values they draw themselves.
-        remember = getattr(sampler, "get_trial_generation", None)
-        if remember is not None:
-            remember(self._study, self._study.get_trials(deepcopy=False)[trial.number])
-        return trial
+        self._enlist(sampler, trial)
+        return trial, checked
 
-    def tell(self, trial: Trial, values: Iterable[float]) -> None:
-        """The trial's values; from now on the sampler learns from it."""
-        self._study.tell(trial, list(values))
+    def tell(self, trial: Trial, values: Iterable[float]) -> dict[str, Any]:
+        """The trial's values; from now on the sampler learns from it. Returns what the sampler noted on the trial."""
+        told = self._study.tell(trial, list(values))
+        return {name: note for name, note in told.system_attrs.items() if name != "fixed_params"}
+
+    def _enlist(self, sampler: BaseSampler, trial: Trial) -> None:
+        """Gives the trial a generation, where the sampler has such.
+
+        Genetic samplers pass over trials without one, and give one only to trials whose values they draw.
+        """
+        enlist = getattr(sampler, "get_trial_generation", None)
+        if enlist is not None:
+            enlist(self._study, self._study.get_trials(deepcopy=False)[trial.number])
 
 
 def _attributes(source: str, proposal: str | None) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -15,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.arm import Arm, Axis, Joint, uniform_link
-from armwright.documents import read_document
+from armwright.documents import check_document, read_document
 from armwright.exceptions import DesignError, SpaceError, did_you_mean
 
 JointType = Literal["R", "P", "Y"]
@@ -29,6 +30,7 @@ JOINT_WORDS: dict[JointType, str] = {
     "Y": "yaw, about local z, along the link",
 }
 TOY_MASS = 0.1  # [kg] of a whole arm
+LARGEST_ANGLE = 2 * math.pi  # [rad]
 LARGEST_LENGTH = 1000.0  # [m]; beyond it float32 kernels lose the millimetre
 
 
@@ -72,7 +74,7 @@ Parameter = FloatParameter | CategoricalParameter
 
 @dataclass(frozen=True)
 class Design:
-    """Parameter values: one point of a design space."""
+    """Parameter values: one point of a design space. The order of the mapping means nothing."""
 
     params: Mapping[str, ParameterValue]
 
@@ -80,7 +82,7 @@ class Design:
         object.__setattr__(self, "params", dict(self.params))
 
     def __hash__(self) -> int:
-        return hash(tuple(self.params.items()))
+        return hash(frozenset(self.params.items()))
 
     @property
     def origin(self) -> tuple[float, float, float]:
@@ -90,12 +92,17 @@ class Design:
     @property
     def joints(self) -> str:
         """The joint types in order, as one word: `YPRP`."""
-        return "".join(str(value) for name, value in self.params.items() if name.startswith("joint_"))
+        return "".join(str(value) for value in self._numbered("joint"))
 
     @property
     def links(self) -> tuple[float, ...]:
         """The link lengths in order [m]."""
-        return tuple(float(value) for name, value in self.params.items() if name.startswith("link_"))
+        return tuple(float(value) for value in self._numbered("link"))
+
+    def _numbered(self, kind: str) -> list[ParameterValue]:
+        """The values of kind_1, kind_2, …, in whatever order the mapping has them."""
+        names = takewhile(self.params.__contains__, (f"{kind}_{number}" for number in count(1)))
+        return [self.params[name] for name in names]
 
 
 class MassPerMetre(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -193,6 +200,8 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         low, high = self.joint_range
         if high - low < math.radians(3.0):
             raise ValueError(f"joint_range = [{low:g}, {high:g}] rad is narrower than 3 degrees; a joint must move")
+        if max(-low, high) > LARGEST_ANGLE:
+            raise ValueError(f"joint_range = [{low:g}, {high:g}] rad goes beyond ±2π, a full turn each way")
         if not low <= 0.0 <= high:
             raise ValueError(f"joint_range = [{low:g}, {high:g}] rad must hold 0, where the inverse kinematics starts")
         if len(set(self.joint_types)) != len(self.joint_types):
@@ -244,7 +253,8 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
 def paper_space(joints: int = 4) -> DesignSpace:
     """The design space of the paper, with `joints` joints (4 in its experiments)."""
-    return DesignSpace(name="paper" if joints == 4 else f"paper-{joints}", joints=joints)
+    content = {"name": "paper" if joints == 4 else f"paper-{joints}", "joints": joints}
+    return check_document(content, DesignSpace, SpaceError, "paper_space")
 
 
 def load_space(path: str | Path) -> DesignSpace:

@@ -4,6 +4,7 @@ Every finished trial is on disk before the next begins, and every trial is drawn
 trials before it, so a killed run goes on where it stopped and ends as if it had never stopped.
 """
 
+import operator
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -11,17 +12,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from armwright.exceptions import ModelError, ProposalError, SettingsError
+from armwright.exceptions import ProposalError, SettingsError
 from armwright.history import BBO, RANDOM, FinishedTrial, FrontMember, History
-from armwright.pareto import Array, FrontTracker
+from armwright.pareto import Array, FrontTracker, default_reference_point
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.results import read_summary, summarize, write_results
+from armwright.results import discard_results, results_are_there, summarize, write_results
 from armwright.run_folder import Method, RunConfig, RunFolder, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_factory
 from armwright.seeding import derived_seed
 
+LARGEST = 2**31 - 1
 PROPOSING = 2  # the place of the proposals' seeds under the run's seed
 
 
@@ -82,7 +84,7 @@ def optimize(
 ) -> Run:
     """Searches `problem` and returns the run; with `out`, every trial is kept there and a second call resumes.
 
-    proposer: "rules", "none", "auto" (a configured model, else the rules), or any Proposer.
+    proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or any Proposer.
     sampler: "tpe", "random", or a factory seed -> Optuna sampler.
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     """
@@ -139,11 +141,26 @@ class Study:
     def run(self) -> Run:
         """All trials that are still due, then the results."""
         resumed = len(self.trials)
-        if self.proposer is not None and any(self._is_proposers(n) for n in range(resumed, self.n_trials)):
-            self.proposer.prepare(None if self.folder is None else self.folder.path)
+        if self.proposer is not None:
+            self.proposer.open(None if self.folder is None else self.folder.path)
+            if any(self._is_proposers(number) for number in range(resumed, self.n_trials)):
+                self.proposer.check()
+        if resumed < self.n_trials:
+            self._begin()
         for number in range(resumed, self.n_trials):
             self._step(number)
         return self._finish(resumed)
+
+    def _begin(self) -> None:
+        """Before the first new trial: results of fewer trials are taken away, other versions are noted."""
+        if self.folder is None:
+            return
+        discard_results(self.folder.path)
+        now = versions()
+        if self.config.versions != now:
+            earlier = [*self.config.earlier_versions, self.config.versions]
+            self.config = self.config.model_copy(update={"versions": now, "earlier_versions": earlier})
+            self.folder.write_config(self.config)
 
     def _is_proposers(self, number: int) -> bool:
         counted = number - self.method.n_init
@@ -154,15 +171,15 @@ class Study:
         proposal, fault = self._propose(number) if self._is_proposers(number) else (None, None)
         proposed = time.perf_counter()
         if proposal is not None and self.proposer is not None:
-            source, design = self.proposer.name, proposal.design
-            trial = self.black_box.inject(design, number, source, proposal.id)
+            source = self.proposer.name
+            trial, design = self.black_box.inject(proposal.design, number, source, proposal.id)
         else:
             source = RANDOM if number < self.method.n_init else BBO
             trial, design = self.black_box.draw(number, source)
         sampled = time.perf_counter()
         values = tuple(self.problem.evaluate([design])[0].tolist())
         evaluated = time.perf_counter()
-        self.black_box.tell(trial, values)
+        noted = self.black_box.tell(trial, values)
         told = time.perf_counter()
         finished = FinishedTrial(
             number=number,
@@ -172,6 +189,7 @@ class Study:
             proposal=proposal.id if proposal is not None else None,
             reason=proposal.reason if proposal is not None else "",
             fault=fault,
+            sampler_attrs=noted,
             seconds={
                 "total": round(told - started, 6),
                 "sampling": round(sampled - proposed + told - evaluated, 6),
@@ -194,21 +212,19 @@ class Study:
             proposal = self.proposer.propose(self._history(), derived_seed(self.config.seed, PROPOSING, number))
         except ProposalError as fault:
             if not any(trial.source == self.proposer.name for trial in self.trials):
-                raise ModelError(
-                    f"{fault}. No proposal has come from {self.proposer.name} so far; see --proposer rules"
+                raise ProposalError(
+                    fault.kind, f"{fault}; no proposal has come from {self.proposer.name} yet"
                 ) from fault
             return None, fault.kind
-        self.problem.space.design(proposal.design.params)
         return proposal, None
 
     def _history(self) -> History:
-        return History(self.problem, tuple(self.trials), self.method.n_init)
+        return History(self.problem, tuple(self.trials), self.method.n_init, self.config.reference_point)
 
     def _freeze_reference_point(self) -> None:
         """Writes a reference point that the task left open into config.yaml as soon as it is known."""
         if self.config.reference_point is None and len(self.trials) >= self.method.n_init:
-            reference_point = self._history().reference_point
-            assert reference_point is not None
+            reference_point = default_reference_point(self._history().values[: self.method.n_init])
             self.config = self.config.model_copy(update={"reference_point": reference_point})
             self._tracker.set_reference_point(reference_point)
             if self.folder is not None:
@@ -238,15 +254,14 @@ class Study:
         folder = None
         if self.folder is not None:
             folder = self.folder.path
-            there = read_summary(folder)
-            if resumed < len(self.trials) or there is None or there.get("n_trials") != len(self.trials):
+            if not results_are_there(folder, history):
                 write_results(self.folder, history, summary)
         return Run(history, self.config, summary, folder, resumed)
 
 
 def _method(proposer: Proposer | None, sampler: str | SamplerFactory, n_init: int, n_step: int, n_total: int) -> Method:
     factory = sampler_factory(sampler)
-    name = sampler if isinstance(sampler, str) else f"{factory.__module__}.{factory.__qualname__}"
+    name = sampler if isinstance(sampler, str) else getattr(factory, "__qualname__", type(factory).__qualname__)
     return Method(
         proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
         sampler=name,
@@ -257,6 +272,10 @@ def _method(proposer: Proposer | None, sampler: str | SamplerFactory, n_init: in
 
 
 def _whole(name: str, value: Any, least: int) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= 2**31 - 1:
-        raise SettingsError(f"{name} = {value!r}: a whole number from {least} up is needed")
-    return value
+    try:
+        number = operator.index(value)  # numpy's whole numbers, too
+    except TypeError:
+        number = -1
+    if isinstance(value, bool) or not least <= number <= LARGEST:
+        raise SettingsError(f"{name} = {value!r}: a whole number from {least} to {LARGEST} is needed")
+    return number

@@ -1,7 +1,10 @@
 """The task: points that the tip of the arm should reach."""
 
 import csv
+import json
 import math
+import os
+import shlex
 from importlib import resources
 from pathlib import Path
 from typing import Self
@@ -64,7 +67,7 @@ def load_task(name_or_path: str | Path) -> Task:
     if str(name_or_path) in known:
         return known[str(name_or_path)]
     path = Path(name_or_path)
-    if path.is_file():
+    if os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long, too
         return read_document(path, Task, TaskError)
     if path.suffix in (".yaml", ".yml"):
         raise TaskError(f"there is no file {path}; `armwright init {path}` writes one to edit")
@@ -97,7 +100,7 @@ def random_task(seed: int) -> Task:
 def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) -> tuple[Point, ...]:
     """The points of a CSV file with x, y and z in its first three columns, times `unit`, plus `offset` [m].
 
-    A first line that is not numbers is taken for the column names; empty lines and lines that begin
+    A first line without any number is taken for the column names; empty lines and lines that begin
     with # are passed over. Commas, semicolons, tabs or blanks may separate the columns.
     """
     if unit not in UNITS:
@@ -109,35 +112,30 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
     except UnicodeDecodeError as fault:
         raise TaskError(f"{path} is not a text file in UTF-8") from fault
     points: list[Point] = []
-    heading_seen = False
-    for number, line in enumerate(lines, start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        row = _split_row(line)
+    rows = [(number, _split_row(line)) for number, line in enumerate(lines, start=1) if _holds_data(line)]
+    if rows and not any(map(_is_number, rows[0][1][:3])):
+        rows = rows[1:]  # column names
+    for number, row in rows:
         try:
-            x, y, z = (float(cell) for cell in row[:3])
+            x, y, z = (float(cell) * UNITS[unit] for cell in row[:3])
         except ValueError as fault:
-            if not points and not heading_seen:
-                heading_seen = True
-                continue
-            raise TaskError(f'{path}, line {number}: "{line.strip()[:60]}" is not three numbers x, y, z') from fault
+            raise TaskError(f"{path}, line {number}: {row[:3]} is not three numbers x, y, z") from fault
         if not all(math.isfinite(c) for c in (x, y, z)):
             raise TaskError(f"{path}, line {number}: coordinates must be finite, not {row[:3]}")
-        scale = UNITS[unit]
-        points.append((_tidy(x * scale + offset[0]), _tidy(y * scale + offset[1]), _tidy(z * scale + offset[2])))
+        points.append((_tidy(x + offset[0]), _tidy(y + offset[1]), _tidy(z + offset[2])))
     if not points:
         raise TaskError(f"{path} holds no points: three numbers x, y, z a line are needed")
     return tuple(points)
 
 
-def task_template(name: str, targets: tuple[Point, ...] | None = None) -> str:
+def task_template(file: Path, targets: tuple[Point, ...] | None = None) -> str:
     """A commented task file to edit, with `targets` [m] or three example points."""
     points = targets or ((0.45, 0.0, 0.1), (0.45, 0.2, 0.3), (0.45, -0.2, 0.3))
-    rows = "\n".join(f"  - [{x:g}, {y:g}, {z:g}]" for x, y, z in points)
+    rows = "\n".join(f"  - [{x!r}, {y!r}, {z!r}]" for x, y, z in points)
     return f"""\
 # A task for armwright: points that the tip of the arm should reach.
-# Run it with:  armwright optimize {name}.yaml
-name: {name}                     # names the run folder: letters, digits, . _ -
+# Run it with:  armwright optimize {shlex.quote(str(file))}
+name: {json.dumps(file.stem)}    # names the run folder: letters, digits, . _ -
 
 # x, y, z in metres; z is up. The base is searched within ±1 m of the origin (see --space).
 targets:
@@ -151,6 +149,18 @@ targets:
 # description: What the arm has to do there.
 # provenance: Who measured the points, and when.
 """
+
+
+def _holds_data(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _split_row(line: str) -> list[str]:

@@ -10,7 +10,7 @@ from armwright.arm import AXES, Arm, Link, Vector
 from armwright.exceptions import ArmError
 
 MOST_JOINTS = 8
-LARGEST_ANGLE = 2 * np.pi  # [rad]
+LARGEST_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]

@@ -15,6 +15,7 @@ from typing import Any
 
 import warp as wp
 
+from armwright.arm import GRAVITY
 from armwright.kinematics.arrays import MOST_JOINTS
 
 LANES = 8
@@ -24,7 +25,6 @@ LEAST_MANIPULABILITY = wp.constant(0.1)  # below it the update is damped
 DAMPING = wp.constant(0.001)
 LIMIT_MARGIN = wp.constant(0.017453293)  # [rad] = 1°, keeps the limit gradient finite
 CENTRING_GAIN = wp.constant(0.01)
-GRAVITY = wp.constant(9.81)  # [m/s²] along -z
 LARGEST = wp.constant(1.0e30)
 
 Lane: Any = wp.types.vector(length=LANES, dtype=wp.float32)

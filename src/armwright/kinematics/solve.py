@@ -1,6 +1,7 @@
 """The boundary of the kernels: numpy in, numpy out. Another kernel could stand behind it."""
 
 import os
+import threading
 from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -112,14 +113,26 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+_loading = threading.Lock()
+
+
 @cache
 def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(cores(), thread_name_prefix="armwright-kernels")
 
 
-@cache
+if hasattr(os, "register_at_fork"):  # a forked child has the pool's object, but not its threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def _ready() -> tuple[Any, Any]:
     """Warp and the kernels, compiled and loaded, so that threads only launch."""
+    with _loading:
+        return _load()
+
+
+@cache
+def _load() -> tuple[Any, Any]:
     import warp as wp
 
     wp.config.log_level = wp.LOG_ERROR

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from armwright.exceptions import DesignError, MissingExtraError, ProposalError, SettingsError
 
 try:
+    from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
     from pydantic_ai.messages import ModelMessage, ModelResponse, TextPart
@@ -25,7 +26,7 @@ except ImportError as fault:
     raise MissingExtraError('language models need an extra: pip install "armwright[llm]"') from fault
 
 CALL_SECONDS = 120.0  # of one request, all attempts of the client included
-CHECK_SECONDS = 20.0
+CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
 REASKS = 2  # after a refused answer
 SERVER_KEY = "ARMWRIGHT_API_KEY"  # for --base-url, where the server wants a key
 
@@ -124,8 +125,15 @@ def _model(name: str, base_url: str | None) -> Model:
     if base_url:
         if not base_url.startswith(("http://", "https://")):
             raise SettingsError(f"--base-url {base_url}: an address that begins with http:// or https:// is needed")
-        # This provider never sends a vendor's key to another host.
-        provider = OpenAICompatibleProvider("openai-compatible", base_url=base_url, api_key=os.environ.get(SERVER_KEY))
+        if "@" in base_url.partition("://")[2].partition("/")[0]:
+            raise SettingsError(f"--base-url holds a user name or password; put the server's key into {SERVER_KEY}")
+        # Nothing that belongs to a vendor goes to another host: neither its key nor its account's names.
+        client = AsyncOpenAI(
+            base_url=base_url,
+            api_key=os.environ.get(SERVER_KEY) or "no-key",
+            default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
+        )
+        provider = OpenAICompatibleProvider("openai-compatible", openai_client=client)
         return OpenAIChatModel(name.removeprefix("openai-chat:"), provider=provider)
     if ":" not in name:
         raise SettingsError(
@@ -143,13 +151,20 @@ def _reply(messages: Sequence[ModelMessage], seconds: float) -> Reply:
     responses = [message for message in messages if isinstance(message, ModelResponse)]
     costs = [_cost(response) for response in responses]
     return Reply(
-        text="".join(part.content for part in responses[-1].parts if isinstance(part, TextPart)) if responses else "",
+        text=_clean("".join(part.content for part in responses[-1].parts if isinstance(part, TextPart)))
+        if responses
+        else "",
         requests=len(responses),
         input_tokens=sum(response.usage.input_tokens for response in responses),
         output_tokens=sum(response.usage.output_tokens for response in responses),
         cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
         seconds=seconds,
     )
+
+
+def _clean(text: str) -> str:
+    """Without lone surrogates, which JSON can carry and UTF-8 cannot."""
+    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _cost(response: ModelResponse) -> float | None:

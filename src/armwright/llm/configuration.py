@@ -31,14 +31,19 @@ def configuration_path() -> Path:
 
 
 def configured_model(model: str | None = None, base_url: str | None = None) -> ModelName | None:
-    """The model by the option, else ARMWRIGHT_MODEL, else the configuration file; None where none is named."""
+    """The model by the option, else ARMWRIGHT_MODEL, else the configuration file; None where none is named.
+
+    The address comes from the option, else ARMWRIGHT_BASE_URL, else, for a model of the file, from the file: a
+    server of one's own in the file says nothing of a vendor's model that is named elsewhere.
+    """
+    base_url = base_url or os.environ.get("ARMWRIGHT_BASE_URL")
     if model:
-        return ModelName(model, base_url or os.environ.get("ARMWRIGHT_BASE_URL"), "--model")
+        return ModelName(model, base_url, "--model")
     named = os.environ.get("ARMWRIGHT_MODEL")
     if named:
-        return ModelName(named, base_url or os.environ.get("ARMWRIGHT_BASE_URL"), "ARMWRIGHT_MODEL")
+        return ModelName(named, base_url, "ARMWRIGHT_MODEL")
     path = configuration_path()
-    if path.is_file():
+    if os.path.isfile(path):
         content = read_document(path, _ConfigurationFile, SettingsError)
         if content.model:
             return ModelName(content.model, base_url or content.base_url, str(path))

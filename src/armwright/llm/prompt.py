@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from armwright.history import History
+from armwright.kinematics.solve import UPDATES
+from armwright.objectives import TORQUE_SCALE
 from armwright.space import JOINT_WORDS, CategoricalParameter, Design, DesignSpace
 
 PROMPTS = ("plus", "minus")
@@ -29,6 +31,8 @@ def proposal_prompt(history: History, prompt: str, seed: int) -> str:
         space=history.problem.space,
         targets=_points(history.problem.task.points),
         joint_words=JOINT_WORDS,
+        updates=UPDATES,
+        torque_scale=TORQUE_SCALE,
         reference_point=history.reference_point,
         n_finished=len(history),
         n_front=len(history.front),

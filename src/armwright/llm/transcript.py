@@ -5,7 +5,8 @@ import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
 
@@ -54,7 +55,7 @@ class Transcript:
             return
         try:
             with open(self._path, "ab") as file:
-                file.write((json.dumps(asdict(call), ensure_ascii=False) + "\n").encode())
+                file.write((json.dumps(asdict(call)) + "\n").encode())
                 file.flush()
                 os.fsync(file.fileno())
         except OSError as fault:
@@ -76,10 +77,15 @@ def _read(path: Path) -> Iterator[Call]:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
     end = content.rfind(b"\n") + 1
     if end < len(content):
-        os.truncate(path, end)
-    for number, line in enumerate(content[:end].splitlines(), start=1):
         try:
-            record: dict[str, Any] = json.loads(line)
-            yield Call(**record)
-        except (ValueError, TypeError) as fault:
+            os.truncate(path, end)
+        except OSError as fault:
+            raise RunFolderError(f"cannot write {path}: {fault.strerror or fault}") from fault
+    for number, line in enumerate(content[:end].split(b"\n")[:-1], start=1):
+        try:
+            yield _CALL.validate_json(line)
+        except ValidationError as fault:
             raise RunFolderError(f"{path}, line {number} is damaged; restore the file or delete the line") from fault
+
+
+_CALL = TypeAdapter(Call)

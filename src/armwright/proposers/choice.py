@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.llm.configuration import ModelName, configured_model
+from armwright.llm.prompt import PROMPTS
 from armwright.proposers.proposer import Proposer
 from armwright.proposers.rules import RulesProposer
 
@@ -30,6 +31,10 @@ def choose_proposer(
         raise SettingsError(
             f'unknown proposer "{name}".{did_you_mean(name, PROPOSERS)} Proposers: {", ".join(PROPOSERS)}'
         )
+    if prompt not in PROMPTS:
+        raise SettingsError(f'unknown prompt "{prompt}".{did_you_mean(prompt, PROMPTS)} Prompts: {", ".join(PROMPTS)}')
+    if base_url and not model and name in ("none", "rules"):
+        raise SettingsError(f"--proposer {name} uses no language model; leave out --base-url {base_url}")
     if model and name in ("none", "rules"):
         raise SettingsError(
             f"--proposer {name} uses no language model; leave out --model {model}, or take --proposer llm"

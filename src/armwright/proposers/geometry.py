@@ -5,11 +5,11 @@ Nothing here evaluates a design; it is what a designer knows before the first tr
 
 import numpy as np
 
+from armwright.arm import GRAVITY
 from armwright.evaluation import Array
 from armwright.objectives import TORQUE_SCALE
 from armwright.space import DesignSpace
 
-GRAVITY = 9.81  # [m/s²]
 INNER_PULL = 0.05  # weight of a target that is already within reach, against one beyond it
 ROUNDS = 60
 

@@ -40,9 +40,12 @@ class LlmProposer(Proposer):
         """Model, server and prompt."""
         return {"model": self.model, "base_url": self.base_url, "prompt": self.prompt}
 
-    def prepare(self, folder: Path | None) -> None:
-        """Reads what was said before in this run, and makes sure that the model answers."""
+    def open(self, folder: Path | None) -> None:
+        """Reads what was said before in this run."""
         self._transcript = Transcript(None if folder is None else folder / TRANSCRIPTS)
+
+    def check(self) -> None:
+        """Makes sure that the model answers."""
         try:
             self._call("", "check", "", self._chat.check)
         except ProposalError as fault:

@@ -41,11 +41,11 @@ class Proposer(Protocol):
         """What must be known to repeat its proposals; kept in config.yaml. No secrets."""
         return {}
 
-    def prepare(self, folder: Path | None) -> None:
-        """Called once before the first trial; ModelError where the proposer cannot work.
+    def open(self, folder: Path | None) -> None:
+        """Called first of all, with the run folder where there is one: what it did before in this run lies there."""
 
-        folder: the run folder, where there is one.
-        """
+    def check(self) -> None:
+        """Called before the first trial if a proposal is due; FailureError where the proposer cannot work."""
 
     def summary(self) -> ProposerSummary:
         """What it did and cost so far."""

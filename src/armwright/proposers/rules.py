@@ -90,6 +90,8 @@ def most_promising(history: History, name: str) -> str:
         rule = (trial.proposal or "").rpartition("-")[2]
         if trial.source == name and rule in added:
             added[rule].append(float(gain[trial.number]))
+    if len(history.problem.space.joint_types) == 1:
+        del added["swap"]  # there is no other axis
     return max(added, key=lambda rule: float(np.mean(added[rule])))
 
 

@@ -1,7 +1,8 @@
 """The figures of one run, as .png and .pdf in its folder, for papers and for the eye."""
 
 import math
-from collections.abc import Generator, Sequence
+import shutil
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,9 @@ from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, RC, TARGET, Look, look
+from armwright.results import FIGURES
 from armwright.run_folder import read_run
 
-FIGURES = "figures"
 REACHED = 1e-3  # [m]; a target missed by less counts as reached
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # of the reference point, the part of the plane that is drawn
@@ -31,20 +32,27 @@ MOST_PANELS = 12
 def write_figures(folder: Path) -> list[Path]:
     """Draws the figures of a run folder and returns their .png files."""
     _, history = read_run(folder)
-    for stale in (folder / FIGURES).glob("arm-*"):
-        stale.unlink(missing_ok=True)
-    with matplotlib.rc_context(RC):
-        drawn = [
-            _save(draw_hypervolume(history), folder, "hypervolume"),
-            _save(draw_samples(history), folder, "samples"),
-            _save(draw_front(history), folder, "front"),
-        ]
-        chosen = chosen_members(history)
-        if chosen:
-            drawn.append(_save(draw_arms(history, chosen), folder, "arms"))
-        for title, member in chosen:
-            drawn.append(_save(draw_arm(history, title, member), folder, f"arm-{member.number:04d}"))
-    return drawn
+    place, part = folder / FIGURES, folder / f"{FIGURES}.part"
+    with matplotlib.rc_context(RC), _writing(place):
+        if part.exists():
+            shutil.rmtree(part)
+        part.mkdir()
+        names = [_save(figure, part / f"{name}.png") for name, figure in _figures(history)]
+        # In one step, so that a folder with this name always holds all figures of one state of the run.
+        if place.exists():
+            shutil.rmtree(place)
+        part.rename(place)
+    return [place / name for name in names]
+
+
+def _figures(history: History) -> Iterator[tuple[str, Figure]]:
+    yield "hypervolume", draw_hypervolume(history)
+    yield "samples", draw_samples(history)
+    yield "front", draw_front(history)
+    chosen = chosen_members(history)
+    yield "arms", draw_arms(history, chosen)
+    for title, member in chosen:
+        yield f"arm-{member.number:04d}", draw_arm(history, title, member)
 
 
 def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
@@ -314,13 +322,10 @@ def _figure(width: float, height: float) -> tuple[Figure, Any]:
     return figure, figure.subplots()
 
 
-def _save(figure: Figure, folder: Path, name: str) -> Path:
-    png = folder / FIGURES / f"{name}.png"
-    with _writing(png):
-        png.parent.mkdir(exist_ok=True)
-        figure.savefig(png)
-        figure.savefig(png.with_suffix(".pdf"), metadata={"CreationDate": None})
-    return png
+def _save(figure: Figure, png: Path) -> str:
+    figure.savefig(png)
+    figure.savefig(png.with_suffix(".pdf"), metadata={"CreationDate": None})
+    return png.name
 
 
 @contextmanager
