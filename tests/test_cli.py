@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -65,6 +66,17 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
     assert "resumed at trial 10 of 13" in longer.stdout
     message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
     assert "proposer.name: rules there, None asked" in message
+
+
+def test_what_is_missing_of_a_finished_run_is_made_again(in_folder: Path) -> None:
+    armwright("optimize", "target-1", *SHORT, "--out", "run")
+    run = in_folder / "run"
+    before = {path.relative_to(run) for path in run.rglob("*")}
+    shutil.rmtree(run / "figures")
+    shutil.rmtree(run / "designs")
+    (run / "front.csv").unlink()
+    assert "is finished" in armwright("optimize", "target-1", *SHORT, "--out", "run").stdout
+    assert {path.relative_to(run) for path in run.rglob("*")} == before
 
 
 def test_json_is_alone_on_stdout(in_folder: Path) -> None:
@@ -134,6 +146,10 @@ def test_version_and_help() -> None:
     [
         (("targt-1",), 'unknown task "targt-1". Did you mean "target-1"?'),
         (("nothing.yaml",), "there is no file nothing.yaml"),
+        (("a" * 300,), "unknown task"),
+        (("target-1", "--space", "turns.yaml"), "beyond ±2π"),
+        (("target-1", "--proposer", "none", "--base-url", "http://x"), "uses no language model"),
+        (("target-1", "--proposer", "none", "--prompt", "x"), 'unknown prompt "x"'),
         (("bad.yaml",), 'unknown key "target".'),
         (("nan.yaml",), "finite number (got nan)"),
         (("empty.yaml",), "targets is empty"),
@@ -157,6 +173,7 @@ def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...]
     (in_folder / "bad.yaml").write_text("name: a\ntarget: [[0, 0, 0]]")
     (in_folder / "nan.yaml").write_text("name: a\ntargets: [[0, 0, .nan]]")
     (in_folder / "empty.yaml").write_text("name: a\ntargets: []")
+    (in_folder / "turns.yaml").write_text("joint_range: [-10, 10]")
     (in_folder / "upside.yaml").write_text("link: [0.3, 0.03]")
     assert words in refused(2, "optimize", *args)
     assert not (in_folder / "runs").exists()

@@ -34,6 +34,7 @@ def test_a_run_killed_20_times_ends_as_an_uninterrupted_one(tmp_path: Path, prop
     length = size(tmp_path / "whole" / "trials.jsonl")
     rng = random.Random(proposer)
     file = tmp_path / "killed" / "trials.jsonl"
+    in_the_middle = 0
     for left in range(KILLS, 0, -1):
         # at a random length of the file, so that kills fall into the work and not into the imports
         goal = size(file) + rng.randint(0, 2 * (length - size(file)) // (left + 1))
@@ -43,8 +44,10 @@ def test_a_run_killed_20_times_ends_as_an_uninterrupted_one(tmp_path: Path, prop
                 process.wait(timeout=0.002)
             except subprocess.TimeoutExpired:
                 continue
+        in_the_middle += process.poll() is None and 0 < size(file) < length
         process.kill()
         process.wait()
+    assert in_the_middle >= KILLS // 2
     subprocess.run(command(tmp_path / "killed", proposer), check=True, capture_output=True)
     assert trials(tmp_path / "killed") == expected
     summaries = [json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "killed")]

@@ -158,16 +158,50 @@ def test_an_answer_that_was_paid_for_is_not_asked_again(chat_server: ChatServer,
     assert [prompt.splitlines()[0] for prompt in chat_server.prompts()] == ["Answer with one word: ready"]
 
 
-def test_another_hosts_key_is_never_sent_or_written(
-    chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("own", "sent"), [("own-planted-secret", "own-planted-secret"), (None, "no-key")]
+)
+def test_what_belongs_to_another_host_is_never_sent_and_no_key_is_written(
+    chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: str | None, sent: str
 ) -> None:
-    monkeypatch.setenv("OPENAI_API_KEY", "sk-planted-secret")
-    monkeypatch.setenv("ARMWRIGHT_API_KEY", "own-planted-secret")
+    for name in ("OPENAI_API_KEY", "OPENAI_ORG_ID", "OPENAI_PROJECT_ID"):
+        monkeypatch.setenv(name, "sk-planted-secret")
+    if own is not None:
+        monkeypatch.setenv("ARMWRIGHT_API_KEY", own)
     run(chat_server, tmp_path / "run", n_total=1)
-    assert {headers["authorization"] for headers in chat_server.headers} == {"Bearer own-planted-secret"}
+    assert {headers["authorization"] for headers in chat_server.headers} == {f"Bearer {sent}"}
+    assert not any("sk-planted" in value for headers in chat_server.headers for value in headers.values())
     written = [path.read_bytes() for path in (tmp_path / "run").rglob("*") if path.is_file()]
     assert written
     assert not any(b"planted-secret" in content for content in written)
+
+
+def test_an_address_with_a_password_is_refused() -> None:
+    with pytest.raises(SettingsError, match="ARMWRIGHT_API_KEY"):
+        LlmProposer("m", "http://user:secret@127.0.0.1:9/v1")
+
+
+def test_a_finished_or_extended_run_keeps_its_account(chat_server: ChatServer, tmp_path: Path) -> None:
+    first = run(chat_server, tmp_path / "run", n_total=1)
+    assert first.summary["proposer"]["calls"] == 3
+    assert run(chat_server, tmp_path / "run", n_total=1).summary == first.summary
+    longer = run(chat_server, tmp_path / "run", n_total=2)  # no proposal is due
+    assert longer.summary["proposer"] == first.summary["proposer"]
+    assert len(chat_server.requests) == 3
+
+
+def test_after_a_server_that_was_not_there_another_proposer_may_take_the_folder(tmp_path: Path) -> None:
+    with pytest.raises(ModelError):
+        optimize(PROBLEM, proposer=LlmProposer("m", "http://127.0.0.1:9/v1"), n_total=1, out=tmp_path / "run")
+    assert optimize(PROBLEM, proposer="rules", n_init=2, n_total=1, out=tmp_path / "run").trials[2].source == "rules"
+
+
+def test_an_answer_that_is_no_valid_text_is_kept_all_the_same(chat_server: ChatServer, tmp_path: Path) -> None:
+    """A lone surrogate can come in JSON, and cannot be written as UTF-8."""
+    chat_server.answer = lambda request: designer(request) if "response_format" in request else "so \ud800 be it"
+    result = run(chat_server, tmp_path / "run", n_total=1)
+    assert result.trials[4].source == "llm"
+    assert Transcript(tmp_path / "run" / "transcripts.jsonl").calls[1].answer == "so ? be it"
 
 
 def test_a_vendors_model_without_its_key_is_refused() -> None:

@@ -2,16 +2,21 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import moocore
 import numpy as np
+import optuna
 import pytest
-from optuna.samplers import BaseSampler, RandomSampler
+from optuna.samplers import BaseSampler, NSGAIISampler, QMCSampler, RandomSampler
 
 from armwright.exceptions import ProposalError, RunConflictError, RunFolderError, SettingsError
 from armwright.history import History
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
+from armwright.run_folder import read_run
+from armwright.sampling import SamplerFactory
+from armwright.space import Design
 from armwright.study import Progress, Run, optimize
 from armwright.task import Task, load_task
 
@@ -101,26 +106,37 @@ def test_a_proposal_that_fails_becomes_a_black_box_trial() -> None:
 
 
 def test_a_proposer_that_never_worked_is_an_error_that_loses_nothing(tmp_path: Path) -> None:
-    with pytest.raises(Exception, match="did not answer"):
+    with pytest.raises(ProposalError, match="did not answer; no proposal has come from listed yet"):
         short(tmp_path / "run", proposer=Listed(faulty=(5,)))
     assert len((tmp_path / "run" / "trials.jsonl").read_text().splitlines()) == 5
     assert short(tmp_path / "run", proposer=Listed()).resumed == 5
 
 
+def nsga2(seed: int) -> BaseSampler:
+    return NSGAIISampler(population_size=5, seed=seed)
+
+
+def qmc(seed: int) -> BaseSampler:
+    return QMCSampler(seed=7, scramble=True, warn_independent_sampling=False)
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+@pytest.mark.parametrize("sampler", ["tpe", nsga2, qmc])
 @pytest.mark.parametrize("proposer", ["none", "rules", Listed()])
 @pytest.mark.parametrize("stop", [3, 5, 6, 12])
-def test_a_resumed_run_equals_an_uninterrupted_one(tmp_path: Path, proposer: Proposer | str, stop: int) -> None:
-    whole = optimize(PROBLEM, proposer=proposer, n_init=5, n_step=4, n_total=20, seed=0)
+def test_a_resumed_run_equals_an_uninterrupted_one(
+    tmp_path: Path, proposer: Proposer | str, stop: int, sampler: str | SamplerFactory
+) -> None:
+    settings: dict[str, Any] = {"proposer": proposer, "sampler": sampler, "n_init": 5, "n_step": 4, "n_total": 20}
+    whole = optimize(PROBLEM, **settings)
 
     def interrupt(progress: Progress) -> None:
         if progress.doing == "finished" and progress.number == stop:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        optimize(
-            PROBLEM, proposer=proposer, n_init=5, n_step=4, n_total=20, seed=0, out=tmp_path / "run", watch=interrupt
-        )
-    resumed = optimize(PROBLEM, proposer=proposer, n_init=5, n_step=4, n_total=20, seed=0, out=tmp_path / "run")
+        optimize(PROBLEM, **settings, out=tmp_path / "run", watch=interrupt)
+    resumed = optimize(PROBLEM, **settings, out=tmp_path / "run")
     assert resumed.resumed == stop + 1
     assert designs(resumed) == designs(whole)
 
@@ -148,6 +164,36 @@ def test_other_settings_are_refused_with_their_differences(tmp_path: Path) -> No
         "n_total: 8 there, 6 asked (it can only grow)",
     ):
         assert difference in str(refusal.value)
+
+
+def test_the_order_of_a_proposals_parameters_means_nothing(tmp_path: Path) -> None:
+    class Backwards(Listed):
+        def propose(self, history: History, seed: int) -> Proposal:
+            proposal = super().propose(history, seed)
+            return Proposal(Design(dict(reversed(proposal.design.params.items()))), proposal.id)
+
+    run = short(tmp_path / "run", proposer=Backwards())
+    assert designs(run) == designs(short(proposer=Listed()))
+    assert [t.values for t in read_run(tmp_path / "run")[1]] == [t.values for t in run.trials]
+
+
+def test_a_folder_without_a_finished_trial_takes_any_settings(tmp_path: Path) -> None:
+    def fail(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        optimize(PROBLEM, proposer=Listed(), n_init=1, n_step=1, n_total=1, out=tmp_path / "run", watch=fail)
+    (tmp_path / "run" / "trials.jsonl").write_text("")
+    assert len(short(tmp_path / "run").trials) == 13
+
+
+def test_other_versions_are_noted(tmp_path: Path) -> None:
+    short(tmp_path / "run")
+    config = tmp_path / "run" / "config.yaml"
+    config.write_text(config.read_text().replace("  optuna: ", "  optuna: 0."))
+    run = short(tmp_path / "run", n_total=12)
+    assert run.config.versions["optuna"] == optuna.__version__
+    assert run.config.earlier_versions[0]["optuna"] == f"0.{optuna.__version__}"
 
 
 def test_two_processes_cannot_write_one_run(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ class FinishedTrial:
     proposal, reason: the proposal's id and reason, where a proposer made the design.
     fault: why a trial that was a proposer's became a black-box one.
     seconds: wall time by part (proposing, sampling, evaluation).
-    sampler_attrs: what the sampler noted on its trial (a genetic one: the generation), needed to resume.
+    sampler_notes: what the sampler noted on its trial and study (a genetic one: generations), needed to resume.
     """
 
     number: int
@@ -36,7 +36,7 @@ class FinishedTrial:
     reason: str = ""
     fault: str | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
-    sampler_attrs: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
 
 
 @dataclass(frozen=True)

@@ -198,7 +198,7 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     params: dict[str, float | str]
     values: list[float] = Field(min_length=2, max_length=2)
     seconds: dict[str, float]
-    sampler_attrs: dict[str, Any] = {}
+    sampler_notes: dict[str, dict[str, Any]] = {}
 
 
 def _trial_line(trial: FinishedTrial) -> bytes:
@@ -211,7 +211,7 @@ def _trial_line(trial: FinishedTrial) -> bytes:
         params=dict(trial.design.params),
         values=list(trial.values),
         seconds=dict(trial.seconds),
-        sampler_attrs=dict(trial.sampler_attrs),
+        sampler_notes={place: dict(noted) for place, noted in trial.sampler_notes.items()},
     )
     return json.dumps(record.model_dump(exclude_defaults=True)).encode() + b"\n"
 
@@ -250,7 +250,7 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
         reason=record.reason,
         fault=record.fault,
         seconds=record.seconds,
-        sampler_attrs=record.sampler_attrs,
+        sampler_notes=record.sampler_notes,
     )
 
 

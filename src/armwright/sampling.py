@@ -10,6 +10,7 @@ from typing import Any
 import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution
 from optuna.samplers import BaseSampler, RandomSampler, TPESampler
+from optuna.storages import InMemoryStorage
 from optuna.study import StudyDirection
 from optuna.trial import Trial, create_trial
 
@@ -63,7 +64,10 @@ class BlackBox:
         self._factory = sampler_factory(sampler)
         self._seed = seed
         self._distributions = distributions(space)
-        self._study = _quiet_study(n_objectives)
+        self._storage = InMemoryStorage()
+        self._study = _quiet_study(self._storage, n_objectives)
+        self._study_id = self._storage.get_study_id_from_name(self._study.study_name)
+        self._study_notes = self._storage.get_study_system_attrs(self._study_id)
 
     @property
     def study(self) -> optuna.Study:
@@ -79,9 +83,12 @@ class BlackBox:
                     distributions=self._distributions,
                     values=list(trial.values),
                     user_attrs=_attributes(trial.source, trial.proposal),
-                    system_attrs=dict(trial.sampler_attrs),
+                    system_attrs=dict(trial.sampler_notes.get("trial", {})),
                 )
             )
+            for name, note in trial.sampler_notes.get("study", {}).items():
+                self._storage.set_study_system_attr(self._study_id, name, note)
+        self._study_notes = self._storage.get_study_system_attrs(self._study_id)
 
     def draw(self, number: int, source: str) -> tuple[Trial, Design]:
         """The sampler's next design; uniformly random where source is `random`."""
@@ -108,10 +115,19 @@ class BlackBox:
         self._enlist(sampler, trial)
         return trial, checked
 
-    def tell(self, trial: Trial, values: Iterable[float]) -> dict[str, Any]:
-        """The trial's values; from now on the sampler learns from it. Returns what the sampler noted on the trial."""
+    def tell(self, trial: Trial, values: Iterable[float]) -> dict[str, dict[str, Any]]:
+        """The trial's values; from now on the sampler learns from it.
+
+        Returns what the sampler noted meanwhile on the trial and on the study (a genetic one: generations, parents):
+        `restore` needs it.
+        """
         told = self._study.tell(trial, list(values))
-        return {name: note for name, note in told.system_attrs.items() if name != "fixed_params"}
+        before, self._study_notes = self._study_notes, self._storage.get_study_system_attrs(self._study_id)
+        notes = {
+            "trial": {name: note for name, note in told.system_attrs.items() if name != "fixed_params"},
+            "study": {name: note for name, note in self._study_notes.items() if before.get(name) != note},
+        }
+        return {place: noted for place, noted in notes.items() if noted}
 
     def _enlist(self, sampler: BaseSampler, trial: Trial) -> None:
         """Gives the trial a generation, where the sampler has such.
@@ -127,11 +143,11 @@ def _attributes(source: str, proposal: str | None) -> dict[str, Any]:
     return {"source": source} if proposal is None else {"source": source, "proposal": proposal}
 
 
-def _quiet_study(n_objectives: int) -> optuna.Study:
+def _quiet_study(storage: InMemoryStorage, n_objectives: int) -> optuna.Study:
     # Optuna announces each study at INFO; the user's own verbosity is put back.
     verbosity = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
     try:
-        return optuna.create_study(directions=[StudyDirection.MINIMIZE] * n_objectives)
+        return optuna.create_study(storage=storage, directions=[StudyDirection.MINIMIZE] * n_objectives)
     finally:
         optuna.logging.set_verbosity(verbosity)

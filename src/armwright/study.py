@@ -189,7 +189,7 @@ class Study:
             proposal=proposal.id if proposal is not None else None,
             reason=proposal.reason if proposal is not None else "",
             fault=fault,
-            sampler_attrs=noted,
+            sampler_notes=noted,
             seconds={
                 "total": round(told - started, 6),
                 "sampling": round(sampled - proposed + told - evaluated, 6),
