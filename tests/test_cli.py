@@ -197,6 +197,40 @@ def test_an_output_folder_that_cannot_be_written_is_code_1(in_folder: Path, plac
     assert f"cannot write {place}" in refused(1, "optimize", "target-1", *SHORT, "--out", place)
 
 
+@pytest.mark.parametrize("variable", ["WARP_CACHE_PATH", "XDG_CACHE_HOME"])
+def test_a_kernel_cache_that_cannot_be_written_is_code_1(in_folder: Path, variable: str) -> None:
+    (in_folder / "file").write_text("")
+    place = {variable: str(in_folder / "file" / "cache")}
+    assert "set WARP_CACHE_PATH" in refused(1, "optimize", "target-1", *SHORT, **place)
+
+
+def test_a_terminal_without_the_characters_shows_the_rest(in_folder: Path) -> None:
+    (in_folder / "space.yaml").write_text("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}")
+    done = armwright("optimize", "target-1", "--space", "space.yaml", *SHORT, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "kg/m?" in done.stdout
+
+
+@pytest.mark.parametrize("command", [("tasks",), ("optimize", "target-1", *SHORT)])
+def test_output_that_cannot_be_written_is_one_line(in_folder: Path, command: tuple[str, ...]) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "armwright", *command], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines() == ["armwright: No space left on device: the output"]
+
+
+def test_names_of_files_and_folders_mean_nothing_but_themselves(in_folder: Path) -> None:
+    """No markup, no emoji, and a task file of any name."""
+    made = armwright("init", "мой [b] файл.yaml")
+    assert made.returncode == 0, made.stderr
+    done = armwright("optimize", "мой [b] файл.yaml", *SHORT, "--out", "o/[red]a:smile:[/b]")
+    assert done.returncode == 0, done.stderr
+    assert "results: o/[red]a:smile:[/b]/" in done.stdout
+    assert (in_folder / "o/[red]a:smile:[/b]/summary.json").exists()
+
+
 def test_an_unknown_option_is_code_2() -> None:
     done = armwright("optimize", "target-1", "--nstep", "5")
     assert done.returncode == 2

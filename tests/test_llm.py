@@ -109,6 +109,24 @@ def test_an_answer_that_stays_wrong_becomes_a_black_box_trial(chat_server: ChatS
     assert len(calls) == 1 + 3  # asked again at most twice
 
 
+def test_a_response_without_any_choice_becomes_a_black_box_trial(chat_server: ChatServer) -> None:
+    empty = '{"id": "1", "object": "chat.completion", "created": 1, "model": "m", "choices": []}'
+    chat_server.answer = lambda request: designer(request) if len(chat_server.requests) <= 3 else (200, empty)
+    result = run(chat_server)
+    assert (result.trials[7].source, result.trials[7].fault) == ("bbo", "answer")
+
+
+def test_an_answer_in_the_transcript_that_is_no_design_is_asked_again(chat_server: ChatServer, tmp_path: Path) -> None:
+    whole = run(chat_server, tmp_path / "run", n_total=1)
+    for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 3)):
+        file = tmp_path / "run" / name
+        text = "".join(file.read_text().splitlines(keepends=True)[:lines])
+        file.write_text(text.replace("0.2,", "9.9,"))
+    chat_server.requests.clear()
+    assert [t.values for t in run(chat_server, tmp_path / "run", n_total=1).trials] == [t.values for t in whole.trials]
+    assert len(chat_server.requests) == 2  # the check, and the parameters
+
+
 def test_a_server_error_later_does_not_stop_the_run(chat_server: ChatServer) -> None:
     def answer(request: Request) -> Answer:
         return designer(request) if len(chat_server.requests) <= 3 else (400, '{"error": {"message": "broken"}}')
@@ -158,9 +176,7 @@ def test_an_answer_that_was_paid_for_is_not_asked_again(chat_server: ChatServer,
     assert [prompt.splitlines()[0] for prompt in chat_server.prompts()] == ["Answer with one word: ready"]
 
 
-@pytest.mark.parametrize(
-    ("own", "sent"), [("own-planted-secret", "own-planted-secret"), (None, "no-key")]
-)
+@pytest.mark.parametrize(("own", "sent"), [("own-planted-secret", "own-planted-secret"), (None, "no-key")])
 def test_what_belongs_to_another_host_is_never_sent_and_no_key_is_written(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: str | None, sent: str
 ) -> None:

@@ -121,6 +121,8 @@ def test_a_file_changes_what_it_names_and_keeps_the_rest(tmp_path: Path) -> None
         ("joint_types: [R, X]", "joint_types"),
         ("links: [0.03, 0.3]", 'unknown key "links".'),
         ("mass: {kind: lead}", "mass"),
+        ("mass: {kg: 3}", "kind is missing: per_metre, per_link or tube"),
+        ("joint_range: [-7, 2.4]", "goes beyond ±2π"),
         ("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.02}", "more than half"),
         ("origin_x: [-.inf, 1]", "finite"),
         ("origin_x: [-1.0e308, 1]", "beyond"),
@@ -144,6 +146,20 @@ def test_a_copy_with_other_ranges_has_its_own_parameters() -> None:
     space = paper_space()
     assert len(space.parameters) == 11
     assert len(space.model_copy(update={"joints": 2}).parameters) == 7
+
+
+def test_the_order_of_the_parameters_means_nothing() -> None:
+    turned = Design(dict(reversed(GOOD.items())))
+    assert turned == Design(GOOD)
+    assert hash(turned) == hash(Design(GOOD))
+    assert paper_space().arm(turned) == paper_space().arm(Design(GOOD))
+
+
+def test_a_design_of_another_space_builds_no_arm() -> None:
+    with pytest.raises(DesignError, match="joint_5"):
+        paper_space().arm(paper_space(5).sample(1, 0)[0])
+    with pytest.raises(SpaceError, match="less than or equal to 8"):
+        paper_space(9)
 
 
 def test_designs_are_values() -> None:

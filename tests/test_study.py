@@ -1,6 +1,7 @@
 """The study: schedule, reference point, hypervolume, resume."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -214,6 +215,22 @@ def test_any_optuna_sampler_by_a_factory(tmp_path: Path) -> None:
     assert run.config.method.sampler.endswith("uniform")
 
 
+def test_a_sampler_or_proposer_of_the_wrong_kind_is_refused() -> None:
+    with pytest.raises(SettingsError, match="a factory seed -> sampler is needed"):
+        optimize(PROBLEM, proposer="none", sampler=RandomSampler())  # type: ignore[arg-type]
+    with pytest.raises(SettingsError, match=r"Listed is a class; give an instance of it: Listed\(\)"):
+        optimize(PROBLEM, proposer=Listed)  # type: ignore[arg-type]
+
+
+def test_a_folder_that_is_deleted_while_the_run_goes_on_is_said_at_once(tmp_path: Path) -> None:
+    def delete(progress: Progress) -> None:
+        if progress.number == 6:
+            shutil.rmtree(tmp_path / "run")
+
+    with pytest.raises(RunFolderError, match="deleted while the run went on"):
+        optimize(PROBLEM, proposer="none", n_init=2, n_total=50, out=tmp_path / "run", watch=delete)
+
+
 def test_progress_tells_the_standing() -> None:
     seen: list[Progress] = []
     run = optimize(OPEN, proposer=Listed(), n_init=3, n_step=2, n_total=4, watch=seen.append)
@@ -226,7 +243,8 @@ def test_progress_tells_the_standing() -> None:
 
 
 @pytest.mark.parametrize(
-    "settings", [{"n_step": 0}, {"n_init": 0}, {"n_total": 0}, {"seed": -1}, {"n_total": 1.5}, {"n_step": True}]
+    "settings",
+    [{"seed": 2**31}, {"n_step": 0}, {"n_init": 0}, {"n_total": 0}, {"seed": -1}, {"n_total": 1.5}, {"n_step": True}],
 )
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, int]) -> None:
     with pytest.raises(SettingsError, match=f"{next(iter(settings))} = "):

@@ -3,6 +3,7 @@
 import os
 import shlex
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -23,14 +24,20 @@ INTERRUPTED = 130  # the shell's word for Ctrl-C
 
 def main() -> NoReturn:
     """The entry point: what we raise on purpose becomes one line and an exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without "³" still shows the rest
     try:
         app()
     except ArmwrightError as error:
         print(f"armwright: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
     except OSError as fault:
-        print(f"armwright: {fault.strerror or fault}: {fault.filename or 'a file'}", file=sys.stderr)
+        print(f"armwright: {fault.strerror or fault}: {fault.filename or 'the output'}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what stdout still holds cannot be written either
         sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
     sys.exit(0)
 
 

@@ -1,6 +1,5 @@
 """What the command line shows: progress while a study runs, and its result."""
 
-import sys
 import time
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
@@ -10,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from armwright.history import History
@@ -99,8 +98,8 @@ def _front_table(history: History) -> Table:
         table.add_row(
             str(member.number),
             member.source,
-            f"{member.values[0]:.3f}",
-            f"{member.values[1]:.3f}",
+            f"{member.values[0]:.4g}",
+            f"{member.values[1]:.4g}",
             " ".join(f"{value:5.2f}" for value in member.design.origin),
             member.design.joints,
             " ".join(f"{value:.2f}" for value in member.design.links),
@@ -153,7 +152,7 @@ def _plain(console: Console) -> Watch:
         if progress.doing == "finished" and done > 0 and (done % EVERY == 0 or done == progress.n_total):
             spent = time.perf_counter() - started
             console.print(f"iteration {done}/{progress.n_total}  {_state(progress)}  {progress.source}  {spent:.1f} s")
-            sys.stdout.flush()
+            console.file.flush()
 
     return watch
 
@@ -168,11 +167,12 @@ class _TimeLeft(ProgressColumn):
 
 @contextmanager
 def _live(console: Console) -> Generator[Watch]:
+    bar_columns = [BarColumn(24)] if console.width >= 100 else []
     columns = (
-        TextColumn("{task.fields[count]}"),
-        BarColumn(24),
-        TextColumn("{task.fields[state]}"),
-        _TimeLeft(),
+        TextColumn("{task.fields[count]}", table_column=Column(no_wrap=True)),
+        *bar_columns,
+        TextColumn("{task.fields[state]}", table_column=Column(no_wrap=True)),
+        _TimeLeft(table_column=Column(no_wrap=True)),
     )
     with Progress(*columns, console=console, transient=False) as bar:
         line = bar.add_task("", total=None, count="starting", state="")

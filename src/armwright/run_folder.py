@@ -8,6 +8,7 @@
 What stands in the last line is made from the finished trials, and can be made again.
 """
 
+import errno
 import json
 import os
 import platform
@@ -138,9 +139,11 @@ class RunFolder:
         assert self._trials is not None, "open_trials comes first"
         line = _trial_line(trial)
         try:
+            if os.fstat(self._trials.fileno()).st_nlink == 0:
+                raise OSError(errno.ENOENT, "the file was deleted while the run went on")
             written = self._trials.write(line)
             if written != len(line):
-                raise OSError(28, "No space left on device")
+                raise OSError(errno.ENOSPC, "No space left on device")
         except OSError as fault:
             raise _write_error(self.path / TRIALS, fault) from fault
 
@@ -180,8 +183,9 @@ def read_config(path: Path) -> RunConfig:
     return parse_document(text, RunConfig, RunFolderError, str(file))
 
 
-def read_run(path: Path) -> tuple[RunConfig, History]:
+def read_run(path: str | Path) -> tuple[RunConfig, History]:
     """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
+    path = Path(path)
     config = read_config(path)
     trials, _ = _read_trials(path / TRIALS, config.space)
     return config, History(config.problem, trials, config.method.n_init, config.reference_point)

@@ -37,6 +37,11 @@ SAMPLERS: dict[str, SamplerFactory] = {"tpe": _tpe, "random": _random}
 
 def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
     """The factory `seed -> Optuna sampler` of a name, or the given one."""
+    if isinstance(sampler, BaseSampler) or not (isinstance(sampler, str) or callable(sampler)):
+        raise SettingsError(
+            f"sampler = {sampler!r}: a name ({', '.join(SAMPLERS)}) or a factory seed -> sampler is needed, "
+            "because every trial gets a sampler of its own"
+        )
     if not isinstance(sampler, str):
         return sampler
     if sampler not in SAMPLERS:

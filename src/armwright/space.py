@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import count, takewhile
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
 from armwright.arm import Arm, Axis, Joint, uniform_link
 from armwright.documents import check_document, read_document
@@ -181,6 +181,13 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     link_radius: float = Field(default=0.015, gt=0.0, le=1.0)  # [m]
     mass: MassModel = MassPerMetre()
 
+    @field_validator("mass", mode="before")
+    @classmethod
+    def _check_kind(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "kind" not in cast("dict[str, Any]", value):
+            raise ValueError("kind is missing: per_metre, per_link or tube")
+        return cast("Any", value)
+
     @model_validator(mode="after")
     def _check_ranges(self) -> Self:
         for name, unit in (
@@ -237,14 +244,20 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return [Design({p.name: _draw(p, rng) for p in self.parameters}) for _ in range(n)]
 
     @property
+    def is_toy(self) -> bool:
+        """Whether even the heaviest arm weighs next to nothing, as the paper's do."""
+        return self.joints * self.mass.mass(self.link[1]) < TOY_MASS
+
+    @property
     def mass_note(self) -> str:
         """How heavy the links are taken to be, in one sentence; it belongs wherever torques are shown."""
-        heaviest = self.joints * self.mass.mass(self.link[1])
-        toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if heaviest < TOY_MASS else ""
+        toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if self.is_toy else ""
         return f"links: {self.mass.words()}{toy}"
 
     def arm(self, design: Design) -> Arm:
         """The physical chain that a design builds."""
+        if not len(design.joints) == len(design.links) == self.joints:
+            self.design(design.params)  # says what is wrong
         lower, upper = self.joint_range
         joints = [Joint("revolute", JOINT_AXES[kind], lower, upper) for kind in design.joints]  # pyright: ignore[reportArgumentType]
         links = [uniform_link((0.0, 0.0, length), self.mass.mass(length), self.link_radius) for length in design.links]

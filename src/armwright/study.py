@@ -90,6 +90,8 @@ def optimize(
     """
     if isinstance(proposer, str):
         proposer = choose_proposer(proposer).proposer
+    elif isinstance(proposer, type):
+        raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
     config = RunConfig(
         task=problem.task,
         space=problem.space,

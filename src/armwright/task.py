@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import re
 import shlex
 from importlib import resources
 from pathlib import Path
@@ -69,6 +70,8 @@ def load_task(name_or_path: str | Path) -> Task:
     path = Path(name_or_path)
     if os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long, too
         return read_document(path, Task, TaskError)
+    if os.path.isdir(path):
+        raise TaskError(f"{path} is a folder, not a task file")
     if path.suffix in (".yaml", ".yml"):
         raise TaskError(f"there is no file {path}; `armwright init {path}` writes one to edit")
     raise TaskError(
@@ -135,7 +138,7 @@ def task_template(file: Path, targets: tuple[Point, ...] | None = None) -> str:
     return f"""\
 # A task for armwright: points that the tip of the arm should reach.
 # Run it with:  armwright optimize {shlex.quote(str(file))}
-name: {json.dumps(file.stem)}    # names the run folder: letters, digits, . _ -
+name: {json.dumps(_safe_name(file.stem))}    # names the run folder: letters, digits, . _ -
 
 # x, y, z in metres; z is up. The base is searched within ±1 m of the origin (see --space).
 targets:
@@ -149,6 +152,10 @@ targets:
 # description: What the arm has to do there.
 # provenance: Who measured the points, and when.
 """
+
+
+def _safe_name(stem: str) -> str:
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("._-")[:64] or "task"
 
 
 def _holds_data(line: str) -> bool:

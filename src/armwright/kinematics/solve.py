@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.exceptions import FailureError
 from armwright.kinematics.arrays import ArmArrays, Floats
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
@@ -136,12 +137,18 @@ def _load() -> tuple[Any, Any]:
     import warp as wp
 
     wp.config.log_level = wp.LOG_ERROR
-    with _silent_stderr():
-        wp.init()
-    from armwright.kinematics import kernels
+    try:
+        with _silent_stderr():
+            wp.init()
+        from armwright.kinematics import kernels
 
-    for kernel in (kernels.descend, kernels.hold):
-        kernel.module.load(DEVICE)
+        for kernel in (kernels.descend, kernels.hold):
+            kernel.module.load(DEVICE)
+    except OSError as fault:
+        raise FailureError(
+            f"the compiled kernels cannot be kept: {fault.strerror or fault}: {fault.filename}; "
+            "set WARP_CACHE_PATH to a folder that can be written"
+        ) from fault
     return wp, kernels
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import re
 import threading
 import time
 from collections.abc import Callable, Coroutine, Sequence
@@ -51,6 +52,10 @@ _KINDS: tuple[tuple[type[Exception], str], ...] = (
     (faults.UsageLimitExceeded, "limit"),
     (faults.RunCancelled, "cancelled"),
 )
+
+
+# What pydantic-ai trips over in some malformed responses, such as an empty list of choices.
+_MALFORMED = (LookupError, TypeError, ValueError, AttributeError)
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,7 @@ class Chat:
         with capture_run_messages() as messages:
             try:
                 output = _wait(agent.run(prompt, model_settings=settings)).output
-            except (faults.AgentRunError, faults.UserError) as fault:
+            except (faults.AgentRunError, faults.UserError, *_MALFORMED) as fault:
                 reply = _reply(messages, time.perf_counter() - started)
                 raise CallError(_kind(fault), f"{self.name}: {_first_line(fault)}", reply) from fault
         return output, _reply(messages, time.perf_counter() - started)
@@ -142,7 +147,9 @@ def _model(name: str, base_url: str | None) -> Model:
     try:
         return infer_model(name)
     except faults.UserError as fault:
-        raise SettingsError(f"model {name} cannot be used: {_first_line(fault)}") from fault
+        key = re.search(r"\b[A-Z_]+_API_KEY\b", str(fault))
+        words = f"needs its key: set {key[0]} in the environment" if key else f"cannot be used: {_first_line(fault)}"
+        raise SettingsError(f"model {name} {words}") from fault
     except ImportError as fault:
         raise MissingExtraError(f"model {name} needs another package: {_first_line(fault)}") from fault
 
@@ -176,11 +183,13 @@ def _cost(response: ModelResponse) -> float | None:
 
 
 def _kind(fault: Exception) -> str:
+    if isinstance(fault, _MALFORMED):
+        return "answer"
     return next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
 
 
 def _first_line(fault: BaseException) -> str:
-    text = " ".join(str(fault).split())
+    text = " ".join(str(fault).split()).rstrip(".")
     return text if len(text) <= 300 else text[:297] + "..."
 
 

@@ -1,14 +1,18 @@
 """The language model as a proposer: it thinks freely, then its answer is turned into parameters."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import ModelError, ProposalError, SettingsError, did_you_mean
+from pydantic import ValidationError
+
+from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError, did_you_mean
 from armwright.history import History
 from armwright.llm.prompt import PROMPTS, answer_schema, design_of, parameters_prompt, proposal_prompt
 from armwright.llm.transcript import Call, Transcript
 from armwright.proposers.proposer import Proposal, Proposer, ProposerSummary
+from armwright.space import Design, DesignSpace
 
 TRANSCRIPTS = "transcripts.jsonl"
 
@@ -71,21 +75,26 @@ class LlmProposer(Proposer):
         identity = f"{self.name}-{len(history):04d}"
         space = history.problem.space
         prompt = proposal_prompt(history, self.prompt, seed)
-        thoughts = self._answer(identity, "reasoning", prompt, lambda: self._chat.ask(prompt))
-        question = parameters_prompt(space, thoughts)
+        thoughts = self._transcript.answer(identity, "reasoning")
+        if thoughts is None:
+            thoughts = self._call(identity, "reasoning", prompt, lambda: self._chat.ask(prompt))
+        design, reason = self._parameters(identity, space, thoughts)
+        return Proposal(design, identity, reason)
+
+    def _parameters(self, identity: str, space: DesignSpace, thoughts: str) -> tuple[Design, str]:
         schema = answer_schema(space)
-        values = self._answer(
+        said = self._transcript.answer(identity, "parameters")
+        if said is not None:
+            with suppress(ValidationError, DesignError):  # a transcript that was changed by hand: ask again
+                return design_of(schema.model_validate_json(said), space)
+        question = parameters_prompt(space, thoughts)
+        said = self._call(
             identity,
             "parameters",
             question,
             lambda: self._chat.ask_for(question, schema, lambda answer: design_of(answer, space)),
         )
-        design, reason = design_of(schema.model_validate_json(values), space)
-        return Proposal(design, identity, reason)
-
-    def _answer(self, proposal: str, step: str, prompt: str, ask: Callable[[], Any]) -> str:
-        said = self._transcript.answer(proposal, step)
-        return said if said is not None else self._call(proposal, step, prompt, ask)
+        return design_of(schema.model_validate_json(said), space)
 
     def _call(self, proposal: str, step: str, prompt: str, ask: Callable[[], Any]) -> str:
         from armwright.llm.chat import CallError

@@ -18,6 +18,7 @@ from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions
+from armwright.objectives import TORQUE
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, RC, TARGET, Look, look
 from armwright.results import FIGURES
@@ -29,8 +30,9 @@ SHOWN = 1.35  # of the reference point, the part of the plane that is drawn
 MOST_PANELS = 12
 
 
-def write_figures(folder: Path) -> list[Path]:
+def write_figures(folder: str | Path) -> list[Path]:
     """Draws the figures of a run folder and returns their .png files."""
+    folder = Path(folder)
     _, history = read_run(folder)
     place, part = folder / FIGURES, folder / f"{FIGURES}.part"
     with matplotlib.rc_context(RC), _writing(place):
@@ -98,7 +100,8 @@ def draw_hypervolume(history: History) -> Figure:
                 label=f"gained by {style.label}",
             )
     axes.set_xlabel(f"Iteration (after {history.n_init} random trials)")
-    axes.set_ylabel(f"Hypervolume, reference point {_pair(_reference(history))}")
+    axes.set_ylabel("Hypervolume")
+    axes.set_title(f"{history.problem.task.name}, reference point {_pair(_reference(history))}")
     axes.set_xlim(0, max(1, len(curve)))
     axes.set_ylim(bottom=0)
     axes.legend(loc="lower right")
@@ -135,13 +138,18 @@ def draw_front(history: History) -> Figure:
     for member in history.front:
         style = look(member.source)
         axes.scatter(*member.values, s=1.6 * style.size, marker=style.marker, **_paint(style), zorder=4)
+    near = 0  # labels of points close together are stacked
+    before = np.full(2, np.inf)
     for title, member in chosen_members(history):
         if np.any(np.array(member.values) > SHOWN * np.array(reference)):
             continue
+        place = np.array(member.values) / np.array(reference)
+        near = near + 1 if np.abs(place - before).max() < 0.15 else 0
+        before = place
         axes.annotate(
             f"{title.split(':')[0].split(',')[0]}\n#{member.number}  {member.design.joints}",
             member.values,
-            xytext=(10, 10),
+            xytext=(10, 10 + 32 * near),
             textcoords="offset points",
             fontsize=8,
             zorder=5,
@@ -293,12 +301,13 @@ def _words(history: History, member: FrontMember) -> str:
     error, torque = member.values
     length = sum(member.design.links)
     first = f"#{member.number} ({look(member.source).label}), {member.design.joints}, length {length:.2f} m"
-    return f"{first}\nposition error {error:.3f} m, torque {torque:.3f}"
+    return f"{first}\nposition error {error:.4g} m, torque {torque:.4g}"
 
 
 def _label(history: History, i: int) -> str:
     objective = history.problem.objectives[i]
-    return f"{objective.label} [{objective.unit.replace(' x ', ' × ')}]"
+    toy = "; toy masses" if objective is TORQUE and history.problem.space.is_toy else ""
+    return f"{objective.label} [{objective.unit.replace(' x ', ' × ')}{toy}]"
 
 
 def _pair(values: Sequence[float]) -> str:
