@@ -1,7 +1,8 @@
 """How fast designs are evaluated on one core, beside scikit-robot's own IK and a Pinocchio loop in Python.
 
-The same work for all: random arms of 4 joints at the 8 targets of target-1, 100 updates from the straight start
-each, then the gravity torque of a posture. The others' time includes loading the URDF, once an arm.
+Random arms of 4 joints at the 8 targets of target-1, 100 updates from the straight start each. Ours and Pinocchio's
+go on to the gravity torque of the posture; scikit-robot is asked for the posture alone. The others' time includes
+loading the URDF, once an arm.
 
     python benchmarks/evaluation.py
 """

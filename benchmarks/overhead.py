@@ -1,8 +1,8 @@
 """What armwright adds to Optuna: a 200-trial run beside the same trials on Optuna's bare in-memory ask/tell.
 
-Both sides make the same 210 trials with TPE. The bare side knows the values beforehand, so it pays for Optuna
-alone; ours pays for the evaluation, the schedule, the hypervolume and the run folder, too. Imports, kernel
-compilation and the results at the end are timed apart.
+Both sides make the same 210 trials with TPE; for that the bare side, too, seeds a sampler for each trial. It knows the
+values beforehand, so it pays for Optuna alone; ours pays for the evaluation, the schedule, the hypervolume and the run
+folder, too. Imports, kernel compilation, results and figures are timed apart.
 
     python benchmarks/overhead.py
 """
@@ -18,6 +18,7 @@ from pathlib import Path
 import optuna
 
 from armwright.problem import Problem
+from armwright.report.figures import write_figures
 from armwright.sampling import distributions, sampler_factory
 from armwright.seeding import derived_seed
 from armwright.study import Run, optimize
@@ -39,9 +40,18 @@ def main() -> None:
 
 
 def seconds_of_run(seed: int) -> float:
+    """From the call to the moment after the last trial was written and reported."""
+    ends: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
-        run = optimize(PROBLEM, proposer="none", seed=seed, out=Path(folder) / "run")
-    return run.summary["seconds"]["total"]
+        started = time.perf_counter()
+        optimize(
+            PROBLEM,
+            proposer="none",
+            seed=seed,
+            out=Path(folder) / "run",
+            watch=lambda progress: ends.append(time.perf_counter()),
+        )
+    return ends[-1] - started
 
 
 def seconds_of_bare(seed: int) -> float:
@@ -64,23 +74,34 @@ def bare(run: Run, seed: int) -> None:
 
 
 def whole_process() -> None:
-    """The command line as a user meets it."""
+    """The command line as a user meets it, and what is not the search."""
     command = [sys.executable, "-m", "armwright"]
-    helps: list[float] = []
-    for _ in range(5):
-        started = time.perf_counter()
-        subprocess.run([*command, "--help"], capture_output=True, check=True)
-        helps.append(time.perf_counter() - started)
+    helps = [seconds_and_memory([*command, "--help"])[0] for _ in range(5)]
+    print(f"  armwright --help                       {statistics.median(helps):6.2f} s")
+    imports = "import armwright.study, armwright.sampling, warp, optuna"
+    print(f"  imports of a run                       {seconds_and_memory([sys.executable, '-c', imports])[0]:6.2f} s")
     with tempfile.TemporaryDirectory() as folder:
+        load = "from armwright.kinematics.solve import _ready; _ready()"
+        cold = seconds_and_memory([sys.executable, "-c", load], WARP_CACHE_PATH=folder)[0]
+        warm = seconds_and_memory([sys.executable, "-c", load], WARP_CACHE_PATH=folder)[0]
+        print(f"  kernels: compiled {cold:.2f} s, loaded from the cache {warm:.2f} s (with the import of Warp)")
+        for name, cache in (("first run", f"{folder}/new"), ("later run", folder)):
+            out = f"{folder}/run-{name}"
+            run = [*command, "optimize", "target-1", "--out", out]
+            seconds, memory = seconds_and_memory(run, WARP_CACHE_PATH=cache)
+            print(f"  armwright optimize target-1, {name} {seconds:6.2f} s, peak memory {memory:.0f} MB")
         started = time.perf_counter()
-        process = subprocess.Popen(
-            [*command, "optimize", "target-1", "--out", f"{folder}/run"], stdout=subprocess.DEVNULL
-        )
-        _, _, usage = os.wait4(process.pid, 0)
-        seconds = time.perf_counter() - started
-    print(f"  armwright --help           {statistics.median(helps):6.2f} s")
-    print(f"  armwright optimize target-1{seconds:6.2f} s with imports, results and figures, kernels in the cache")
-    print(f"  its peak memory            {usage.ru_maxrss / 1024:6.0f} MB")
+        write_figures(f"{folder}/run-later run")
+        print(f"  of which figures                       {time.perf_counter() - started:6.2f} s")
+
+
+def seconds_and_memory(command: list[str], **environment: str) -> tuple[float, float]:
+    """Wall time [s] and peak memory [MB] of a process."""
+    started = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env={**os.environ, **environment})
+    _, status, usage = os.wait4(process.pid, 0)
+    assert status == 0, command
+    return time.perf_counter() - started, usage.ru_maxrss / 1024
 
 
 if __name__ == "__main__":

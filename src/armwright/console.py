@@ -98,8 +98,8 @@ def _front_table(history: History) -> Table:
         table.add_row(
             str(member.number),
             member.source,
-            f"{member.values[0]:.4g}",
-            f"{member.values[1]:.4g}",
+            _value(member.values[0]),
+            _value(member.values[1]),
             " ".join(f"{value:5.2f}" for value in member.design.origin),
             member.design.joints,
             " ".join(f"{value:.2f}" for value in member.design.links),
@@ -127,6 +127,10 @@ def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
 def _seconds(seconds: dict[str, float]) -> str:
     parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
     return f"{seconds['total']:.1f} s ({parts})"
+
+
+def _value(value: float) -> str:
+    return f"{value:.3f}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"
 
 
 def _point(point: Sequence[float]) -> str:

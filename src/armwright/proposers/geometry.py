@@ -17,8 +17,9 @@ ROUNDS = 60
 def shoulder(points: Array, reach: float) -> Array:
     """(3,) the place from which an arm of `reach` [m] misses `points` (T, 3) by the smallest sum [m].
 
-    The sum of distances that are left, Σ max(0, ‖p_i - c‖ - reach), is flat where everything is in reach: a
-    weak pull of the near targets settles c there. Weiszfeld's iteration, re-weighted.
+    It lies on every symmetry plane of the points, as a mirror does not change the sum. The sum of distances that are
+    left, Σ max(0, ‖p_i - c‖ - reach), is flat where everything is in reach: a weak pull of the near targets settles c
+    there. Weiszfeld's iteration, re-weighted.
     """
     place = points.mean(axis=0)
     for _ in range(ROUNDS):
