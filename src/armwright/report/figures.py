@@ -149,7 +149,7 @@ def draw_front(history: History) -> Figure:
         axes.annotate(
             f"{title.split(':')[0].split(',')[0]}\n#{member.number}  {member.design.joints}",
             member.values,
-            xytext=(10, 10 + 32 * near),
+            xytext=(10, -34 if place[1] > 0.9 * SHOWN else 10 + 40 * near),
             textcoords="offset points",
             fontsize=8,
             zorder=5,
@@ -262,8 +262,9 @@ def _frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
 
 
 def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.ndarray, float]:
-    bases = np.array([member.arm.base for member in members])
-    points = np.vstack([evaluation.targets, bases, evaluation.reached.reshape(-1, 3)])
+    """The middle and the half side of the cube that holds the targets and every posture of the members [m]."""
+    places = [joint_positions(member.arm, q) for row, member in enumerate(members) for q in evaluation.q[row]]
+    points = np.vstack([evaluation.targets, *places])
     low, high = points.min(axis=0), points.max(axis=0)
     return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
 
