@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from armwright.exceptions import RunFolderError
+from armwright.exceptions import ArmwrightError, RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.problem import Problem
 from armwright.results import read_summary
@@ -177,10 +177,26 @@ def test_a_damaged_config_is_named(run: Run, tmp_path: Path) -> None:
         short(tmp_path / "run")
 
 
+def test_results_without_their_trials_are_not_taken_over(run: Run, tmp_path: Path) -> None:
+    (folder(run) / "trials.jsonl").unlink()
+    with pytest.raises(ArmwrightError, match="holds no run, but other files"):
+        short(tmp_path / "run")
+    assert (folder(run) / "summary.json").exists()
+
+
 def test_trials_without_their_config_are_not_taken_over(run: Run, tmp_path: Path) -> None:
     (folder(run) / "config.yaml").unlink()
     with pytest.raises(RunFolderError, match=r"cannot read config.yaml"):
         short(tmp_path / "run")
+
+
+@pytest.mark.parametrize("name", ["figures/mine.png", "notes.txt", "config.yaml", "designs/0001/arm.urdf"])
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / name).write_text("mine: 1\n")
+    with pytest.raises(ArmwrightError, match=r"holds no run|unknown key"):
+        short(tmp_path)
+    assert (tmp_path / name).read_text() == "mine: 1\n"
 
 
 def test_a_folder_that_is_no_run_folder(tmp_path: Path) -> None:

@@ -32,6 +32,7 @@ from armwright.task import Task
 
 CONFIG = "config.yaml"
 TRIALS = "trials.jsonl"
+BEFORE_TRIALS = {".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl"}
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim")
 
 
@@ -108,7 +109,8 @@ class RunFolder:
         RunConflictError with the differences where the folder holds a run with other settings.
         """
         trials = self.path / TRIALS
-        if not (trials.is_file() and b"\n" in trials.read_bytes()):  # nothing there that could be lost
+        if not (trials.is_file() and b"\n" in trials.read_bytes()):  # no run, or one that never came to a trial
+            self._check_free()
             self.write_config(config)
             return config
         there = read_config(self.path)
@@ -117,6 +119,16 @@ class RunFolder:
             there = there.model_copy(update={"method": config.method})
             self.write_config(there)
         return there
+
+    def _check_free(self) -> None:
+        """RunConflictError where the folder holds anything but what a run without trials leaves."""
+        others = sorted({entry.name for entry in self.path.iterdir()} - BEFORE_TRIALS)
+        if others:
+            raise RunConflictError(
+                f"{self.path} holds no run, but other files ({others[0]}, …); give another --out DIR"
+            )
+        if (self.path / CONFIG).exists():
+            read_config(self.path)
 
     def write_config(self, config: RunConfig) -> None:
         """Replaces config.yaml in one step."""
