@@ -92,7 +92,9 @@ def test_a_refused_design_goes_back_in_the_words_of_the_space(chat_server: ChatS
     "wrong",
     ["no JSON at all", json.dumps({**GOOD_DESIGN, "joint_1": "Z"}), json.dumps({**GOOD_DESIGN, "origin_x": None}), ""],
 )
-def test_an_answer_that_stays_wrong_becomes_a_black_box_trial(chat_server: ChatServer, wrong: str) -> None:
+def test_an_answer_that_stays_wrong_becomes_a_black_box_trial(
+    chat_server: ChatServer, tmp_path: Path, wrong: str
+) -> None:
     calls: list[Request] = []
 
     def answer(request: Request) -> Answer:
@@ -102,11 +104,15 @@ def test_an_answer_that_stays_wrong_becomes_a_black_box_trial(chat_server: ChatS
         return designer(request) if len(calls) == 1 else wrong
 
     chat_server.answer = answer
-    result = run(chat_server)
+    result = run(chat_server, tmp_path / "run")
     assert [trial.source for trial in result.trials[4:]] == ["llm", "bbo", "bbo", "bbo", "bbo", "bbo"]
     assert result.trials[7].fault == "answer"
     assert result.summary["proposer"]["failures"] == {"answer": 1}
     assert len(calls) == 1 + 3  # asked again at most twice
+    failed = Transcript(tmp_path / "run" / "transcripts.jsonl").calls[-1]
+    assert (failed.answer, failed.requests) == (wrong, 3)
+    assert failed.error is not None
+    assert failed.error.startswith("answer: test-model")
 
 
 def test_a_response_without_any_choice_becomes_a_black_box_trial(chat_server: ChatServer) -> None:

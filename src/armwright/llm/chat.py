@@ -18,7 +18,7 @@ try:
     from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
-    from pydantic_ai.messages import ModelMessage, ModelResponse, TextPart
+    from pydantic_ai.messages import ModelMessage, ModelResponse, TextPart, ToolCallPart
     from pydantic_ai.models import Model, infer_model
     from pydantic_ai.models.openai import OpenAIChatModel
     from pydantic_ai.providers.openai_compatible import OpenAICompatibleProvider
@@ -158,9 +158,7 @@ def _reply(messages: Sequence[ModelMessage], seconds: float) -> Reply:
     responses = [message for message in messages if isinstance(message, ModelResponse)]
     costs = [_cost(response) for response in responses]
     return Reply(
-        text=_clean("".join(part.content for part in responses[-1].parts if isinstance(part, TextPart)))
-        if responses
-        else "",
+        text=_text(responses[-1]) if responses else "",
         requests=len(responses),
         input_tokens=sum(response.usage.input_tokens for response in responses),
         output_tokens=sum(response.usage.output_tokens for response in responses),
@@ -169,9 +167,14 @@ def _reply(messages: Sequence[ModelMessage], seconds: float) -> Reply:
     )
 
 
-def _clean(text: str) -> str:
-    """Without lone surrogates, which JSON can carry and UTF-8 cannot."""
-    return text.encode("utf-8", "replace").decode("utf-8")
+def _text(response: ModelResponse) -> str:
+    """What the model wrote, the arguments of a tool call included, so that a refused answer can be read later.
+
+    Without lone surrogates, which JSON can carry and UTF-8 cannot.
+    """
+    written = [part.content for part in response.parts if isinstance(part, TextPart)]
+    written += [part.args_as_json_str() for part in response.parts if isinstance(part, ToolCallPart)]
+    return "\n".join(written).encode("utf-8", "replace").decode("utf-8")
 
 
 def _cost(response: ModelResponse) -> float | None:
