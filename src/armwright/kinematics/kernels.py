@@ -6,7 +6,7 @@ is a mask of zeros and ones. The axes of an arm are the same in all lanes, so th
 
 The equations are those of docs/method.md; the inverse kinematics is the solver of Chan & Dubey (1995) and
 Sugiura et al. (2007). Angles, positions and torques are float32. The 3 x 3 system is float64: its matrix squares
-the condition of the Jacobian, and near the joint limits the weights make it up to 1e5 worse.
+the condition of the Jacobian, and weights near the joint limits (down to 2.5e-4 at ±2.4 rad) make it worse still.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -31,7 +31,7 @@ Lane: Any = wp.types.vector(length=LANES, dtype=wp.float32)
 Wide: Any = wp.types.vector(length=LANES, dtype=wp.float64)
 Joints: Any = wp.types.matrix(shape=(MOST_JOINTS, LANES), dtype=wp.float32)  # row j: joint j in all lanes
 
-# At -O2, Warp's default, LLVM leaves most lanes scalar: three times slower.
+# At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
 _OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
 
 
@@ -173,7 +173,7 @@ def descend(
     q_kept: (N, groups, D), the angles nearest to the target of all but the last.
 
     One long function on purpose: the arrays over joints live in its registers and stack, and handing them to
-    functions copies them, which was measured to be three times slower.
+    functions copies them, which made a prototype three times slower.
     """
     i, group = wp.tid()
     arm = first + i
