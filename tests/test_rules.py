@@ -41,8 +41,8 @@ def proposals(history: History, n: int) -> list[Proposal]:
     """`n` proposals, one upon the other; each is checked for what every proposal must be."""
     made: list[Proposal] = []
     for k in range(n):
-        proposal = RulesProposer().propose(history, seed=k)
-        assert RulesProposer().propose(history, seed=k) == proposal
+        proposal = RulesProposer().propose(history, seed=k, number=len(history))
+        assert RulesProposer().propose(history, seed=k, number=len(history)) == proposal
         history.problem.space.design(proposal.design.params)
         assert proposal.reason
         assert "\n" not in proposal.reason
@@ -177,7 +177,7 @@ def test_structures_fit_any_number_of_joints(n: int) -> None:
 
 def test_the_first_proposal_beats_the_median_random_design() -> None:
     problem = Problem(load_task("target-1"))
-    first = RulesProposer().propose(history_of(problem, 10), 0).design
+    first = RulesProposer().propose(history_of(problem, 10), 0, 10).design
     random = [hypervolume(row[None], (5.0, 5.0)) for row in problem.evaluate(problem.space.sample(500, 1))]
     alone = hypervolume(problem.evaluate([first]), (5.0, 5.0))
     assert alone > np.median(random)

@@ -59,6 +59,7 @@ def test_config_repeats_the_run(run: Run) -> None:
         "n_init": 5,
         "n_step": 4,
         "n_total": 8,
+        "in_flight": None,
     }
     assert config["seed"] == 0
     assert {"armwright", "optuna", "warp-lang", "python"} <= set(config["versions"])

@@ -33,7 +33,7 @@ class Listed(Proposer):
     def __init__(self, faulty: tuple[int, ...] = ()) -> None:
         self.faulty = faulty
 
-    def propose(self, history: History, seed: int) -> Proposal:
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
         if len(history) in self.faulty:
             raise ProposalError("timeout", "it did not answer")
         return Proposal(history.problem.space.sample(1, seed)[0], f"listed-{len(history)}")
@@ -106,11 +106,12 @@ def test_a_proposal_that_fails_becomes_a_black_box_trial() -> None:
     assert run.summary["proposer"]["failures"] == {"timeout": 1}
 
 
-def test_a_proposer_that_never_worked_is_an_error_that_loses_nothing(tmp_path: Path) -> None:
-    with pytest.raises(ProposalError, match="did not answer; no proposal has come from listed yet"):
-        short(tmp_path / "run", proposer=Listed(faulty=(5,)))
-    assert len((tmp_path / "run" / "trials.jsonl").read_text().splitlines()) == 5
-    assert short(tmp_path / "run", proposer=Listed()).resumed == 5
+def test_a_proposer_that_fails_from_the_first_is_marked_counted_and_flagged() -> None:
+    run = short(proposer=Listed(faulty=(5, 9)))
+    assert [trial.fault for trial in run.trials] == [None] * 5 + ["timeout", None, None, None] * 2
+    assert {trial.source for trial in run.trials[5:]} == {"bbo"}
+    proposer = run.summary["proposer"]
+    assert (proposer["failures"], proposer["fallback_share"], proposer["flagged"]) == ({"timeout": 2}, 1.0, True)
 
 
 def nsga2(seed: int) -> BaseSampler:
@@ -169,8 +170,8 @@ def test_other_settings_are_refused_with_their_differences(tmp_path: Path) -> No
 
 def test_the_order_of_a_proposals_parameters_means_nothing(tmp_path: Path) -> None:
     class Backwards(Listed):
-        def propose(self, history: History, seed: int) -> Proposal:
-            proposal = super().propose(history, seed)
+        def propose(self, history: History, seed: int, number: int) -> Proposal:
+            proposal = super().propose(history, seed, number)
             return Proposal(Design(dict(reversed(proposal.design.params.items()))), proposal.id)
 
     run = short(tmp_path / "run", proposer=Backwards())

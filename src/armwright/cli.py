@@ -5,11 +5,14 @@ import shlex
 import sys
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from armwright.exceptions import ArmwrightError, FailureError, TaskError
+from armwright.exceptions import AnswerPendingError, ArmwrightError, FailureError, SettingsError, TaskError
+
+if TYPE_CHECKING:
+    from armwright.problem import Problem
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -58,22 +61,64 @@ def options(
     """Options of armwright itself."""
 
 
+# Options that several commands share.
+TaskName = Annotated[str, typer.Argument(help="A built-in task (see `armwright tasks`) or a YAML file.")]
+SpaceFile = Annotated[Path | None, typer.Option(help="Design space as a YAML file; without it, the paper's.")]
+PromptName = Annotated[
+    str, typer.Option(help="Prompt: plus (with analysis instructions), minus, or a template file of your own.")
+]
+MemoryName = Annotated[
+    str, typer.Option(help="What the model sees of its own earlier proposals: none (as the paper), or own.")
+]
+AnswerName = Annotated[
+    str, typer.Option(help="two-step (free reasoning, then a second call, as the paper) or one-step.")
+]
+ProposalCount = Annotated[int, typer.Option(help="Designs that one call asks for.")]
+ModelName = Annotated[str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.")]
+BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")]
+
+
 @app.command()
 def optimize(
-    task: Annotated[str, typer.Argument(help="A built-in task (see `armwright tasks`) or a YAML file.")],
-    space: Annotated[Path | None, typer.Option(help="Design space as a YAML file; without it, the paper's.")] = None,
+    task: TaskName,
+    space: SpaceFile = None,
     sampler: Annotated[str, typer.Option(help="Black-box sampler: tpe or random.")] = "tpe",
     proposer: Annotated[
         str,
         typer.Option(
-            help="Who proposes every n-step-th design: auto (a configured model, else rules), none, rules, llm."
+            help="Who proposes every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
+            "replay:RUN (a recorded run again), manual:DIR (you, by files)."
         ),
     ] = "auto",
-    prompt: Annotated[
-        str, typer.Option(help="Prompt of the model: plus (with analysis instructions) or minus.")
-    ] = "plus",
-    model: Annotated[str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.")] = None,
-    base_url: Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")] = None,
+    model: ModelName = None,
+    base_url: BaseUrl = None,
+    prompt: PromptName = "plus",
+    memory: MemoryName = "none",
+    answer: AnswerName = "two-step",
+    proposals: ProposalCount = 1,
+    temperature: Annotated[
+        float | None, typer.Option(help="Sent to the model only if given; the paper's is 0.")
+    ] = None,
+    model_seed: Annotated[int | None, typer.Option(help="Sent to the model only if given.")] = None,
+    output: Annotated[
+        str, typer.Option(help="How answers are held to the schema: tool, native, prompted; auto chooses.")
+    ] = "auto",
+    origin: Annotated[
+        str, typer.Option(help="What answers: model, or scripted for a stand-in; written with every call.")
+    ] = "model",
+    max_calls: Annotated[int | None, typer.Option(help="Ask no more after so many calls.")] = None,
+    max_cost: Annotated[float | None, typer.Option(help="Ask no more after so many USD.")] = None,
+    on_model_failure: Annotated[
+        str, typer.Option(help="If the model fails before the first trial: stop, or continue without it.")
+    ] = "stop",
+    overlap: Annotated[bool, typer.Option("--overlap", help="Ask while black-box trials go on.")] = False,
+    in_flight: Annotated[int | None, typer.Option(help="With --overlap: questions at a time.  [default: 1]")] = None,
+    replay_strict: Annotated[
+        bool, typer.Option("--replay-strict", help="A prompt that differs from the recorded one is an error.")
+    ] = False,
+    once: Annotated[
+        bool, typer.Option("--once", help="With manual:DIR: take the answers that are there, and exit at a question.")
+    ] = False,
     n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.")] = 10,
     n_step: Annotated[int, typer.Option(help="Trials in a block; the first is the proposer's.")] = 10,
     n_total: Annotated[int, typer.Option(help="Counted trials.")] = 200,
@@ -83,15 +128,19 @@ def optimize(
 ) -> None:
     """Search designs for TASK. The same command again resumes or shows the run; a larger --n-total extends it."""
     from armwright import console as view
-    from armwright.problem import Problem
-    from armwright.proposers.choice import choose_proposer
-    from armwright.space import load_space, paper_space
+    from armwright.proposers.asking import Asking
+    from armwright.proposers.choice import Wishes, choose_proposer
     from armwright.study import optimize as run_study
-    from armwright.task import load_task
 
     words = view.stderr_console() if json_ else view.stdout_console()
-    problem = Problem(load_task(task), paper_space() if space is None else load_space(space))
-    choice = choose_proposer(proposer, model, base_url, prompt)
+    problem = _problem(task, space)
+    wishes = Wishes(
+        proposer, model, base_url, Asking(prompt, memory, answer, proposals), temperature, model_seed, output, origin,
+        max_calls, max_cost, replay_strict, once,
+    )  # fmt: skip
+    if in_flight is not None and not overlap:
+        raise SettingsError(f"--in-flight {in_flight} goes with --overlap")
+    choice = choose_proposer(wishes)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     words.print(choice.reason)
     try:
@@ -103,6 +152,8 @@ def optimize(
                 n_init=n_init,
                 n_step=n_step,
                 n_total=n_total,
+                in_flight=(1 if in_flight is None else in_flight) if overlap else None,
+                on_model_failure=on_model_failure,
                 seed=seed,
                 out=folder,
                 watch=watch,
@@ -115,6 +166,13 @@ def optimize(
         kept = f"every finished trial is in {folder}/" if folder.exists() else "nothing was begun"
         words.print(f"\nstopped; {kept}. Go on with:\n  {_same_command()}")
         sys.exit(INTERRUPTED)
+    except AnswerPendingError as pending:
+        words.print(
+            f"{pending.question} waits for your answer in {pending.answer}; then go on with:\n  {_same_command()}"
+        )
+        if json_:
+            _print_json({"folder": str(folder), "question": str(pending.question), "answer": str(pending.answer)})
+        return
     if json_:
         _print_json({"folder": str(folder), **run.summary})
         return
@@ -123,6 +181,67 @@ def optimize(
     elif run.resumed:
         words.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
     view.show_result(words, run, figures)
+
+
+@app.command(name="prompt")
+def prompt_(
+    task: Annotated[str | None, typer.Argument(help="A built-in task, or a YAML file.")] = None,
+    after: Annotated[
+        Path | None, typer.Option(help="The prompt for the next proposal of this run; without it, of a new run.")
+    ] = None,
+    number: Annotated[
+        int | None, typer.Option(help="With --after: the prompt for this trial of the run, as it was then.")
+    ] = None,
+    space: SpaceFile = None,
+    prompt: PromptName = "plus",
+    memory: MemoryName = "none",
+    answer: AnswerName = "two-step",
+    proposals: ProposalCount = 1,
+    n_init: Annotated[int, typer.Option(help="Random trials of the new run.")] = 10,
+    seed: Annotated[int, typer.Option(help="Seed of the new run.")] = 0,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the answer's JSON schema instead.")] = False,
+    template: Annotated[
+        bool, typer.Option("--template", help="Print the template of --prompt instead, to make your own from.")
+    ] = False,
+    variables: Annotated[bool, typer.Option("--variables", help="Print what a template may use instead.")] = False,
+) -> None:
+    """Print exactly what would be sent to a model for TASK, or how to write a prompt of your own."""
+    from armwright.llm.prompt import VARIABLES, builtin_template, load_prompt
+    from armwright.preview import preview
+    from armwright.proposers.asking import Asking
+
+    if variables:
+        print("\n".join(f"{name}: {words}" for name, words in VARIABLES.items()))
+        return
+    if template:
+        print(f"{builtin_template('proposal.md.j2')}\n{{# ---- {prompt} ---- #}}\n{load_prompt(prompt).template}")
+        return
+    if task is None:
+        raise SettingsError("armwright prompt needs a TASK (or --template, or --variables)")
+    asking = Asking(prompt, memory, answer, proposals)
+    shown = preview(_problem(task, space), asking, after=after, number=number, n_init=n_init, seed=seed)
+    if schema:
+        _print_json(shown.schema)
+    else:
+        print(shown.prompt, end="")
+        print(f"about {shown.tokens:,} tokens; for trial {shown.number}", file=sys.stderr)
+
+
+@app.command()
+def doctor(
+    model: ModelName = None,
+    base_url: BaseUrl = None,
+    call: Annotated[bool, typer.Option("--call", help="Make one tiny call to the configured model.")] = False,
+) -> None:
+    """Say what is installed and which models are configured; nothing is sent unless --call is given."""
+    from armwright import console as view
+    from armwright.doctor import examine, try_model
+
+    words = view.stdout_console()
+    for finding in examine(model, base_url):
+        words.print(f"{finding.mark} {finding.subject}: {finding.words}")
+    if call:
+        words.print(try_model(model, base_url))
 
 
 @app.command()
@@ -178,6 +297,14 @@ def _figures(folder: Path) -> list[Path]:
 
     there = sorted((folder / FIGURES).glob("*.png"))
     return there or write_figures(folder)
+
+
+def _problem(task: str, space: Path | None) -> "Problem":
+    from armwright.problem import Problem
+    from armwright.space import load_space, paper_space
+    from armwright.task import load_task
+
+    return Problem(load_task(task), paper_space() if space is None else load_space(space))
 
 
 def _same_command() -> str:

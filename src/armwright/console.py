@@ -113,15 +113,37 @@ def _front_table(history: History) -> Table:
 
 
 def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
-    if proposer is None or proposer["model"] is None:
+    if proposer is None:
         return
-    cost = "unknown cost" if proposer["cost_usd"] is None else f"{proposer['cost_usd']:.4f} USD"
-    failures = sum(proposer["failures"].values())
-    words = f"model {proposer['model']}: {proposer['calls']} calls, {proposer['tokens']} tokens, {cost}"
+    if proposer["model"] is not None:
+        cost = "cost not known" if proposer["cost_usd"] is None else f"{proposer['cost_usd']:.4f} USD"
+        by = "" if proposer["origin"] == "model" else f" (origin: {proposer['origin']})"
+        tokens = f"{proposer['input_tokens']:,} tokens in, {proposer['output_tokens']:,} out"
+        console.print(
+            f"{proposer['model']}{by}: {proposer['calls']} calls, {tokens}, {cost}, {proposer['call_seconds']:.1f} s"
+        )
+    failures = proposer["failures"]
     if failures:
-        kinds = ", ".join(f"{count} {kind}" for kind, count in proposer["failures"].items())
-        words += f"; {failures} proposals failed and became black-box trials ({kinds})"
-    console.print(words)
+        kinds = ", ".join(f"{count} {kind}" for kind, count in failures.items())
+        console.print(f"{sum(failures.values())} proposals failed and became black-box trials ({kinds})")
+    if proposer["flagged"]:
+        console.print(
+            f"FLAGGED: {proposer['fallback_share']:.0%} of the proposals failed; this run does not stand for its "
+            "proposer, and is kept out of its row in tables"
+        )
+    if proposer.get("differing_prompts"):
+        console.print(
+            f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones; "
+            "--replay-strict makes that an error"
+        )
+    overlap = proposer["overlap"]
+    if overlap is not None and overlap["feedback_age"] is not None:
+        age = overlap["feedback_age"]
+        console.print(
+            f"overlap: {overlap['ratio']:.3f} of the trials were the proposer's (planned: "
+            f"{overlap['ratio_planned']:.3f}); its feedback was {age['mean']:.1f} trials old on average, "
+            f"{age['max']} at most"
+        )
 
 
 def _seconds(seconds: dict[str, float]) -> str:
@@ -139,19 +161,25 @@ def _point(point: Sequence[float]) -> str:
 
 def _state(progress: StudyProgress) -> str:
     volume = "-" if progress.hypervolume is None else f"{progress.hypervolume:.3f}"
-    return f"hypervolume {volume}  front {progress.front_size}"
+    faults = sum(progress.faults.values())
+    failed = f"  failed {faults}" if faults else ""
+    return f"hypervolume {volume}  front {progress.front_size}{failed}"
 
 
-def _fault(progress: StudyProgress) -> str:
-    return f"trial {progress.number}: no usable proposal ({progress.fault}); a black-box trial took its place"
+def _note(progress: StudyProgress) -> str:
+    """What the user should be told beside the numbers; empty where that is nothing."""
+    if progress.fault:
+        words = progress.note or progress.fault
+        return f"trial {progress.number}: no usable proposal ({words}); a black-box trial took its place"
+    return progress.note
 
 
 def _plain(console: Console) -> Watch:
     started = time.perf_counter()
 
     def watch(progress: StudyProgress) -> None:
-        if progress.fault:
-            console.print(_fault(progress))
+        if note := _note(progress):
+            console.print(note)
         done = progress.iteration
         if progress.doing == "finished" and done > 0 and (done % EVERY == 0 or done == progress.n_total):
             spent = time.perf_counter() - started
@@ -182,9 +210,11 @@ def _live(console: Console) -> Generator[Watch]:
         line = bar.add_task("", total=None, count="starting", state="")
 
         def watch(progress: StudyProgress) -> None:
-            if progress.fault:
-                console.print(_fault(progress))
+            if note := _note(progress):
+                console.print(note)
             doing = f"asking {progress.source} …" if progress.doing == "proposing" else progress.source
+            if progress.under_way:
+                doing += f"  {progress.under_way} asked"
             bar.update(
                 line,
                 total=progress.n_total,

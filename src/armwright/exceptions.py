@@ -8,9 +8,11 @@
     │   ├── ArmError            a chain that cannot exist, or that the kernels cannot compute yet
     │   ├── SettingsError       the settings of a run
     │   └── RunConflictError    the run folder holds a run with other settings
+    ├── AnswerPendingError      a question waits for people (--proposer manual:DIR --once)   (exit code 0)
     └── FailureError            something broke on the way                  (exit code 1)
         ├── RunFolderError      a run folder that cannot be written, or whose content is damaged
         ├── ModelError          a language model that cannot be used
+        ├── ReplayError         a recorded run that cannot be played again, or not to the letter
         ├── ProposalError       a proposer gave no design; the trial becomes a black-box one
         └── MissingExtraError   an optional dependency that is not installed
 
@@ -20,6 +22,7 @@ way out.
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 
 class ArmwrightError(Exception):
@@ -70,15 +73,35 @@ class ModelError(FailureError):
     """A language model that cannot be used."""
 
 
+class ReplayError(FailureError):
+    """A recorded run that cannot be played again, or not to the letter."""
+
+
 class ProposalError(FailureError):
     """A proposer gave no design; the trial becomes a black-box one.
 
     kind: one word for statistics: timeout, connection, refused, …
+    final: whether asking again in this session is of no use (a wrong key, a spent quota).
     """
 
-    def __init__(self, kind: str, message: str) -> None:
+    def __init__(self, kind: str, message: str, *, final: bool = False) -> None:
         super().__init__(message)
         self.kind = kind
+        self.final = final
+
+
+class AnswerPendingError(ArmwrightError):
+    """A question lies ready for people to answer; the run goes on from there.
+
+    question, answer: the files' paths.
+    """
+
+    exit_code = 0
+
+    def __init__(self, question: Path, answer: Path) -> None:
+        super().__init__(f"{question} waits for {answer}")
+        self.question = question
+        self.answer = answer
 
 
 class MissingExtraError(FailureError):

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation
-from armwright.pareto import front_numbers, hypervolume_history
+from armwright.pareto import default_reference_point, front_numbers, hypervolume_history
 from armwright.problem import Problem
 from armwright.space import Design
 
@@ -22,8 +22,11 @@ class FinishedTrial:
     """One evaluated design.
 
     source: `random`, `bbo`, or the name of the proposer.
-    proposal, reason: the proposal's id and reason, where a proposer made the design.
+    proposal, reason, expected: the proposal's id and reason, and the objectives that were expected of it, where a
+        proposer made the design (and said so).
     fault: why a trial that was a proposer's became a black-box one.
+    asked: the trial that a proposal was asked for, where it came for another (overlap, several proposals a call).
+    feedback: how many finished trials the proposer knew, where not all before this one.
     seconds: wall time by part (proposing, sampling, evaluation).
     sampler_notes: what the sampler noted on its trial and study (a genetic one: generations), needed to resume.
     """
@@ -34,7 +37,10 @@ class FinishedTrial:
     values: tuple[float, ...]
     proposal: str | None = None
     reason: str = ""
+    expected: tuple[float, ...] | None = None
     fault: str | None = None
+    asked: int | None = None
+    feedback: int | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
 
@@ -83,6 +89,10 @@ class History:
         """The Pareto set, by rising position error."""
         return [self.member(number) for number in front_numbers(self.values)]
 
+    def before(self, number: int) -> "History":
+        """What was known when trial `number` began."""
+        return History(self.problem, self.trials[:number], self.n_init, self.frozen_reference_point)
+
     def member(self, number: int) -> FrontMember:
         """The design of one trial and its arm."""
         trial = self.trials[number]
@@ -98,3 +108,14 @@ class History:
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
         """The physics of these trials' designs, computed again (the kernels give the same bits)."""
         return self.problem.evaluation([self.trials[number].design for number in numbers])
+
+
+def sampled_history(problem: Problem, n: int = 10, seed: int = 0) -> History:
+    """What a study of `n` uniformly random designs would have found."""
+    designs = problem.space.sample(n, seed)
+    values = problem.evaluate(designs).tolist()
+    trials = [
+        FinishedTrial(i, RANDOM, design, tuple(v)) for i, (design, v) in enumerate(zip(designs, values, strict=True))
+    ]
+    reference_point = problem.reference_point or default_reference_point(np.array(values))
+    return History(problem, trials, n, reference_point)

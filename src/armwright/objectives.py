@@ -14,12 +14,16 @@ TORQUE_SCALE = 40.0  # α of the paper
 class Objective:
     """A number per arm that should be small.
 
+    symbol: its name in formulas and prompts.
+    words: what its share of one target is, for a reader who knows nothing of this program.
     each: its share per target, (N, T); the objective is the sum over the targets.
     """
 
     name: str
     label: str
     unit: str
+    symbol: str
+    words: str
     each: Callable[[Evaluation], Array]
 
     def __call__(self, evaluation: Evaluation) -> Array:
@@ -35,6 +39,20 @@ def _torque(evaluation: Evaluation) -> Array:
     return TORQUE_SCALE * np.linalg.norm(evaluation.joint_torques, axis=-1)
 
 
-POSITION_ERROR = Objective("position_error", "Position error", "m", _position_error)
-TORQUE = Objective("torque", "Torque", f"N m x {TORQUE_SCALE:g}", _torque)
+POSITION_ERROR = Objective(
+    name="position_error",
+    label="Position error",
+    unit="m",
+    symbol="E_pos",
+    words="the distance between the tip and the target in that posture",
+    each=_position_error,
+)
+TORQUE = Objective(
+    name="torque",
+    label="Torque",
+    unit=f"N m x {TORQUE_SCALE:g}",
+    symbol="E_torque",
+    words="the Euclidean norm of the joint torques that hold that posture against gravity",
+    each=_torque,
+)
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)

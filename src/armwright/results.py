@@ -17,7 +17,7 @@ from typing import Any
 
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
-from armwright.history import FrontMember, History
+from armwright.history import FinishedTrial, FrontMember, History
 from armwright.proposers.proposer import ProposerSummary
 from armwright.run_folder import RunConfig, RunFolder
 
@@ -25,6 +25,7 @@ SUMMARY = "summary.json"
 DESIGNS = "designs"
 FIGURES = "figures"  # drawn by report/figures.py
 TABLES = ("trials.csv", "front.csv")
+MOST_FALLBACKS = 0.1  # of a proposer's turns, beyond which its run is flagged and kept out of its row in tables
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
 
 
@@ -82,20 +83,44 @@ def summarize(history: History, config: RunConfig, proposer: ProposerSummary | N
             "history": curve.tolist(),
         },
         "front_size": len(history.front),
-        "proposer": None if proposer is None else _proposer_record(history, proposer),
+        "proposer": None if proposer is None else _proposer_record(history, config, proposer),
         "seconds": {part: round(seconds[part], 6) for part in PARTS},
         "versions": dict(config.versions),
     }
 
 
-def _proposer_record(history: History, proposer: ProposerSummary) -> dict[str, Any]:
+def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:
+    turns = [trial for trial in history if trial.proposal is not None or trial.fault is not None]
+    fallbacks = sum(trial.fault is not None for trial in turns)
     return {
         "name": proposer.name,
         "model": proposer.model,
+        "origin": proposer.origin,
         "calls": proposer.calls,
-        "failures": dict(Counter(trial.fault for trial in history if trial.fault)),
-        "tokens": proposer.tokens,
+        "call_failures": dict(proposer.call_failures),
+        "failures": dict(Counter(trial.fault for trial in turns if trial.fault)),
+        "fallback_share": round(fallbacks / len(turns), 4) if turns else 0.0,
+        "flagged": fallbacks > MOST_FALLBACKS * len(turns),
+        "tokens": proposer.input_tokens + proposer.output_tokens,
+        "input_tokens": proposer.input_tokens,
+        "output_tokens": proposer.output_tokens,
         "cost_usd": proposer.cost_usd,
+        "call_seconds": proposer.seconds,
+        **proposer.notes,
+        "overlap": _overlap_record(history, config, turns),
+    }
+
+
+def _overlap_record(history: History, config: RunConfig, turns: Sequence[FinishedTrial]) -> dict[str, Any] | None:
+    """With --overlap: the proposals' share of the counted trials, and how old [trials] what they knew was."""
+    if config.method.in_flight is None:
+        return None
+    ages = [trial.number - trial.feedback if trial.feedback is not None else 0 for trial in turns if trial.proposal]
+    return {
+        "in_flight": config.method.in_flight,
+        "ratio_planned": 1.0 / config.method.n_step,
+        "ratio": round(len(turns) / max(1, len(history) - history.n_init), 4),
+        "feedback_age": {"mean": round(sum(ages) / len(ages), 2), "max": max(ages)} if ages else None,
     }
 
 

@@ -37,13 +37,18 @@ PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai
 
 
 class Method(BaseModel, frozen=True, extra="forbid"):
-    """How a study searches. proposer: its name and settings; None for black-box trials only."""
+    """How a study searches.
+
+    proposer: its name and settings; None for black-box trials only.
+    in_flight: how many questions go on while black-box trials run; None: the study waits for each.
+    """
 
     proposer: dict[str, Any] | None
     sampler: str
     n_init: int = Field(ge=1)
     n_step: int = Field(ge=1)
     n_total: int = Field(ge=1)
+    in_flight: int | None = Field(default=None, ge=1)
 
 
 class RunConfig(BaseModel, frozen=True, extra="forbid"):
@@ -210,7 +215,10 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     source: str
     proposal: str | None
     reason: str = ""
+    expected: list[float] | None = None
     fault: str | None = None
+    asked: int | None = None
+    feedback: int | None = None
     params: dict[str, float | str]
     values: list[float] = Field(min_length=2, max_length=2)
     seconds: dict[str, float]
@@ -223,7 +231,10 @@ def _trial_line(trial: FinishedTrial) -> bytes:
         source=trial.source,
         proposal=trial.proposal,
         reason=trial.reason,
+        expected=None if trial.expected is None else list(trial.expected),
         fault=trial.fault,
+        asked=trial.asked,
+        feedback=trial.feedback,
         params=dict(trial.design.params),
         values=list(trial.values),
         seconds=dict(trial.seconds),
@@ -264,7 +275,10 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
         values=tuple(record.values),
         proposal=record.proposal,
         reason=record.reason,
+        expected=None if record.expected is None else tuple(record.expected),
         fault=record.fault,
+        asked=record.asked,
+        feedback=record.feedback,
         seconds=record.seconds,
         sampler_notes=record.sampler_notes,
     )

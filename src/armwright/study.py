@@ -6,42 +6,50 @@ trials before it, so a killed run goes on where it stopped and ends as if it had
 
 import operator
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from armwright.exceptions import ProposalError, SettingsError
+from armwright.exceptions import ModelError, SettingsError
 from armwright.history import BBO, RANDOM, FinishedTrial, FrontMember, History
 from armwright.pareto import Array, FrontTracker, default_reference_point
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
-from armwright.proposers.proposer import Proposal, Proposer
+from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, results_are_there, summarize, write_results
 from armwright.run_folder import Method, RunConfig, RunFolder, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_factory
-from armwright.seeding import derived_seed
+from armwright.space import Design
+from armwright.turns import Alternating, Asker, Nobody, Overlapping, Recorded, Schedule, Turn, Turns
 
 LARGEST = 2**31 - 1
-PROPOSING = 2  # the place of the proposals' seeds under the run's seed
+ON_MODEL_FAILURE = ("stop", "continue")
 
 
 @dataclass(frozen=True)
 class Progress:
-    """What a study does now: it asks its proposer, or has finished a trial.
+    """What a study does now: it begins, asks its proposer, or has finished a trial.
 
     iteration: counted trials finished (0 while the random ones run).
+    under_way: questions that wait for their answers while trials go on.
+    fault, faults: of this trial; and of all trials so far, by kind.
+    note: what the user should be told, once.
     """
 
-    doing: Literal["proposing", "finished"]
+    doing: Literal["beginning", "proposing", "finished"]
     number: int
     iteration: int
     n_total: int
     hypervolume: float | None
     front_size: int
     source: str
+    under_way: int = 0
     fault: str | None = None
+    faults: Mapping[str, int] = field(default_factory=dict[str, int])
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,8 @@ def optimize(
     n_init: int = 10,
     n_step: int = 10,
     n_total: int = 200,
+    in_flight: int | None = None,
+    on_model_failure: str = "stop",
     seed: int = 0,
     out: str | Path | None = None,
     watch: Callable[[Progress], None] | None = None,
@@ -87,7 +97,11 @@ def optimize(
     proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or any Proposer.
     sampler: "tpe", "random", or a factory seed -> Optuna sampler.
     n_init random trials come first, then n_total counted ones in blocks of n_step.
+    in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
+    on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials.
     """
+    if on_model_failure not in ON_MODEL_FAILURE:
+        raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
     if isinstance(proposer, str):
         proposer = choose_proposer(proposer).proposer
     elif isinstance(proposer, type):
@@ -96,7 +110,7 @@ def optimize(
         task=problem.task,
         space=problem.space,
         reference_point=problem.reference_point,
-        method=_method(proposer, sampler, n_init, n_step, n_total),
+        method=_method(proposer, sampler, n_init, n_step, n_total, in_flight),
         seed=_whole("seed", seed, 0),
         versions=versions(),
     )
@@ -106,7 +120,7 @@ def optimize(
             folder = stack.enter_context(RunFolder(Path(out)))
             config = folder.adopt(config)
         study = Study(problem, config, proposer, sampler, folder, watch)
-        return study.run()
+        return study.run(on_model_failure)
 
 
 class Study:
@@ -140,18 +154,54 @@ class Study:
         """Of the whole study, the random ones included."""
         return self.method.n_init + self.method.n_total
 
-    def run(self) -> Run:
+    def run(self, on_model_failure: str = "stop") -> Run:
         """All trials that are still due, then the results."""
         resumed = len(self.trials)
         if self.proposer is not None:
             self.proposer.open(None if self.folder is None else self.folder.path)
-            if any(self._is_proposers(number) for number in range(resumed, self.n_trials)):
-                self.proposer.check()
+            if resumed < self.n_trials:
+                self._check(on_model_failure)
         if resumed < self.n_trials:
             self._begin()
-        for number in range(resumed, self.n_trials):
-            self._step(number)
+            with closing(self._turns()) as turns:
+                for number in range(resumed, self.n_trials):
+                    self._step(number, turns)
         return self._finish(resumed)
+
+    def _check(self, on_model_failure: str) -> None:
+        """Says what the proposals will take, and makes sure that they are to be had."""
+        assert self.proposer is not None
+        due = self._schedule.n_proposals - sum(turn is not None for turn in map(_past_turn, self.trials))
+        if due <= 0:
+            return
+        forecast = self.proposer.forecast(self.problem, due)
+        if forecast:
+            self._report("beginning", len(self.trials), self.proposer.name, note=forecast)
+        try:
+            self.proposer.check()
+        except ModelError as fault:
+            if on_model_failure == "stop":
+                raise
+            self._report("beginning", len(self.trials), self.proposer.name, note=str(fault))
+
+    @property
+    def _schedule(self) -> Schedule:
+        return Schedule(self.method.n_init, self.method.n_step, self.method.n_total)
+
+    def _turns(self) -> Turns:
+        if self.proposer is None:
+            return Nobody()
+        asker = Asker(self.proposer, self.config.seed)
+        recorded = self.proposer.recorded_turns()
+        if recorded is not None:
+            return Recorded(asker, recorded, self._history)
+        unused = [Turn(p.asked, p.known, p, note=p.note) for p in self.proposer.unused(self._history())]
+        if self.method.in_flight is None:
+            return Alternating(asker, self._schedule, self._history, unused)
+        past = [turn for turn in map(_past_turn, self.trials) if turn is not None]
+        return Overlapping(
+            asker, self._schedule, self._history, unused, past, self.method.in_flight, self.proposer.per_call
+        )
 
     def _begin(self) -> None:
         """Before the first new trial: results of fewer trials are taken away, other versions are noted."""
@@ -164,61 +214,40 @@ class Study:
             self.config = self.config.model_copy(update={"versions": now, "earlier_versions": earlier})
             self.folder.write_config(self.config)
 
-    def _is_proposers(self, number: int) -> bool:
-        counted = number - self.method.n_init
-        return self.proposer is not None and counted >= 0 and counted % self.method.n_step == 0
-
-    def _step(self, number: int) -> None:
+    def _step(self, number: int, turns: Turns) -> None:
         started = time.perf_counter()
-        proposal, fault = self._propose(number) if self._is_proposers(number) else (None, None)
+        if self.proposer is not None and self._schedule.begins_block(number):
+            self._report("proposing", number, self.proposer.name, turns)
+        turn = turns.next(number)
         proposed = time.perf_counter()
-        if proposal is not None and self.proposer is not None:
-            source = self.proposer.name
-            trial, design = self.black_box.inject(proposal.design, number, source, proposal.id)
-        else:
-            source = RANDOM if number < self.method.n_init else BBO
-            trial, design = self.black_box.draw(number, source)
+        trial, design, source = self._ask(number, turn)
         sampled = time.perf_counter()
         values = tuple(self.problem.evaluate([design])[0].tolist())
         evaluated = time.perf_counter()
         noted = self.black_box.tell(trial, values)
         told = time.perf_counter()
-        finished = FinishedTrial(
-            number=number,
-            source=source,
-            design=design,
-            values=values,
-            proposal=proposal.id if proposal is not None else None,
-            reason=proposal.reason if proposal is not None else "",
-            fault=fault,
-            sampler_notes=noted,
-            seconds={
-                "total": round(told - started, 6),
-                "sampling": round(sampled - proposed + told - evaluated, 6),
-                "evaluation": round(evaluated - sampled, 6),
-                "proposing": round(proposed - started, 6),
-            },
-        )
+        seconds = {
+            "total": round(told - started, 6),
+            "sampling": round(sampled - proposed + told - evaluated, 6),
+            "evaluation": round(evaluated - sampled, 6),
+            "proposing": round(proposed - started, 6),
+        }
+        finished = _finished(number, source, design, values, turn, noted, seconds)
         if self.folder is not None:
             self.folder.append(finished)
         self.trials.append(finished)
         self._tracker.add(values)
         self._freeze_reference_point()
-        self._report("finished", number, source, fault)
+        self._report("finished", number, source, turns, finished.fault, "" if turn is None else turn.note)
 
-    def _propose(self, number: int) -> tuple[Proposal | None, str | None]:
-        """The proposal for this trial, or the kind of fault that left it without one."""
-        assert self.proposer is not None
-        self._report("proposing", number, self.proposer.name)
-        try:
-            proposal = self.proposer.propose(self._history(), derived_seed(self.config.seed, PROPOSING, number))
-        except ProposalError as fault:
-            if not any(trial.source == self.proposer.name for trial in self.trials):
-                raise ProposalError(
-                    fault.kind, f"{fault}; no proposal has come from {self.proposer.name} yet"
-                ) from fault
-            return None, fault.kind
-        return proposal, None
+    def _ask(self, number: int, turn: Turn | None) -> tuple[Any, Design, str]:
+        """Optuna's trial with the design to evaluate, and where it comes from."""
+        if turn is not None and turn.proposal is not None:
+            assert self.proposer is not None
+            source = self.proposer.name
+            return *self.black_box.inject(turn.proposal.design, number, source, turn.proposal.id), source
+        source = RANDOM if number < self.method.n_init else BBO
+        return *self.black_box.draw(number, source), source
 
     def _history(self) -> History:
         return History(self.problem, tuple(self.trials), self.method.n_init, self.config.reference_point)
@@ -233,7 +262,13 @@ class Study:
                 self.folder.write_config(self.config)
 
     def _report(
-        self, doing: Literal["proposing", "finished"], number: int, source: str, fault: str | None = None
+        self,
+        doing: Literal["beginning", "proposing", "finished"],
+        number: int,
+        source: str,
+        turns: Turns | None = None,
+        fault: str | None = None,
+        note: str = "",
     ) -> None:
         if self.watch is None:
             return
@@ -246,7 +281,10 @@ class Study:
                 hypervolume=self._tracker.hypervolume,
                 front_size=self._tracker.size,
                 source=source,
+                under_way=0 if turns is None else turns.under_way,
                 fault=fault,
+                faults=Counter(trial.fault for trial in self.trials if trial.fault),
+                note=note,
             )
         )
 
@@ -261,7 +299,14 @@ class Study:
         return Run(history, self.config, summary, folder, resumed)
 
 
-def _method(proposer: Proposer | None, sampler: str | SamplerFactory, n_init: int, n_step: int, n_total: int) -> Method:
+def _method(
+    proposer: Proposer | None,
+    sampler: str | SamplerFactory,
+    n_init: int,
+    n_step: int,
+    n_total: int,
+    in_flight: int | None,
+) -> Method:
     factory = sampler_factory(sampler)
     name = sampler if isinstance(sampler, str) else getattr(factory, "__qualname__", type(factory).__qualname__)
     return Method(
@@ -270,7 +315,40 @@ def _method(proposer: Proposer | None, sampler: str | SamplerFactory, n_init: in
         n_init=_whole("n_init", n_init, 1),
         n_step=_whole("n_step", n_step, 1),
         n_total=_whole("n_total", n_total, 1),
+        in_flight=None if in_flight is None else _whole("in_flight", in_flight, 1),
     )
+
+
+def _finished(
+    number: int,
+    source: str,
+    design: Design,
+    values: tuple[float, ...],
+    turn: Turn | None,
+    noted: Mapping[str, Mapping[str, Any]],
+    seconds: Mapping[str, float],
+) -> FinishedTrial:
+    trial = FinishedTrial(number, source, design, values, sampler_notes=noted, seconds=seconds)
+    if turn is None:
+        return trial
+    proposal = turn.proposal
+    return replace(
+        trial,
+        proposal=None if proposal is None else proposal.id,
+        reason="" if proposal is None else proposal.reason,
+        expected=None if proposal is None else proposal.expected,
+        fault=turn.fault,
+        asked=None if turn.asked == number else turn.asked,
+        feedback=None if turn.feedback == number else turn.feedback,
+    )
+
+
+def _past_turn(trial: FinishedTrial) -> Turn | None:
+    """The proposer's turn that a finished trial was."""
+    if trial.proposal is None and trial.fault is None:
+        return None
+    asked = trial.number if trial.asked is None else trial.asked
+    return Turn(asked, trial.number if trial.feedback is None else trial.feedback, fault=trial.fault)
 
 
 def _whole(name: str, value: Any, least: int) -> int:

@@ -5,24 +5,28 @@ import os
 import re
 import threading
 import time
-from collections.abc import Callable, Coroutine, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Coroutine, Mapping, Sequence
+from concurrent.futures import CancelledError, Future
+from dataclasses import replace
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
-from pydantic import BaseModel
-
-from armwright.exceptions import DesignError, MissingExtraError, ProposalError, SettingsError
+from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
+from armwright.llm.secrets import redacted
+from armwright.llm.speaker import CHECK, CallError, Question, Reader, Reply, Speaker
 
 try:
+    from genai_prices import Usage, calc_price
     from openai import AsyncOpenAI, Omit
-    from pydantic_ai import Agent, ModelRetry, NativeOutput, ToolOutput, capture_run_messages
+    from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
     from pydantic_ai.messages import ModelMessage, ModelResponse, TextPart, ToolCallPart
     from pydantic_ai.models import Model, infer_model
     from pydantic_ai.models.openai import OpenAIChatModel
+    from pydantic_ai.output import StructuredDict
     from pydantic_ai.providers.openai_compatible import OpenAICompatibleProvider
     from pydantic_ai.settings import ModelSettings
+    from pydantic_ai.usage import UsageLimits
 except ImportError as fault:
     raise MissingExtraError('language models need an extra: pip install "armwright[llm]"') from fault
 
@@ -30,6 +34,16 @@ CALL_SECONDS = 120.0  # of one request, all attempts of the client included
 CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
 REASKS = 2  # after a refused answer
 SERVER_KEY = "ARMWRIGHT_API_KEY"  # for --base-url, where the server wants a key
+
+OutputMode = Literal["auto", "tool", "native", "prompted"]
+OUTPUT_MODES: tuple[str, ...] = get_args(OutputMode)
+_OUTPUTS: Mapping[str, Any] = {"tool": ToolOutput, "native": NativeOutput, "prompted": PromptedOutput}
+
+# Servers of one's own that have a name: where they listen, and the environment's words for address and key.
+_LOCAL = {
+    "ollama": ("http://localhost:11434/v1", "OLLAMA_BASE_URL", "OLLAMA_API_KEY"),
+    "vllm": ("http://localhost:8000/v1", "VLLM_BASE_URL", "VLLM_API_KEY"),
+}
 
 Result = TypeVar("Result")
 
@@ -58,100 +72,164 @@ _KINDS: tuple[tuple[type[Exception], str], ...] = (
 _MALFORMED = (LookupError, TypeError, ValueError, AttributeError)
 
 
-@dataclass(frozen=True)
-class Reply:
-    """What came back, and what it took. text: the answer as the model wrote it."""
+class Chat(Speaker):
+    """One model behind one server. Every call is new: the model remembers nothing between calls.
 
-    text: str
-    requests: int
-    input_tokens: int
-    output_tokens: int
-    cost_usd: float | None
-    seconds: float
+    model: `openai-chat:gpt-4o`, `anthropic:…`, `google:…`, `azure:…`, `openrouter:…`, `ollama:…`, `vllm:…`.
+    base_url: the address of any OpenAI-compatible server instead.
+    output: how an answer is held to a schema: by calling a tool (hosted models), natively (servers of one's own), or
+        by words in the prompt; auto chooses.
+    temperature, seed: sent only if they are set.
+    origin: `scripted` where a stand-in answers instead of a model; it is written with every call.
+    """
 
-
-class CallError(ProposalError):
-    """A call that gave no usable answer; `reply` says what it cost all the same."""
-
-    def __init__(self, kind: str, message: str, reply: Reply) -> None:
-        super().__init__(kind, message)
-        self.reply = reply
-
-
-class Chat:
-    """One model behind one server. Every call is new: the model remembers nothing between calls."""
-
-    def __init__(self, model: str, base_url: str | None = None) -> None:
-        self.name = model
-        self._model = _model(model, base_url)
-        # Servers of one's own constrain the answer by a JSON schema; hosted models are best at calling a tool.
-        self._output: Any = NativeOutput if base_url else ToolOutput
+    def __init__(
+        self,
+        model: str,
+        base_url: str | None = None,
+        *,
+        output: str = "auto",
+        temperature: float | None = None,
+        seed: int | None = None,
+        origin: str = "model",
+    ) -> None:
+        if output not in OUTPUT_MODES:
+            raise SettingsError(
+                f'unknown output "{output}".{did_you_mean(output, OUTPUT_MODES)} Outputs: {", ".join(OUTPUT_MODES)}'
+            )
+        self.model = model
+        self.origin = origin
+        self._model, own_server = _model(model, base_url)
+        if output == "auto":
+            output = "native" if own_server else "tool"
+        self._output = _OUTPUTS[output]
+        self._settings = ModelSettings()
+        if temperature is not None:
+            self._settings["temperature"] = temperature
+        if seed is not None:
+            self._settings["seed"] = seed
+        self._pending: set[Future[Any]] = set()
 
     def check(self) -> Reply:
         """One tiny question, so that a wrong name, key or address is known before any work is done."""
-        return self._run(Agent(self._model), "Answer with one word: ready", CHECK_SECONDS)[1]
+        return self._run(Agent(self._model), CHECK, CHECK_SECONDS)
 
-    def ask(self, prompt: str) -> Reply:
+    def ask(self, question: Question) -> Reply:
         """The free answer to a prompt."""
-        reply = self._run(Agent(self._model, retries=REASKS), prompt, CALL_SECONDS)[1]
+        reply = self._run(Agent(self._model, retries=REASKS), question, CALL_SECONDS)
         if not reply.text.strip():
-            raise CallError("answer", f"{self.name} gave an empty answer", reply)
+            raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
 
-    def ask_for(self, prompt: str, schema: type[BaseModel], check: Callable[[BaseModel], object]) -> Reply:
-        """The answer as JSON of `schema` that `check` accepts; its refusal (DesignError) goes back in its words."""
+    def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
+        """The answer as JSON of `schema` that `read` takes; its refusal goes back in its words."""
 
-        def accept(answer: BaseModel) -> BaseModel:
+        accepted: list[str] = []
+
+        def accept(answer: dict[str, Any]) -> dict[str, Any]:
             try:
-                check(answer)
+                accepted.append(read(answer))
             except DesignError as refusal:
                 raise ModelRetry(str(refusal)) from refusal
             return answer
 
-        agent: Agent[None, BaseModel] = Agent(self._model, output_type=self._output(schema), retries=REASKS)
+        output = self._output(StructuredDict(dict(schema)))
+        agent: Agent[None, Any] = Agent(self._model, output_type=output, retries=REASKS)
         agent.output_validator(accept)
-        output, reply = self._run(agent, prompt, CALL_SECONDS)
-        return replace(reply, text=output.model_dump_json())
+        return replace(self._run(agent, question, CALL_SECONDS), text=accepted[-1])
 
-    def _run(self, agent: Agent[None, Any], prompt: str, seconds: float) -> tuple[Any, Reply]:
+    def cancel(self) -> None:
+        """Ends all calls under way."""
+        for future in list(self._pending):
+            future.cancel()
+
+    def _run(self, agent: Agent[None, Any], question: Question, seconds: float) -> Reply:
         started = time.perf_counter()
-        settings = ModelSettings(temperature=0.0, request_timeout=seconds)
+        settings: ModelSettings = {**self._settings, "request_timeout": seconds}
+        limits = UsageLimits(request_limit=question.most_requests)
         with capture_run_messages() as messages:
             try:
-                output = _wait(agent.run(prompt, model_settings=settings)).output
+                self._wait(agent.run(question.prompt, model_settings=settings, usage_limits=limits))
+            except CancelledError as fault:
+                reply = _reply(messages, time.perf_counter() - started)
+                raise CallError("cancelled", f"{self.model}: the call was ended", reply) from fault
             except (faults.AgentRunError, faults.UserError, *_MALFORMED) as fault:
                 reply = _reply(messages, time.perf_counter() - started)
-                raise CallError(_kind(fault), f"{self.name}: {_first_line(fault)}", reply) from fault
-        return output, _reply(messages, time.perf_counter() - started)
+                raise CallError(_kind(fault), f"{self.model}: {_first_line(fault)}", reply) from fault
+        return _reply(messages, time.perf_counter() - started)
+
+    def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
+        """The coroutine's result, from an event loop in a thread of its own.
+
+        One loop serves all callers: connections are kept open in it, and it works from any thread, also inside
+        a notebook's running loop.
+        """
+        future = asyncio.run_coroutine_threadsafe(coroutine, _loop())
+        self._pending.add(future)
+        try:
+            return future.result()
+        except BaseException:
+            future.cancel()  # Ctrl-C: the request ends, too
+            raise
+        finally:
+            self._pending.discard(future)
 
 
-def _model(name: str, base_url: str | None) -> Model:
-    """The model by its name; SettingsError where the name is unknown or its key is not set."""
+def estimated_cost(model: str, input_tokens: int, output_tokens: int) -> float | None:
+    """[USD] by the public price list, or None where it does not have the model."""
+    vendor, _, name = model.partition(":")
+    try:
+        usage = Usage(input_tokens=input_tokens, output_tokens=output_tokens)
+        return float(calc_price(usage, model_ref=name, provider_id=vendor.removesuffix("-chat")).total_price)
+    except LookupError:
+        return None
+
+
+def is_local(model: str, base_url: str | None) -> bool:
+    """Whether the model runs behind a server of one's own, where nobody sends a bill that we know of."""
+    return base_url is not None or model.partition(":")[0] in _LOCAL
+
+
+def _model(name: str, base_url: str | None) -> tuple[Model, bool]:
+    """The model by its name, and whether its server is one's own.
+
+    SettingsError where the name is unknown or its key is not set.
+    """
+    key_name = SERVER_KEY
+    vendor, _, bare = name.partition(":")
+    if base_url is None and vendor in _LOCAL:
+        default, address, vendor_key = _LOCAL[vendor]
+        base_url, name = os.environ.get(address) or default, bare
+        key_name = vendor_key if os.environ.get(vendor_key) else SERVER_KEY
     if base_url:
-        if not base_url.startswith(("http://", "https://")):
-            raise SettingsError(f"--base-url {base_url}: an address that begins with http:// or https:// is needed")
-        if "@" in base_url.partition("://")[2].partition("/")[0]:
-            raise SettingsError(f"--base-url holds a user name or password; put the server's key into {SERVER_KEY}")
-        # Nothing that belongs to a vendor goes to another host: neither its key nor its account's names.
-        client = AsyncOpenAI(
-            base_url=base_url,
-            api_key=os.environ.get(SERVER_KEY) or "no-key",
-            default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
-        )
-        provider = OpenAICompatibleProvider("openai-compatible", openai_client=client)
-        return OpenAIChatModel(name.removeprefix("openai-chat:"), provider=provider)
+        return _own_server(name.removeprefix("openai-chat:"), base_url, key_name), True
     if ":" not in name:
         raise SettingsError(
             f'model "{name}": a vendor is needed before it, like openai-chat:{name}; or give --base-url'
         )
     try:
-        return infer_model(name)
+        return infer_model(name), False
     except faults.UserError as fault:
-        key = re.search(r"\b[A-Z_]+_API_KEY\b", str(fault))
-        words = f"needs its key: set {key[0]} in the environment" if key else f"cannot be used: {_first_line(fault)}"
+        key = re.search(r"\b[A-Z_]+_(?:API_KEY|ENDPOINT)\b", str(fault))
+        words = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_first_line(fault)}"
         raise SettingsError(f"model {name} {words}") from fault
     except ImportError as fault:
         raise MissingExtraError(f"model {name} needs another package: {_first_line(fault)}") from fault
+
+
+def _own_server(name: str, base_url: str, key_name: str) -> Model:
+    """A model behind an OpenAI-compatible server. Nothing that belongs to a vendor goes there."""
+    if not base_url.startswith(("http://", "https://")):
+        raise SettingsError(f"--base-url {base_url}: an address that begins with http:// or https:// is needed")
+    place = base_url.partition("://")[2]
+    if "@" in place.partition("/")[0] or "?" in place or "#" in place:
+        raise SettingsError(f"--base-url holds more than an address; put the server's key into {SERVER_KEY}")
+    client = AsyncOpenAI(
+        base_url=base_url,
+        api_key=os.environ.get(key_name) or "no-key",
+        default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
+    )
+    return OpenAIChatModel(name, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
 
 
 def _reply(messages: Sequence[ModelMessage], seconds: float) -> Reply:
@@ -174,7 +252,7 @@ def _text(response: ModelResponse) -> str:
     """
     written = [part.content for part in response.parts if isinstance(part, TextPart)]
     written += [part.args_as_json_str() for part in response.parts if isinstance(part, ToolCallPart)]
-    return "\n".join(written).encode("utf-8", "replace").decode("utf-8")
+    return redacted("\n".join(written).encode("utf-8", "replace").decode("utf-8"))
 
 
 def _cost(response: ModelResponse) -> float | None:
@@ -192,22 +270,8 @@ def _kind(fault: Exception) -> str:
 
 
 def _first_line(fault: BaseException) -> str:
-    text = " ".join(str(fault).split()).rstrip(".")
+    text = redacted(" ".join(str(fault).split())).encode("utf-8", "replace").decode("utf-8").rstrip(".")
     return text if len(text) <= 300 else text[:297] + "..."
-
-
-def _wait(coroutine: Coroutine[Any, Any, Result]) -> Result:
-    """The coroutine's result, from an event loop in a thread of its own.
-
-    One loop serves all callers: connections are kept open in it, and it works from any thread, also inside
-    a notebook's running loop.
-    """
-    future = asyncio.run_coroutine_threadsafe(coroutine, _loop())
-    try:
-        return future.result()
-    except BaseException:
-        future.cancel()  # Ctrl-C: the request ends, too
-        raise
 
 
 @cache

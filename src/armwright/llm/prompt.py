@@ -1,132 +1,216 @@
 """What the model is told: the problem, feedback on past designs, and how to think. The words are in templates/."""
 
-from collections.abc import Mapping, Sequence
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError, TemplateSyntaxError, meta
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
+from armwright.exceptions import SettingsError, did_you_mean
 from armwright.history import History
 from armwright.kinematics.solve import UPDATES
-from armwright.objectives import TORQUE_SCALE
-from armwright.space import JOINT_WORDS, CategoricalParameter, Design, DesignSpace
+from armwright.llm.feedback import Record, design_records, drawn_designs, points, proposal_records, vector
+from armwright.problem import Problem
+from armwright.space import JOINT_WORDS
 
 PROMPTS = ("plus", "minus")
-N_PARETO = 5  # members of the front shown, docs/method.md §6
-N_RANDOM = 5  # other finished designs shown
+Memory = Literal["none", "own"]
+MEMORIES: tuple[str, ...] = get_args(Memory)
+Form = Literal["text", "then-schema", "schema"]  # of the answer: free; free, and a second call extracts it; by schema
+
+MOST_TOKENS = 12_000  # of a prompt; beyond it fewer targets, designs and earlier proposals are shown
+MOST_TARGETS, FEWEST_TARGETS = 64, 4  # shown
+MOST_PROPOSED, FEWEST_PROPOSED = 20, 4  # earlier proposals shown
+LARGEST_TEMPLATE = 256 * 1024  # characters
+
+# What a template may use; the answer to `armwright prompt --variables`.
+VARIABLES = {
+    "space": "the design space: joints, joint_types, joint_range, origin_x, origin_y, origin_z, link, mass_note",
+    "joint_words": "what each joint type is, by its letter",
+    "task": "the task: name, description",
+    "targets": "the target points as text; n_targets_shown of n_targets",
+    "n_targets": "how many targets the task has",
+    "n_targets_shown": "how many of them are listed",
+    "target_low": "the least x, y and z of all targets",
+    "target_high": "the largest x, y and z of all targets",
+    "updates": "updates of the inverse kinematics",
+    "objectives": "what is minimised, each with symbol, label, unit, words",
+    "reference_point": "of the hypervolume; none as long as there is none",
+    "n_finished": "how many designs have been evaluated",
+    "n_front": "how many of them are Pareto-optimal",
+    "front": "some members of the front: number, origin, joints, links, e_each, p_ik, tau_ik, limits, load, e_all",
+    "others": "some other designs, with the same",
+    "proposed": "--memory own: earlier proposals: number, origin, joints, links, expected, e_all, on_front, reason",
+    "n_proposed": "how many proposals there were",
+    "proposals": "how many designs to propose",
+    "expected": "whether the expected objectives are asked for",
+    "form": 'of the answer: "schema", "then-schema" (free text, a second call extracts it) or "text" (free text alone)',
+}
 
 
-def proposal_prompt(history: History, prompt: str, seed: int) -> str:
-    """The prompt for the next design after `history`; which designs it shows is drawn from `seed`.
+@dataclass(frozen=True)
+class Prompt:
+    """A prompt's name and its Jinja template."""
 
-    prompt: "plus" with instructions on how to analyse the parameters, "minus" without.
-    """
-    front, others = _shown_designs(history, seed)
-    return _render(
-        "proposal.md.j2",
-        problem=history.problem,
-        space=history.problem.space,
-        targets=_points(history.problem.task.points),
-        joint_words=JOINT_WORDS,
-        updates=UPDATES,
-        torque_scale=TORQUE_SCALE,
-        reference_point=history.reference_point,
-        n_finished=len(history),
-        n_front=len(history.front),
-        front=_feedback(history, front),
-        others=_feedback(history, others),
-        plus=prompt == "plus",
-    )
+    name: str
+    template: str
 
+    def __post_init__(self) -> None:
+        """SettingsError where the template cannot be read."""
+        try:
+            used = meta.find_undeclared_variables(_environment().parse(self.template))
+        except TemplateSyntaxError as fault:
+            raise SettingsError(f"prompt {self.name}, line {fault.lineno}: {fault.message}") from fault
+        for name in sorted(used - VARIABLES.keys()):
+            raise SettingsError(
+                f'prompt {self.name} uses "{name}", which does not exist.{did_you_mean(name, VARIABLES)} '
+                f"Names: {', '.join(VARIABLES)}"
+            )
 
-def parameters_prompt(space: DesignSpace, answer: str) -> str:
-    """The prompt of the second call: the free answer turned into parameters."""
-    return _render("parameters.md.j2", parameters=space.parameters, answer=answer)
+    def render(
+        self,
+        history: History,
+        seed: int,
+        *,
+        memory: str = "none",
+        name: str = "llm",
+        proposals: int = 1,
+        form: Form = "then-schema",
+    ) -> str:
+        """The prompt for the next design after `history`; which designs it shows is drawn from `seed`.
 
+        memory: "own" shows the earlier proposals of the proposer `name`, too.
+        proposals: how many designs are asked for.
 
-@cache
-def answer_schema(space: DesignSpace) -> type[BaseModel]:
-    """The answer of the second call: one field a parameter, and the reason in one sentence.
+        At most about MOST_TOKENS long: of more targets, designs and proposals fewer are shown.
+        """
+        proposed = proposal_records(history, name) if memory == "own" else []
+        numbers = drawn_designs(history, seed)
+        common = _common(history, memory, proposals, form) | {"n_proposed": len(proposed)}
+        most = MOST_TARGETS, len(numbers[0]) + len(numbers[1]), MOST_PROPOSED
+        while True:
+            text = self._render({**common, **_shown(history, numbers, proposed, *most)})
+            fewer = _fewer(*most)
+            if estimated_tokens(text) <= MOST_TOKENS or fewer == most:
+                return text
+            most = fewer
 
-    Ranges are told, not enforced here: the design space refuses in its own words.
-    """
-    fields: dict[str, Any] = {}
-    for parameter in space.parameters:
-        if isinstance(parameter, CategoricalParameter):
-            fields[parameter.name] = (Literal[parameter.choices], Field())
-        else:
-            words = f"{parameter.low:g} <= {parameter.name} <= {parameter.high:g} {parameter.unit}"
-            fields[parameter.name] = (float, Field(description=words, allow_inf_nan=False))
-    fields["reason"] = (str, Field(default="", description="why this design, in one sentence"))
-    return create_model(
-        "NewDesign", __config__=ConfigDict(extra="forbid"), __doc__="The arm to evaluate next.", **fields
-    )
-
-
-def design_of(answer: BaseModel, space: DesignSpace) -> tuple[Design, str]:
-    """The design of an answer, and its reason; DesignError where the space refuses it."""
-    params = answer.model_dump()
-    reason = " ".join(str(params.pop("reason")).split())
-    return space.design(params), reason
-
-
-def _shown_designs(history: History, seed: int) -> tuple[list[int], list[int]]:
-    """Numbers of members of the front, and of other finished trials, drawn without repetition."""
-    rng = np.random.default_rng(seed)
-    front = [member.number for member in history.front]
-    others = [trial.number for trial in history if trial.number not in set(front)]
-    return _draw(front, N_PARETO, rng), _draw(others, N_RANDOM, rng)
+    def _render(self, values: dict[str, Any]) -> str:
+        try:
+            text = _environment().from_string(self.template).render(values)
+        except (TemplateError, TypeError, ValueError, ArithmeticError, LookupError, AttributeError) as fault:
+            raise SettingsError(f"prompt {self.name} cannot be rendered: {' '.join(str(fault).split())}") from fault
+        return _tidy(text)
 
 
-def _draw(numbers: Sequence[int], n: int, rng: np.random.Generator) -> list[int]:
-    if len(numbers) <= n:
-        return list(numbers)
-    return sorted(rng.choice(np.array(numbers), size=n, replace=False).tolist())
-
-
-def _feedback(history: History, numbers: Sequence[int]) -> list[Mapping[str, Any]]:
-    """For each design what docs/method.md §6 lists, as text."""
-    if not numbers:
-        return []
-    evaluation = history.evaluation(numbers)
-    each = np.stack([objective.each(evaluation) for objective in history.problem.objectives], axis=-1)  # (n, T, 2)
-    shown: list[Mapping[str, Any]] = []
-    for row, number in enumerate(numbers):
-        trial = history.trials[number]
-        shown.append(
-            {
-                "number": number,
-                "origin": _row(trial.design.origin),
-                "joints": "(" + ", ".join(trial.design.joints) + ")",
-                "links": _row(trial.design.links),
-                "e_each": _points(each[row]),
-                "p_ik": _points(evaluation.reached[row]),
-                "tau_ik": _points(evaluation.joint_torques[row], digits=4),
-                "e_all": _row(trial.values),
-            }
+def load_prompt(name: str | Path) -> Prompt:
+    """The prompt `plus` or `minus`, or the one of a template file."""
+    if str(name) in PROMPTS:
+        return Prompt(str(name), builtin_template(f"{name}.md.j2"))
+    path = Path(name)
+    if not os.path.isfile(path):
+        raise SettingsError(
+            f'unknown prompt "{name}".{did_you_mean(str(name), PROMPTS)} Prompts: {", ".join(PROMPTS)}, or a file'
         )
-    return shown
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as fault:
+        raise SettingsError(f"cannot read {path}: {fault.strerror or fault}") from fault
+    except UnicodeDecodeError as fault:
+        raise SettingsError(f"{path} is not a text file in UTF-8") from fault
+    if len(text) > LARGEST_TEMPLATE:
+        raise SettingsError(f"{path} is larger than {LARGEST_TEMPLATE // 1024} KiB; that is no prompt")
+    return Prompt(path.name, text)
 
 
-def _points(rows: NDArray[np.float64], digits: int = 3) -> str:
-    return "[" + ", ".join(_row(row, digits) for row in rows) + "]"
+def builtin_template(name: str) -> str:
+    """The text of a template that comes with armwright."""
+    loader = _environment().loader
+    assert loader is not None
+    return loader.get_source(_environment(), name)[0]
 
 
-def _row(values: Sequence[float] | NDArray[np.float64], digits: int = 3) -> str:
-    # + 0.0 turns -0.0 into 0.0
-    return "(" + ", ".join(f"{round(float(value), digits) + 0.0:.{digits}f}" for value in values) + ")"
+def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expected: bool = False) -> str:
+    """The prompt of the second call: the free answer turned into parameters."""
+    template = _environment().get_template("parameters.md.j2")
+    values = {"parameters": problem.space.parameters, "proposals": proposals, "expected": expected, "answer": answer}
+    return _tidy(template.render(values))
 
 
-def _render(template: str, **values: Any) -> str:
-    return _environment().get_template(template).render(**values).strip() + "\n"
+def estimated_tokens(text: str) -> int:
+    """About how many tokens a model makes of a text: words in pieces of 5 letters, numbers in pieces of 3 digits."""
+    return len(re.findall(r"\d{1,3}|[^\W\d_]{1,5}|[^\w\s]|_", text))
+
+
+def _common(history: History, memory: str, proposals: int, form: Form) -> dict[str, Any]:
+    problem = history.problem
+    return {
+        "space": problem.space,
+        "joint_words": JOINT_WORDS,
+        "task": problem.task,
+        "n_targets": len(problem.task.points),
+        "target_low": vector(problem.task.points.min(axis=0)),
+        "target_high": vector(problem.task.points.max(axis=0)),
+        "updates": UPDATES,
+        "objectives": problem.objectives,
+        "reference_point": history.reference_point,
+        "n_finished": len(history),
+        "n_front": len(history.front),
+        "proposals": proposals,
+        "expected": memory == "own",
+        "form": form,
+    }
+
+
+def _shown(
+    history: History,
+    numbers: tuple[list[int], list[int]],
+    proposed: Sequence[Record],
+    most_targets: int,
+    most_designs: int,
+    most_proposed: int,
+) -> dict[str, Any]:
+    """Targets, designs and earlier proposals, at most so many of each."""
+    points_ = history.problem.task.points
+    shown = spread(len(points_), most_targets)
+    others = numbers[1][: most_designs // 2]
+    front = numbers[0][: most_designs - len(others)]
+    return {
+        "targets": points(points_[shown]),
+        "n_targets_shown": len(shown),
+        "front": design_records(history, front, shown),
+        "others": design_records(history, others, shown),
+        "proposed": proposed[-most_proposed:],
+    }
+
+
+def _fewer(targets: int, designs: int, proposed: int) -> tuple[int, int, int]:
+    """A step less of everything, targets first."""
+    if targets > FEWEST_TARGETS:
+        return max(FEWEST_TARGETS, 3 * targets // 4), designs, max(FEWEST_PROPOSED, 3 * proposed // 4)
+    return targets, max(1, designs - 1), FEWEST_PROPOSED
+
+
+def spread(n: int, most: int) -> list[int]:
+    """At most `most` of the places 0 … n-1, evenly spread."""
+    return sorted({round(place) for place in np.linspace(0, n - 1, min(n, most))})
+
+
+def _tidy(text: str) -> str:
+    """Without blanks at line ends, and without more than one empty line in a row."""
+    return re.sub(r"\n{3,}", "\n\n", re.sub(r"[ \t]+\n", "\n", text)).strip() + "\n"
 
 
 @cache
 def _environment() -> Environment:
-    # The output is a prompt, not a page: nothing is to be escaped.
-    return Environment(
+    # A sandbox, because templates are files that people pass on. The output is a prompt, not a page: nothing is
+    # to be escaped.
+    return ImmutableSandboxedEnvironment(
         loader=PackageLoader("armwright.llm"), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -2,6 +2,7 @@
 
 import json
 import os
+import threading
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,15 +16,19 @@ from armwright.exceptions import RunFolderError
 class Call:
     """One call.
 
-    proposal: the id of the proposal that it belongs to.
-    step: check (may the model be used at all), reasoning (the free answer), parameters (the answer as values).
-    origin: who answered; `model` for a language model.
+    proposal: the id of the proposal that it belongs to; empty for a check.
+    step: check (may the model be used at all), reasoning (the free answer), parameters (that answer as values), or
+        answer (both at once).
+    known: how many finished trials the question was made from.
+    origin: who answered: `model`, `manual` (people) or `scripted` (a stand-in, in tests and examples).
     requests: requests sent to the server; above 1 where an answer was refused and asked for again.
-    error: the fault's kind and text, where there was one; then the answer may be empty.
+    fault, error: the fault's kind and words, where there was one; then the answer may be empty.
     """
 
     proposal: str
     step: str
+    known: int
+    origin: str
     model: str
     prompt: str
     answer: str
@@ -32,16 +37,20 @@ class Call:
     output_tokens: int
     cost_usd: float | None
     seconds: float
+    fault: str | None = None
     error: str | None = None
-    origin: str = "model"
 
 
 class Transcript:
-    """The calls of one run, kept in a file where the run has a folder."""
+    """The calls of one run, kept in a file where the run has a folder; several threads may add to it.
 
-    def __init__(self, path: Path | None) -> None:
+    read_only: for a record that is none of this run's; a last line that a crash cut short stays in its file.
+    """
+
+    def __init__(self, path: Path | None, read_only: bool = False) -> None:
         self._path = path
-        self._calls = list(_read(path)) if path is not None else []
+        self._calls = list(_read(path, mend=not read_only)) if path is not None else []
+        self._lock = threading.Lock()
 
     @property
     def calls(self) -> tuple[Call, ...]:
@@ -50,25 +59,26 @@ class Transcript:
 
     def add(self, call: Call) -> None:
         """Keeps a call; on disk before this returns, because its answer was paid for."""
-        self._calls.append(call)
-        if self._path is None:
-            return
-        try:
-            with open(self._path, "ab") as file:
-                file.write((json.dumps(asdict(call)) + "\n").encode())
-                file.flush()
-                os.fsync(file.fileno())
-        except OSError as fault:
-            raise RunFolderError(f"cannot write {self._path}: {fault.strerror or fault}") from fault
+        with self._lock:
+            self._calls.append(call)
+            if self._path is None:
+                return
+            try:
+                with open(self._path, "ab") as file:
+                    file.write((json.dumps(asdict(call)) + "\n").encode())
+                    file.flush()
+                    os.fsync(file.fileno())
+            except OSError as fault:
+                raise RunFolderError(f"cannot write {self._path}: {fault.strerror or fault}") from fault
 
     def answer(self, proposal: str, step: str) -> str | None:
         """The answer that this step of a proposal got already, if it got one."""
-        found = [c.answer for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.error is None]
+        found = [c.answer for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.fault is None]
         return found[-1] if found else None
 
 
-def _read(path: Path) -> Iterator[Call]:
-    """The calls of a file; a last line that a crash cut short is dropped from the file, too."""
+def _read(path: Path, mend: bool) -> Iterator[Call]:
+    """The calls of a file; mend: a last line that a crash cut short is dropped from the file, too."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
@@ -76,7 +86,7 @@ def _read(path: Path) -> Iterator[Call]:
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
     end = content.rfind(b"\n") + 1
-    if end < len(content):
+    if mend and end < len(content):
         try:
             os.truncate(path, end)
         except OSError as fault:

@@ -1,124 +1,91 @@
-"""The language model as a proposer: it thinks freely, then its answer is turned into parameters."""
+"""The language model as a proposer."""
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
-from pydantic import ValidationError
+from armwright.history import sampled_history
+from armwright.llm.prompt import estimated_tokens, parameters_prompt
+from armwright.problem import Problem
+from armwright.proposers.asking import Asking, AskingProposer
 
-from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError, did_you_mean
-from armwright.history import History
-from armwright.llm.prompt import PROMPTS, answer_schema, design_of, parameters_prompt, proposal_prompt
-from armwright.llm.transcript import Call, Transcript
-from armwright.proposers.proposer import Proposal, Proposer, ProposerSummary
-from armwright.space import Design, DesignSpace
-
-TRANSCRIPTS = "transcripts.jsonl"
+THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # that a model is taken to write, for an estimate
 
 
-class LlmProposer(Proposer):
-    """Asks a language model for each proposal, in two calls, and keeps what was said.
+class LlmProposer(AskingProposer):
+    """Asks a language model for each proposal, and keeps what was said.
 
-    model: vendor and name, `openai-chat:gpt-4o`.
-    base_url: the address of an OpenAI-compatible server, where it is not the vendor's own.
-    prompt: "plus" (with instructions on how to analyse the parameters) or "minus".
+    model: vendor and name, `openai-chat:gpt-4o`, `anthropic:claude-…`, `google:…`, `azure:…`, `openrouter:…`,
+        `ollama:…`, `vllm:…`.
+    base_url: the address of any OpenAI-compatible server instead.
+    prompt: "plus" (with instructions on how to analyse the parameters), "minus", or a template file.
+    memory: "none" (every call is new), or "own": the earlier proposals of the run are shown.
+    answer: "two-step" (free reasoning, then a second call into the schema) or "one-step".
+    proposals: designs a call.
+    temperature, seed: sent only if they are set.
+    output: how an answer is held to a schema: "tool", "native", "prompted"; "auto" chooses by the server.
+    max_calls, max_cost: after so many calls, or [USD], of the whole run it asks no more.
+    origin: "scripted" where a stand-in answers instead of a model; it is written with every call.
     """
 
-    name = "llm"
-
-    def __init__(self, model: str, base_url: str | None = None, prompt: str = "plus") -> None:
+    def __init__(
+        self,
+        model: str,
+        base_url: str | None = None,
+        prompt: str = "plus",
+        *,
+        memory: str = "none",
+        answer: str = "two-step",
+        proposals: int = 1,
+        temperature: float | None = None,
+        seed: int | None = None,
+        output: str = "auto",
+        max_calls: int | None = None,
+        max_cost: float | None = None,
+        origin: str = "model",
+    ) -> None:
         from armwright.llm.chat import Chat
 
-        if prompt not in PROMPTS:
-            raise SettingsError(
-                f'unknown prompt "{prompt}".{did_you_mean(prompt, PROMPTS)} Prompts: {", ".join(PROMPTS)}'
-            )
+        asking = Asking(prompt, memory, answer, proposals)
+        chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
+        super().__init__(chat, asking, "llm", max_calls=max_calls, max_cost=max_cost)
         self.model = model
         self.base_url = base_url
-        self.prompt = prompt
-        self._chat = Chat(model, base_url)
-        self._transcript = Transcript(None)
+        self._sent = {"output": output, "temperature": temperature, "seed": seed, "origin": origin}
 
     def settings(self) -> Mapping[str, Any]:
-        """Model, server and prompt."""
-        return {"model": self.model, "base_url": self.base_url, "prompt": self.prompt}
+        """Model, server, prompt and what is sent with it."""
+        return {"model": self.model, "base_url": self.base_url, **super().settings(), **self._sent}
 
-    def open(self, folder: Path | None) -> None:
-        """Reads what was said before in this run."""
-        self._transcript = Transcript(None if folder is None else folder / TRANSCRIPTS)
+    def forecast(self, problem: Problem, n: int) -> str:
+        """About what `n` proposals will take, before any is asked for."""
+        from armwright.llm.chat import estimated_cost, is_local
 
-    def check(self) -> None:
-        """Makes sure that the model answers."""
-        try:
-            self._call("", "check", "", self._chat.check)
-        except ProposalError as fault:
-            raise ModelError(
-                f"{fault}. Check the model, its key and --base-url; --proposer rules needs none"
-            ) from fault
-
-    def summary(self) -> ProposerSummary:
-        """Calls, tokens and cost of the whole run, earlier sessions included."""
-        calls = self._transcript.calls
-        costs = [call.cost_usd for call in calls if call.requests]
-        known = costs and None not in costs
-        return ProposerSummary(
-            name=self.name,
-            model=self.model,
-            calls=len(calls),
-            tokens=sum(call.input_tokens + call.output_tokens for call in calls),
-            cost_usd=sum(cost or 0.0 for cost in costs) if known else None,
+        calls = -(-n // self.asking.proposals)
+        given, written = self._tokens_each(problem)
+        steps = 2 if self._form == "then-schema" else 1
+        words = (
+            f"{n} proposals: about {steps * calls + 1} calls, {_thousands(calls * given)} tokens in, "
+            f"{_thousands(calls * written)} out"
         )
+        if is_local(self.model, self.base_url):
+            return f"{words}; on a server of your own"
+        cost = estimated_cost(self.model, calls * given, calls * written)
+        return f"{words}; " + ("price not known" if cost is None else f"about {cost:.2f} USD by public prices")
 
-    def propose(self, history: History, seed: int) -> Proposal:
-        """The model's next design. An answer that was paid for in a run that was killed is used, not asked again."""
-        identity = f"{self.name}-{len(history):04d}"
-        space = history.problem.space
-        prompt = proposal_prompt(history, self.prompt, seed)
-        thoughts = self._transcript.answer(identity, "reasoning")
-        if thoughts is None:
-            thoughts = self._call(identity, "reasoning", prompt, lambda: self._chat.ask(prompt))
-        design, reason = self._parameters(identity, space, thoughts)
-        return Proposal(design, identity, reason)
+    def _tokens_each(self, problem: Problem) -> tuple[int, int]:
+        """Tokens in and out of one proposal: as those so far in this run, else by a prompt with designs at random."""
+        said = [call for call in self._transcript.calls if call.proposal and call.fault is None]
+        asked = {call.proposal for call in said}
+        if asked:
+            return tuple(
+                sum(n) // len(asked) for n in zip(*((c.input_tokens, c.output_tokens) for c in said), strict=True)
+            )  # pyright: ignore[reportReturnType]
+        prompt = self.prompt_for(sampled_history(problem), seed=0)
+        given, written = estimated_tokens(prompt), self.asking.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
+        if self._form == "then-schema":
+            given += estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS
+        return given, written
 
-    def _parameters(self, identity: str, space: DesignSpace, thoughts: str) -> tuple[Design, str]:
-        schema = answer_schema(space)
-        said = self._transcript.answer(identity, "parameters")
-        if said is not None:
-            with suppress(ValidationError, DesignError):  # a transcript that was changed by hand: ask again
-                return design_of(schema.model_validate_json(said), space)
-        question = parameters_prompt(space, thoughts)
-        said = self._call(
-            identity,
-            "parameters",
-            question,
-            lambda: self._chat.ask_for(question, schema, lambda answer: design_of(answer, space)),
-        )
-        return design_of(schema.model_validate_json(said), space)
 
-    def _call(self, proposal: str, step: str, prompt: str, ask: Callable[[], Any]) -> str:
-        from armwright.llm.chat import CallError
-
-        error = None
-        try:
-            reply = ask()
-        except CallError as fault:
-            error, reply = fault, fault.reply
-        self._transcript.add(
-            Call(
-                proposal=proposal,
-                step=step,
-                model=self.model,
-                prompt=prompt,
-                answer=reply.text,
-                requests=reply.requests,
-                input_tokens=reply.input_tokens,
-                output_tokens=reply.output_tokens,
-                cost_usd=reply.cost_usd,
-                seconds=round(reply.seconds, 3),
-                error=None if error is None else f"{error.kind}: {error}",
-            )
-        )
-        if error is not None:
-            raise error
-        return reply.text
+def _thousands(n: int) -> str:
+    return f"{n:,}" if n < 10_000 else f"{round(n, -3):,}"

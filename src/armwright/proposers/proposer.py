@@ -1,41 +1,77 @@
 """What a proposer is. Your own needs a name and `propose`; the rest has defaults."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
 from armwright.history import History
+from armwright.problem import Problem
 from armwright.space import Design
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A design to evaluate next, and the reason in one line."""
+    """A design to evaluate next.
+
+    reason: in one line.
+    expected: the objectives that the proposer expects of it, where it says so.
+    asked, known: the trial that it was asked for, and how many finished trials the proposer knew; filled in for
+        proposals that were made in an earlier session.
+    note: what the user should know of how it came about.
+    """
 
     design: Design
     id: str
     reason: str = ""
+    expected: tuple[float, ...] | None = None
+    asked: int = 0
+    known: int = 0
+    note: str = ""
 
 
 @dataclass(frozen=True)
 class ProposerSummary:
-    """What a run's proposer did and cost, for summary.json."""
+    """What a run's proposer did and cost, for summary.json.
+
+    model: who answered.  origin: what answered: `model`, `manual` (people), `scripted` (a stand-in).
+    calls, requests: questions, and requests to the server (more, where answers were refused).
+    call_failures: failed calls by kind.
+    cost_usd: None where a price is not known.
+    seconds: of all calls together.
+    notes: what else should be known, such as where a replay differs from its record.
+    """
 
     name: str
     model: str | None = None
+    origin: str | None = None
     calls: int = 0
-    tokens: int = 0
+    requests: int = 0
+    call_failures: Mapping[str, int] = field(default_factory=dict[str, int])
+    input_tokens: int = 0
+    output_tokens: int = 0
     cost_usd: float | None = None
+    seconds: float = 0.0
+    notes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True)
+class RecordedTurn:
+    """When a proposal entered a run that is played again: the trial it was asked for, and what was known then."""
+
+    asked: int
+    feedback: int
 
 
 class Proposer(Protocol):
     """Proposes one design for every n_step trials; inherit from it and write `propose`.
 
     name: the `source` of its trials.
+    per_call: how many designs one call of `propose` gives, at most.
     """
 
     name: str
+    per_call: int = 1
 
     def settings(self) -> Mapping[str, Any]:
         """What must be known to repeat its proposals; kept in config.yaml. No secrets."""
@@ -44,16 +80,34 @@ class Proposer(Protocol):
     def open(self, folder: Path | None) -> None:
         """Called first of all, with the run folder where there is one: what it did before in this run lies there."""
 
+    def forecast(self, problem: Problem, n: int) -> str:
+        """About what `n` more proposals will take, in one line for the user; empty where that is nothing."""
+        return ""
+
     def check(self) -> None:
         """Called before the first trial if a proposal is due; FailureError where the proposer cannot work."""
+
+    def unused(self, history: History) -> Sequence[Proposal]:
+        """Proposals of earlier sessions of this run that no trial has used yet; they go first."""
+        return ()
+
+    def recorded_turns(self) -> Mapping[int, RecordedTurn] | None:
+        """Of a record that is played again: when its proposals entered, by trial number."""
+        return None
 
     def summary(self) -> ProposerSummary:
         """What it did and cost so far."""
         return ProposerSummary(self.name)
 
-    def propose(self, history: History, seed: int) -> Proposal:
-        """The next design; ProposalError where there is none (the trial becomes a black-box one).
+    def cancel(self) -> None:
+        """Ends what is under way in other threads (the study ends, or was interrupted)."""
 
-        Must depend on nothing but `history` and `seed`, so that a killed run goes on as if it had not been.
+    def propose(self, history: History, seed: int, number: int) -> Proposal | Sequence[Proposal]:
+        """The next design, or several to be evaluated in turn; ProposalError where there is none.
+
+        history: the finished trials; number: the trial that is asked for (ids are made from it).
+
+        Must depend on nothing but these, so that a killed run goes on as if it had not been. With --overlap it is
+        called from other threads.
         """
         ...

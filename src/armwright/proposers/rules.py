@@ -56,7 +56,7 @@ class RulesProposer(Proposer):
 
     name = "rules"
 
-    def propose(self, history: History, seed: int) -> Proposal:
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
         """The next structure of the opening, then what the rule that has brought most says."""
         rng = np.random.default_rng(seed)
         earlier = sum(trial.source == self.name for trial in history)
@@ -66,7 +66,7 @@ class RulesProposer(Proposer):
         else:
             rule = most_promising(history, self.name)
             design, reason = RULES[rule](history, inside, rng)
-        return Proposal(distinct(design, history, rng), f"{self.name}-{len(history):04d}-{rule}", reason)
+        return Proposal(distinct(design, history, rng), f"{self.name}-{number:04d}-{rule}", reason)
 
 
 def bounds(history: History) -> tuple[float, ...]:

@@ -1,0 +1,113 @@
+"""People in the model's place: each question is a file, and so is its answer."""
+
+import os
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import AnswerPendingError, DesignError, FailureError
+from armwright.llm.answer import LONGEST_ANSWER
+from armwright.llm.speaker import CallError, Question, Reply, Speaker, TextReader
+
+LOOK_EVERY = 0.5  # [s]
+
+
+class People(Speaker):
+    """Writes DIR/NNN-prompt.md and takes DIR/NNN-answer.md (or .json), where NNN is the trial's number.
+
+    wait: whether to wait for an answer that is not there; else AnswerPendingError.
+    """
+
+    model = "people"
+    origin = "manual"
+
+    def __init__(self, folder: Path, wait: bool = True) -> None:
+        self.folder = folder
+        self.wait = wait
+        self._cancelled = threading.Event()
+        self._seen: dict[Path, tuple[int, int]] = {}  # files' sizes and times when last looked at
+
+    def check(self) -> Reply:
+        """People are not asked before there is a question."""
+        return Reply("")
+
+    def ask(self, question: Question) -> Reply:
+        """The free answer."""
+        return self.ask_people(question, lambda text: text)
+
+    def ask_for(self, question: Question, schema: Mapping[str, Any], read: Any) -> Reply:
+        """People are asked for text, not for a schema."""
+        raise NotImplementedError
+
+    def cancel(self) -> None:
+        """Waits no longer."""
+        self._cancelled.set()
+
+    def ask_people(self, question: Question, read: TextReader) -> Reply:
+        """The answer as `read` gives it; what it refuses (DesignError) is put aside, with the reason, for another."""
+        started = time.perf_counter()
+        number = f"{int(question.proposal.rpartition('-')[2]):03d}"
+        asked = self.folder / f"{number}-prompt.md"
+        self._ask(asked, question.prompt)
+        while True:
+            answer = self._answer_file(number)
+            if answer is not None:
+                text = self._read(answer)
+                try:
+                    return Reply(read(text), requests=1, seconds=time.perf_counter() - started)
+                except DesignError as refusal:
+                    self._refuse(number, answer, str(refusal))
+            if not self.wait:
+                raise AnswerPendingError(asked, self.folder / f"{number}-answer.md")
+            if self._cancelled.wait(LOOK_EVERY):
+                raise CallError("cancelled", "the wait for an answer was ended", Reply(""))
+
+    def _ask(self, file: Path, prompt: str) -> None:
+        if os.path.isfile(file):
+            if self._read(file) == prompt:
+                return
+            raise FailureError(
+                f"{file} holds a question of another run, or of another version; give an empty folder, or move "
+                f"{file.name} and its answer away"
+            )
+        self._write(file, prompt)
+
+    def _answer_file(self, number: str) -> Path | None:
+        """The answer, once it has something in it and, where there is time to look twice, rests."""
+        for ending in ("md", "json", "txt"):
+            file = self.folder / f"{number}-answer.{ending}"
+            if os.path.isfile(file):
+                found = file.stat()
+                now = found.st_size, found.st_mtime_ns
+                before, self._seen[file] = self._seen.get(file), now
+                if now[0] and (before == now or not self.wait):
+                    return file
+        return None
+
+    def _read(self, file: Path) -> str:
+        try:
+            with open(file, encoding="utf-8-sig", errors="replace") as content:
+                return content.read(LONGEST_ANSWER)
+        except OSError as fault:
+            raise FailureError(f"cannot read {file}: {fault.strerror or fault}") from fault
+
+    def _refuse(self, number: str, answer: Path, reason: str) -> None:
+        try:
+            before = len(list(self.folder.glob(f"{number}-refused-*")))
+            kept = self.folder / f"{number}-refused-{before + 1}{answer.suffix}"
+            os.replace(answer, kept)
+        except OSError as fault:
+            raise FailureError(f"cannot rename {answer}: {fault.strerror or fault}") from fault
+        self._write(
+            self.folder / f"{number}-refused.md",
+            f"{kept.name} was refused:\n\n{reason}\n\nGive another {answer.name}.\n",
+        )
+
+    def _write(self, file: Path, text: str) -> None:
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+        except OSError as fault:
+            raise FailureError(f"cannot write {file}: {fault.strerror or fault}") from fault

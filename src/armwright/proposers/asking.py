@@ -1,0 +1,247 @@
+"""A proposer that asks: what the language model, a recording of one, and people in its place have in common."""
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError, did_you_mean
+from armwright.history import History
+from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
+from armwright.llm.prompt import MEMORIES, Form, Prompt, load_prompt, parameters_prompt
+from armwright.llm.speaker import CHECK, CallError, Question, Reply, Speaker
+from armwright.llm.transcript import Call, Transcript
+from armwright.problem import Problem
+from armwright.proposers.proposer import Proposal, Proposer, ProposerSummary
+
+TRANSCRIPTS = "transcripts.jsonl"
+ANSWERS: Mapping[str, Form] = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
+NEVER_MADE = ("missing", "cancelled")  # faults of calls that nobody answered, and that cost nothing
+LAST_STEPS = ("parameters", "answer")  # the steps whose answers are designs
+MOST_PROPOSALS = 100  # a call
+
+
+@dataclass(frozen=True)
+class Asking:
+    """How designs are asked for.
+
+    prompt: "plus" (with instructions on how to analyse the parameters), "minus", or a template file.
+    memory: "none" (every call is new), or "own": the earlier proposals of the run are shown.
+    answer: "two-step" (free reasoning, then a second call into the schema) or "one-step"; people answer in "text".
+    proposals: designs a call.
+    """
+
+    prompt: str = "plus"
+    memory: str = "none"
+    answer: str = "two-step"
+    proposals: int = 1
+
+    def __post_init__(self) -> None:
+        for name, value, allowed in (("memory", self.memory, MEMORIES), ("answer", self.answer, tuple(ANSWERS))):
+            if value not in allowed:
+                raise SettingsError(
+                    f'unknown {name} "{value}".{did_you_mean(value, allowed)} One of: {", ".join(allowed)}'
+                )
+        if not 1 <= self.proposals <= MOST_PROPOSALS:
+            raise SettingsError(f"proposals = {self.proposals}: a whole number from 1 to {MOST_PROPOSALS} is needed")
+
+
+class AskingProposer(Proposer):
+    """Asks a speaker for each proposal, and keeps what was said.
+
+    name: the `source` of its trials.
+    max_calls, max_cost: after so many calls, or [USD], of the whole run it asks no more.
+    """
+
+    def __init__(
+        self,
+        speaker: Speaker,
+        asking: Asking,
+        name: str,
+        *,
+        prompt: Prompt | None = None,
+        max_calls: int | None = None,
+        max_cost: float | None = None,
+    ) -> None:
+        self.name = name
+        self.asking = asking
+        self.per_call = asking.proposals
+        self.prompt = prompt or load_prompt(asking.prompt)
+        self.speaker = speaker
+        self.max_calls = max_calls
+        self.max_cost = max_cost
+        self._form: Form = ANSWERS[asking.answer]
+        self._transcript = Transcript(None)
+        self._under_way = 0
+        self._lock = threading.Lock()
+
+    def settings(self) -> Mapping[str, Any]:
+        """Prompt, memory and form of the answer; of a prompt of one's own the whole template."""
+        own = {} if self.prompt.name in ("plus", "minus") else {"template": self.prompt.template}
+        return {
+            "prompt": self.prompt.name,
+            **own,
+            "memory": self.asking.memory,
+            "answer": self.asking.answer,
+            "proposals": self.asking.proposals,
+        }
+
+    def open(self, folder: Path | None) -> None:
+        """Reads what was said before in this run."""
+        self._transcript = Transcript(None if folder is None else folder / TRANSCRIPTS)
+
+    def check(self) -> None:
+        """Makes sure that answers are to be had."""
+        try:
+            self._call(CHECK, lambda question: self.speaker.check())
+        except ProposalError as fault:
+            raise ModelError(
+                f"{fault}. Check the model, its key and --base-url; --proposer rules needs none"
+            ) from fault
+        if self.max_cost is not None and self.summary().cost_usd is None:
+            raise ModelError(
+                f"the price of {self.speaker.model} is not known, so --max-cost cannot hold; use --max-calls"
+            )
+
+    def unused(self, history: History) -> Sequence[Proposal]:
+        """Designs that were answered in a run that was killed, and that no trial has used: they were paid for."""
+        used = {trial.proposal for trial in history}
+        found: dict[str, Proposal] = {}
+        for call in self._transcript.calls:
+            if call.step in LAST_STEPS and call.fault is None:
+                with suppress(DesignError):  # a transcript that was changed by hand: asked again
+                    answers = read_text(call.answer, history.problem, self.asking.proposals)
+                    found.update({p.id: p for p in self._proposals(call.proposal, answers, call.known)})
+        return [proposal for proposal in found.values() if proposal.id not in used]
+
+    def summary(self) -> ProposerSummary:
+        """Calls, tokens and cost of the whole run, earlier sessions included."""
+        calls = self._transcript.calls
+        costs = [call.cost_usd for call in calls if call.requests]
+        return ProposerSummary(
+            name=self.name,
+            model=self.speaker.model,
+            origin=self.speaker.origin,
+            calls=sum(max(1, call.requests) for call in calls),
+            call_failures=dict(Counter(call.fault for call in calls if call.fault)),
+            input_tokens=sum(call.input_tokens for call in calls),
+            output_tokens=sum(call.output_tokens for call in calls),
+            cost_usd=sum(cost or 0.0 for cost in costs) if costs and None not in costs else None,
+            seconds=round(sum(call.seconds for call in calls), 3),
+        )
+
+    def cancel(self) -> None:
+        """Ends the calls under way."""
+        self.speaker.cancel()
+
+    def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
+        """The next designs. An answer that was paid for in a run that was killed is used, not asked again."""
+        identity = f"{self.name}-{number:04d}"
+        prompt = self.prompt_for(history, seed)
+        if self._form == "then-schema":
+            thoughts = self._transcript.answer(identity, "reasoning")
+            if thoughts is None:
+                thoughts = self._call(Question(identity, "reasoning", prompt, len(history)), self.speaker.ask)
+            extract = parameters_prompt(
+                history.problem, thoughts, proposals=self.asking.proposals, expected=self._expects
+            )
+            question = Question(identity, "parameters", extract, len(history))
+        else:
+            question = Question(identity, "answer", prompt, len(history))
+        text = self._call(question, lambda asked: self.ask_designs(asked, history.problem))
+        answers = read_text(text, history.problem, self.asking.proposals)
+        return self._proposals(identity, answers, len(history))
+
+    def prompt_for(self, history: History, seed: int) -> str:
+        """What is asked after `history`."""
+        return self.prompt.render(
+            history,
+            seed,
+            memory=self.asking.memory,
+            name=self.name,
+            proposals=self.asking.proposals,
+            form=self._form,
+        )
+
+    def schema(self, problem: Problem) -> dict[str, Any]:
+        """JSON schema of the answer that holds the designs."""
+        return answer_schema(
+            problem,
+            reasoning=self._form == "schema",
+            expected=self._expects,
+            proposals=self.asking.proposals,
+        )
+
+    def ask_designs(self, question: Question, problem: Problem) -> Reply:
+        """The answer that holds the designs, as JSON that `read_text` reads."""
+
+        def read(content: Mapping[str, Any]) -> str:
+            answers = read_answers(content, problem, self.asking.proposals)
+            return written_answers(answers, problem, str(content.get("reasoning", "")))
+
+        return self.speaker.ask_for(question, self.schema(problem), read)
+
+    @property
+    def _expects(self) -> bool:
+        return self.asking.memory == "own"
+
+    def _proposals(self, identity: str, answers: Sequence[Answer], known: int) -> list[Proposal]:
+        ids = [identity] if len(answers) == 1 else [f"{identity}.{i}" for i in range(1, len(answers) + 1)]
+        asked = int(identity.rpartition("-")[2])
+        return [
+            Proposal(answer.design, id_, answer.reason, answer.expected, asked, known)
+            for id_, answer in zip(ids, answers, strict=True)
+        ]
+
+    def _call(self, question: Question, ask: Callable[[Question], Reply]) -> str:
+        question = self._within_budget(question)
+        error = None
+        try:
+            reply = ask(question)
+        except CallError as fault:
+            error, reply = fault, fault.reply
+        finally:
+            with self._lock:
+                self._under_way -= 1
+        if error is None or error.kind not in NEVER_MADE:
+            self._transcript.add(self._record(question, reply, error))
+        if error is not None:
+            raise error
+        return reply.text
+
+    def _record(self, question: Question, reply: Reply, error: CallError | None) -> Call:
+        return Call(
+            proposal=question.proposal,
+            step=question.step,
+            known=question.known,
+            origin=self.speaker.origin,
+            model=self.speaker.model,
+            prompt=question.prompt,
+            answer=reply.text,
+            requests=reply.requests,
+            input_tokens=reply.input_tokens,
+            output_tokens=reply.output_tokens,
+            cost_usd=reply.cost_usd,
+            seconds=round(reply.seconds, 3),
+            fault=None if error is None else error.kind,
+            error=None if error is None else str(error),
+        )
+
+    def _within_budget(self, question: Question) -> Question:
+        """The question, bounded by what is left of the budget; ProposalError where nothing is left."""
+        with self._lock:
+            spent = self.summary()
+            if self.max_calls is not None:
+                left = self.max_calls - spent.calls - self._under_way
+                if left <= 0:
+                    raise ProposalError("budget", f"--max-calls {self.max_calls} is used up", final=True)
+                question = replace(question, most_requests=left)
+            if self.max_cost is not None:
+                each = (spent.cost_usd or 0.0) / max(1, spent.calls)
+                if (spent.cost_usd or 0.0) + each * (1 + self._under_way) > self.max_cost:
+                    raise ProposalError("budget", f"--max-cost {self.max_cost:g} USD is used up", final=True)
+            self._under_way += 1
+        return question

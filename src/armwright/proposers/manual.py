@@ -1,0 +1,40 @@
+"""People as a proposer: for a model that can be used only through its web page, or for a designer's own ideas."""
+
+from pathlib import Path
+
+from armwright.llm.answer import read_text, written_answers
+from armwright.llm.people import People
+from armwright.llm.speaker import Question, Reply
+from armwright.problem import Problem
+from armwright.proposers.asking import Asking, AskingProposer
+
+
+class ManualProposer(AskingProposer):
+    """Writes each prompt to FOLDER/NNN-prompt.md and takes the answer from FOLDER/NNN-answer.md (or .json).
+
+    prompt, memory, proposals: as of LlmProposer.
+    wait: whether to wait for an answer; else AnswerPendingError is raised, and the same call goes on once it is there.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        prompt: str = "plus",
+        *,
+        memory: str = "none",
+        proposals: int = 1,
+        wait: bool = True,
+    ) -> None:
+        self.people = People(Path(folder), wait)
+        super().__init__(self.people, Asking(prompt, memory, "text", proposals), "manual")
+
+    def check(self) -> None:
+        """Nobody is asked before there is a question."""
+
+    def ask_designs(self, question: Question, problem: Problem) -> Reply:
+        """The answer's designs; what is refused is put aside with the reason, and another answer is waited for."""
+
+        def read(text: str) -> str:
+            return written_answers(read_text(text, problem, self.asking.proposals), problem)
+
+        return self.people.ask_people(question, read)

@@ -1,0 +1,104 @@
+"""A recorded run's proposals, played again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import ProposalError, ReplayError
+from armwright.history import FinishedTrial, History
+from armwright.llm.prompt import PROMPTS, Prompt
+from armwright.llm.recording import Recording
+from armwright.llm.transcript import Transcript
+from armwright.proposers.asking import TRANSCRIPTS, Asking, AskingProposer
+from armwright.proposers.proposer import Proposal, ProposerSummary, RecordedTurn
+from armwright.run_folder import CONFIG, TRIALS, RunConfig, read_config, read_run
+
+
+class ReplayProposer(AskingProposer):
+    """Plays the transcripts of a run folder, or of a transcripts.jsonl, again: no network, no cost.
+
+    With the settings of the recorded run, on the same machine with the same versions, the run comes out equal to the
+    bit. Where a prompt differs from the recorded one, it is reported; with `strict` it is an error.
+
+    asking: how the recorded run asked; read from the config.yaml beside the transcript where there is one.
+    """
+
+    def __init__(self, source: str | Path, strict: bool = False, asking: Asking | None = None) -> None:
+        self.source = Path(source)
+        folder = self.source if self.source.is_dir() else self.source.parent
+        file = folder / TRANSCRIPTS if self.source.is_dir() else self.source
+        if not file.is_file():
+            raise ReplayError(f"there is no {file} to replay; give a run folder or its {TRANSCRIPTS}")
+        calls = Transcript(file, read_only=True).calls
+        if not any(call.proposal for call in calls):
+            raise ReplayError(f"{file} holds no proposal")
+        name = next(call.proposal for call in calls if call.proposal).rpartition("-")[0]
+        recorded = read_config(folder) if (folder / CONFIG).is_file() else None
+        prompt, recorded_asking = _recorded_asking(recorded)
+        super().__init__(Recording(calls, file, strict), asking or recorded_asking, name, prompt=prompt)
+        self.recording: Recording = self.speaker  # pyright: ignore[reportAttributeAccessIssue]
+        self._trials = _recorded_trials(folder, recorded)
+
+    def settings(self) -> Mapping[str, Any]:
+        """What is replayed, and how it was asked for."""
+        return {"replay": str(self.source), **super().settings()}
+
+    def check(self) -> None:
+        """Says the recorded check again, so that the account is the same; nothing can fail here."""
+        if any(call.step == "check" and call.fault is None for call in self.recording.calls):
+            super().check()
+
+    def recorded_turns(self) -> Mapping[int, RecordedTurn] | None:
+        """When the recorded proposals entered, by trial number; None where only the transcript is there."""
+        if not self._trials:
+            return None
+        turns: dict[int, RecordedTurn] = {}
+        for trial in self._trials:
+            if trial.proposal is not None or trial.fault is not None:
+                asked = trial.number if trial.asked is None else trial.asked
+                feedback = trial.number if trial.feedback is None else trial.feedback
+                turns[trial.number] = RecordedTurn(asked, feedback)
+        return turns
+
+    def summary(self) -> ProposerSummary:
+        """The account of the recorded calls that were played."""
+        notes = {"replay": str(self.source), "differing_prompts": len(self.recording.differing)}
+        return replace(super().summary(), notes=notes)
+
+    def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
+        """The recorded designs; the recorded fault where there was one."""
+        identity = f"{self.name}-{number:04d}"
+        if not any(call.proposal == identity for call in self.recording.calls):
+            raise ProposalError(*self._why_missing(number))
+        proposals = super().propose(history, seed, number)
+        if identity not in self.recording.differing:
+            return proposals
+        note = f"the prompt for {identity} differs from the recorded one"
+        return [replace(proposals[0], note=note), *proposals[1:]]
+
+    def _why_missing(self, number: int) -> tuple[str, str]:
+        recorded = next((t for t in self._trials if t.fault and number == (t.asked or t.number)), None)
+        if recorded is not None:  # never asked: no budget, or a model that was given up
+            assert recorded.fault is not None
+            return recorded.fault, f"recorded: {recorded.fault}"
+        there = sorted({int(c.proposal.rpartition("-")[2]) for c in self.recording.calls if c.proposal})
+        return "missing", (
+            f"{self.recording.source} holds no proposal for trial {number}, but for {', '.join(map(str, there[:4]))}"
+            f"{', …' if len(there) > 4 else ''}; were n_init and n_step others?"
+        )
+
+
+def _recorded_asking(config: RunConfig | None) -> tuple[Prompt | None, Asking]:
+    settings = config.method.proposer if config is not None else None
+    if not settings or "prompt" not in settings:
+        return None, Asking()
+    own = Prompt(settings["prompt"], settings["template"]) if "template" in settings else None
+    name = settings["prompt"] if settings["prompt"] in PROMPTS else PROMPTS[0]
+    return own, Asking(name, settings["memory"], settings["answer"], settings["proposals"])
+
+
+def _recorded_trials(folder: Path, config: RunConfig | None) -> Sequence[FinishedTrial]:
+    if config is None or not (folder / TRIALS).is_file():
+        return ()
+    return read_run(folder)[1].trials
