@@ -167,11 +167,14 @@ def optimize(
         words.print(f"\nstopped; {kept}. Go on with:\n  {_same_command()}")
         sys.exit(INTERRUPTED)
     except AnswerPendingError as pending:
+        if pending.refusal:
+            words.print(f"the answer was refused: {pending.refusal}")
         words.print(
             f"{pending.question} waits for your answer in {pending.answer}; then go on with:\n  {_same_command()}"
         )
         if json_:
-            _print_json({"folder": str(folder), "question": str(pending.question), "answer": str(pending.answer)})
+            where = {"folder": str(folder), "question": str(pending.question), "answer": str(pending.answer)}
+            _print_json({**where, "refusal": pending.refusal})
         return
     if json_:
         _print_json({"folder": str(folder), **run.summary})
@@ -187,18 +190,25 @@ def optimize(
 def prompt_(
     task: Annotated[str | None, typer.Argument(help="A built-in task, or a YAML file.")] = None,
     after: Annotated[
-        Path | None, typer.Option(help="The prompt for the next proposal of this run; without it, of a new run.")
+        Path | None,
+        typer.Option(help="The prompt for the next proposal of this run, asked as it asks; without it, of a new run."),
     ] = None,
     number: Annotated[
         int | None, typer.Option(help="With --after: the prompt for this trial of the run, as it was then.")
     ] = None,
     space: SpaceFile = None,
-    prompt: PromptName = "plus",
-    memory: MemoryName = "none",
-    answer: AnswerName = "two-step",
-    proposals: ProposalCount = 1,
-    n_init: Annotated[int, typer.Option(help="Random trials of the new run.")] = 10,
-    seed: Annotated[int, typer.Option(help="Seed of the new run.")] = 0,
+    prompt: Annotated[
+        str | None, typer.Option(help="Prompt: plus, minus, or a template file.  [default: the run's, else plus]")
+    ] = None,
+    memory: Annotated[str | None, typer.Option(help="none or own.  [default: the run's, else none]")] = None,
+    answer: Annotated[
+        str | None, typer.Option(help="two-step, one-step, text (people).  [default: the run's, else two-step]")
+    ] = None,
+    proposals: Annotated[
+        int | None, typer.Option(help="Designs that one call asks for.  [default: the run's, else 1]")
+    ] = None,
+    n_init: Annotated[int | None, typer.Option(help="Random trials of the new run.  [default: 10]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the new run.  [default: 0]")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the answer's JSON schema instead.")] = False,
     template: Annotated[
         bool, typer.Option("--template", help="Print the template of --prompt instead, to make your own from.")
@@ -207,24 +217,44 @@ def prompt_(
 ) -> None:
     """Print exactly what would be sent to a model for TASK, or how to write a prompt of your own."""
     from armwright.llm.prompt import VARIABLES, builtin_template, load_prompt
-    from armwright.preview import preview
+    from armwright.preview import preview, preview_after
     from armwright.proposers.asking import Asking
+    from armwright.space import load_space
+    from armwright.task import load_task
 
     if variables:
         print("\n".join(f"{name}: {words}" for name, words in VARIABLES.items()))
         return
     if template:
-        print(f"{builtin_template('proposal.md.j2')}\n{{# ---- {prompt} ---- #}}\n{load_prompt(prompt).template}")
+        name = prompt or "plus"
+        print(f"{builtin_template('proposal.md.j2')}\n{{# ---- {name} ---- #}}\n{load_prompt(name).template}")
         return
-    if task is None:
-        raise SettingsError("armwright prompt needs a TASK (or --template, or --variables)")
-    asking = Asking(prompt, memory, answer, proposals)
-    shown = preview(_problem(task, space), asking, after=after, number=number, n_init=n_init, seed=seed)
+    said = {"prompt": prompt, "memory": memory, "answer": answer, "proposals": proposals}
+    wishes: dict[str, Any] = {name: value for name, value in said.items() if value is not None}
+    if after is None:
+        if task is None:
+            raise SettingsError("armwright prompt needs a TASK (or --after RUN, --template, or --variables)")
+        if number is not None:
+            raise SettingsError(f"--number {number} goes with --after RUN")
+        n_init = 10 if n_init is None else n_init
+        shown = preview(_problem(task, space), Asking(**wishes), n_init=n_init, seed=seed or 0)
+    else:
+        for option, value in (("--n-init", n_init), ("--seed", seed)):
+            if value is not None:
+                raise SettingsError(f"{option} {value} goes with a new run; {after} has its own")
+        shown = preview_after(
+            after,
+            wishes,
+            task=None if task is None else load_task(task),
+            space=None if space is None else load_space(space),
+            number=number,
+        )
     if schema:
         _print_json(shown.schema)
-    else:
-        print(shown.prompt, end="")
-        print(f"about {shown.tokens:,} tokens; for trial {shown.number}", file=sys.stderr)
+        return
+    print(shown.prompt, end="")
+    note = f"; {shown.note}" if shown.note else ""
+    print(f"about {shown.tokens:,} tokens; for trial {shown.number}{note}", file=sys.stderr)
 
 
 @app.command()

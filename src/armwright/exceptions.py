@@ -94,14 +94,16 @@ class AnswerPendingError(ArmwrightError):
     """A question lies ready for people to answer; the run goes on from there.
 
     question, answer: the files' paths.
+    refusal: why an answer that was there was not taken; empty where there was none.
     """
 
     exit_code = 0
 
-    def __init__(self, question: Path, answer: Path) -> None:
-        super().__init__(f"{question} waits for {answer}")
+    def __init__(self, question: Path, answer: Path, refusal: str = "") -> None:
+        super().__init__(f"{question} waits for {answer}" + (f"; refused: {refusal}" if refusal else ""))
         self.question = question
         self.answer = answer
+        self.refusal = refusal
 
 
 class MissingExtraError(FailureError):

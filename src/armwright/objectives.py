@@ -52,7 +52,7 @@ TORQUE = Objective(
     label="Torque",
     unit=f"N m x {TORQUE_SCALE:g}",
     symbol="E_torque",
-    words="the Euclidean norm of the joint torques that hold that posture against gravity",
+    words=f"{TORQUE_SCALE:g} times the Euclidean norm of the joint torques [N m] that hold it against gravity",
     each=_torque,
 )
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)

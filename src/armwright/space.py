@@ -45,12 +45,13 @@ class FloatParameter:
 
     def check(self, value: Any) -> float:
         """`value` as a float; DesignError where it is not a number within the range."""
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
             raise DesignError(f"{self.name} = {value!r} is not a finite number [{self.unit}]")
         if not self.low <= value <= self.high:
+            shown = exact(value) if abs(value) < 1e300 else "a huge number"  # whole numbers have no largest
             raise DesignError(
-                f"{self.name} = {value:g} {self.unit} is outside "
-                f"{self.low:g} <= {self.name} <= {self.high:g} {self.unit}"
+                f"{self.name} = {shown} {self.unit} is outside "
+                f"{exact(self.low)} <= {self.name} <= {exact(self.high)} {self.unit}"
             )
         return float(value)
 
@@ -70,6 +71,12 @@ class CategoricalParameter:
 
 
 Parameter = FloatParameter | CategoricalParameter
+
+
+def exact(value: float) -> str:
+    """A number in six digits, or in all where six do not give it back: a range must be told so that it can be met."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(float(value))
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,27 @@
 """A model's answer turned into designs: the schema it is asked for, and what is taken of what it gives.
 
 Lenient in form (numbers as text, lower-case joint letters, code fences, thoughts before the answer), strict in
-substance: the design space refuses in its own words.
+substance: nothing is guessed, and the design space refuses in its own words.
 """
 
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, cast
 
 from armwright.exceptions import DesignError
+from armwright.llm.lines import designs_in_lines, plain_number, words_of_lists
+from armwright.llm.words import one_line, without_thoughts
 from armwright.problem import Problem
-from armwright.space import CategoricalParameter, Design, DesignSpace, Parameter, ParameterValue
+from armwright.space import JOINT_WORDS, CategoricalParameter, Design, Parameter, exact
 
 LONGEST_ANSWER = 100_000  # characters; the end counts
-MOST_OBJECTS = 1000  # braces tried in a free answer
-LONGEST_REASON = 300
+MOST_OBJECTS = 1000  # braces tried in a free answer, from its end
+LONGEST_REASON = 300  # characters
+LONGEST_VALUE = 60  # characters of a value or a name that a refusal repeats
 
 
 @dataclass(frozen=True)
@@ -40,10 +44,14 @@ def answer_schema(problem: Problem, *, reasoning: bool, expected: bool, proposal
     fields: dict[str, Any] = {parameter.name: _property(parameter) for parameter in problem.space.parameters}
     if expected:
         for objective in problem.objectives:
-            words = f"the {objective.symbol} that you expect of this design, in all [{objective.unit}]"
+            words = f"the {objective.symbol} that you expect of this design, summed over all targets [{objective.unit}]"
             fields[f"expected_{objective.name}"] = {"type": "number", "description": words}
     fields["reason"] = {"type": "string", "description": "the main reason for this design, in one sentence"}
-    content = {"designs": {"type": "array", "items": _object(fields)}} if proposals > 1 else fields
+    if proposals > 1:
+        words = f"{proposals} designs, each different from the others"
+        content = {"designs": {"type": "array", "description": words, "items": _object(fields)}}
+    else:
+        content = fields
     if reasoning:
         content = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **content}
     title = "NewDesign" if proposals == 1 else "NewDesigns"
@@ -51,26 +59,21 @@ def answer_schema(problem: Problem, *, reasoning: bool, expected: bool, proposal
 
 
 def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 1) -> list[Answer]:
-    """The designs of an answer, at most `proposals`; DesignError, in the words of the design space, refuses it."""
+    """The designs of an answer, the first `proposals` if there are more.
+
+    DesignError, in the words of the design space, refuses it.
+    """
     content = {key: value for key, value in content.items() if key != "reasoning"}
     if "designs" not in content:
         return [_read(content, problem)]
     designs: Any = content["designs"]
     if not isinstance(designs, list) or not designs:
         raise DesignError("designs holds no design: a list of objects, one a design, is needed")
-    answers: list[Answer] = []
-    for number, design in enumerate(cast("list[Any]", designs)[:proposals], start=1):
-        if not isinstance(design, dict):
-            raise DesignError(f"design {number} is not an object with one value a parameter")
-        try:
-            answers.append(_read(cast("dict[str, Any]", design), problem))
-        except DesignError as refusal:
-            raise DesignError(f"design {number}: {refusal}") from refusal
-    return answers
+    return _read_all(cast("list[Any]", designs)[:proposals], problem)
 
 
 def written_answers(answers: Sequence[Answer], problem: Problem, reasoning: str = "") -> str:
-    """Answers as JSON that `read_answers` reads back to the same."""
+    """Answers as JSON that `read_text` reads back to the same."""
     designs = [_content(answer, problem) for answer in answers]
     content: dict[str, Any] = {"reasoning": reasoning} if reasoning else {}
     content.update(designs[0] if len(designs) == 1 else {"designs": designs})
@@ -78,24 +81,37 @@ def written_answers(answers: Sequence[Answer], problem: Problem, reasoning: str 
 
 
 def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
-    """The designs of an answer in free text: its last JSON object, else its last ORIGIN, JOINTS and LINKS lines."""
-    text = re.sub(r"<think>.*?</think>", "", text[-LONGEST_ANSWER:], flags=re.DOTALL)
-    names = {parameter.name for parameter in problem.space.parameters}
-    for content in _objects(text):
-        if names & content.keys() or "designs" in content:
-            return read_answers(content, problem, proposals)
-    answers = [_read(lines, problem) for lines in _named_lines(text, problem.space)[-proposals:]]
-    if not answers:
+    """The designs of an answer in free text: what comes last, of JSON objects and of ORIGIN, JOINTS and LINKS lines.
+
+    Of several designs one after the other, the last `proposals`. A JSON object that does not end is refused: what
+    stands before it was not the answer.
+    """
+    with suppress(ValueError, RecursionError):  # JSON and nothing else, such as an answer that was kept
+        content = _decoder.decode(text.strip())
+        if isinstance(content, dict):
+            return read_answers(cast("dict[str, Any]", content), problem, proposals)
+    text = without_thoughts(text)[-LONGEST_ANSWER:]
+    names = {"designs", "origin", "joints", "links", *(parameter.name for parameter in problem.space.parameters)}
+    found, broken = _objects(text, names)
+    place, lines = designs_in_lines(text)
+    if broken > max(place, found[-1][0] if found else -1):
+        raise DesignError("the last JSON object is not whole: give one value a parameter, and close its braces")
+    if lines and (not found or place > found[-1][0]):
+        return _read_all(lines[-proposals:], problem)
+    if not found:
         raise DesignError(
             "no design found: give JSON with one value a parameter, or the lines ORIGIN, JOINTS and LINKS"
         )
-    return answers
+    last = found[-1][1]
+    if "designs" in last:
+        return read_answers(last, problem, proposals)
+    return _read_all([content for _, content in found if "designs" not in content][-proposals:], problem)
 
 
 def _property(parameter: Parameter) -> dict[str, Any]:
     if isinstance(parameter, CategoricalParameter):
         return {"type": "string", "enum": list(parameter.choices)}
-    words = f"{parameter.low:g} <= {parameter.name} <= {parameter.high:g} {parameter.unit}"
+    words = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}"
     return {"type": "number", "description": words}
 
 
@@ -103,10 +119,29 @@ def _object(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "object", "properties": dict(fields), "required": list(fields), "additionalProperties": False}
 
 
+def _read_all(designs: Sequence[Any], problem: Problem) -> list[Answer]:
+    """Each design; of several, a refusal says which."""
+    answers: list[Answer] = []
+    for number, design in enumerate(designs, start=1):
+        try:
+            if not isinstance(design, Mapping):
+                raise DesignError("not an object with one value a parameter")
+            answers.append(_read(cast("Mapping[str, Any]", design), problem))
+        except DesignError as refusal:
+            if len(designs) == 1:
+                raise
+            raise DesignError(f"design {number}: {refusal}") from refusal
+    return answers
+
+
 def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
-    content = dict(content)
-    reason = " ".join(str(content.pop("reason", "")).split())[:LONGEST_REASON]
-    expected = [_number(content.pop(f"expected_{objective.name}", None)) for objective in problem.objectives]
+    content = words_of_lists({one_line(str(key), LONGEST_VALUE).lower(): value for key, value in content.items()})
+    reason = one_line(_as_text(content.pop("reason", None) or ""), LONGEST_REASON)
+    names = [f"expected_{objective.name}" for objective in problem.objectives]
+    together: Any = content.pop("expected", None)
+    if isinstance(together, (list, tuple)) and len(cast("list[Any]", together)) == len(names):
+        content |= dict(zip(names, cast("list[Any]", together), strict=True))
+    expected = [_number(content.pop(name, None)) for name in names]
     kinds = {parameter.name: parameter for parameter in problem.space.parameters}
     params = {name: _value(kinds.get(name), value) for name, value in content.items()}
     design = problem.space.design(params)
@@ -117,21 +152,39 @@ def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
 def _value(parameter: Parameter | None, value: Any) -> Any:
     """The value as the design space wants it, where only its form differs."""
     if isinstance(parameter, CategoricalParameter):
-        word = str(value).strip().strip("'\"").lower()
-        return next((choice for choice in parameter.choices if choice.lower() == word), value)
+        word = value.strip().strip("'\"").lower() if isinstance(value, str) else None
+        for choice in parameter.choices:
+            if word in (choice.lower(), JOINT_WORDS[choice].partition(",")[0]):  # pyright: ignore[reportArgumentType]
+                return choice
+        return _short(value)
     return _number(value, "" if parameter is None else parameter.unit)
 
 
 def _number(value: Any, unit: str = "") -> Any:
     """A number that was written as text (`"0.25"`, `"0.25 m"`), else the value itself."""
     if isinstance(value, int) and not isinstance(value, bool):
-        return float(value) if abs(value) < 2**63 else value
-    if isinstance(value, str):
         try:
-            return float(value.strip().removesuffix(unit).strip())
-        except ValueError:
-            return value
-    return value
+            return float(value)
+        except OverflowError:
+            return math.inf if value > 0 else -math.inf
+    if isinstance(value, str):
+        number = plain_number(value, unit)
+        return _short(value) if number is None else number
+    return _short(value)
+
+
+def _short(value: Any) -> Any:
+    """A value that will be refused, so that the refusal is one line."""
+    words = _as_text(value)
+    short = one_line(words, LONGEST_VALUE)
+    return value if short == words else short
+
+
+def _as_text(value: Any) -> str:
+    try:
+        return value if isinstance(value, str) else repr(value)
+    except RecursionError:
+        return "a list in a list in a list, and so on"
 
 
 def _content(answer: Answer, problem: Problem) -> dict[str, Any]:
@@ -141,44 +194,37 @@ def _content(answer: Answer, problem: Problem) -> dict[str, Any]:
     return {**content, "reason": answer.reason}
 
 
-def _objects(text: str) -> Iterator[dict[str, Any]]:
-    """The outermost JSON objects of a text, the last first."""
-    found: list[dict[str, Any]] = []
-    decoder, place = json.JSONDecoder(), text.find("{")
-    for _ in range(MOST_OBJECTS):
-        if place < 0:
-            break
-        try:
-            content, end = decoder.raw_decode(text, place)
-            found.append(content)
-        except (ValueError, RecursionError):
-            end = place + 1
-        place = text.find("{", end)
-    return reversed(found)
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object; a name that stands there twice with two values is refused later, as neither of them."""
+    content: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in content and content[name] != value:
+            value = f"{content[name]} and {value}"
+        content[name] = value
+    return content
 
 
-_LINE = re.compile(r"^[\s>*_#`-]*(ORIGIN|JOINTS|LINKS|REASON)[\s*_`]*[:=](.*)$", re.IGNORECASE | re.MULTILINE)
+_decoder = json.JSONDecoder(object_pairs_hook=_once)
 
 
-def _named_lines(text: str, space: DesignSpace) -> list[dict[str, ParameterValue]]:
-    """The parameters of each group of ORIGIN, JOINTS and LINKS lines, in the order of the text."""
-    groups: list[dict[str, Any]] = []
-    for match in _LINE.finditer(text):
-        name, rest = match[1].lower(), match[2]
-        if name == "origin":
-            groups.append({})
-        if not groups:
+def _objects(text: str, names: set[str]) -> tuple[list[tuple[int, dict[str, Any]]], int]:
+    """The outermost JSON objects that hold one of `names`, with their places; and the place of a broken one, or -1."""
+    # Commas too many and comments are common; blanks keep the places.
+    text = re.sub(r'//[^"\n]*$', lambda comment: " " * len(comment[0]), text, flags=re.MULTILINE)
+    text = re.sub(r",(?=\s*[}\]])", " ", text)
+    braces = [match.start() for match in re.finditer(r'\{\s*"', text)][-MOST_OBJECTS:]
+    found: list[tuple[int, dict[str, Any]]] = []
+    end, broken = 0, -1
+    for place in braces:
+        if place < end:
             continue
-        if name == "reason":
-            groups[-1]["reason"] = rest.strip()
-        elif name == "joints":
-            types = re.findall(r"[A-Za-z]+", rest)
-            letters = list(types[0]) if len(types) == 1 else types  # YPRP as one word, too
-            groups[-1].update({f"joint_{j}": kind for j, kind in enumerate(letters, start=1)})
-        else:
-            numbers = re.findall(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|inf", rest, re.IGNORECASE)
-            names = ("origin_x", "origin_y", "origin_z") if name == "origin" else None
-            for j, number in enumerate(numbers):
-                key = f"link_{j + 1}" if names is None else names[j] if j < 3 else f"origin_{j + 1}"
-                groups[-1][key] = float(number)
-    return groups
+        try:
+            content, end = _decoder.raw_decode(text, place)
+        except (ValueError, RecursionError):
+            start = text[place : place + 200].lower()
+            if any(f'"{name}"' in start for name in names):
+                broken = place
+            continue
+        if names & {str(name).lower() for name in content}:
+            found.append((place, content))
+    return found, broken

@@ -1,84 +1,133 @@
 """Past designs as a prompt shows them: docs/method.md §6."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.arm import GRAVITY
 from armwright.evaluation import Evaluation
 from armwright.history import History
+from armwright.llm.answer import LONGEST_REASON
+from armwright.llm.words import one_line
 
 N_PARETO = 5  # members of the front shown
 N_RANDOM = 5  # other finished designs shown
 AT_LIMIT = 1e-3  # [rad] from a limit, from which a joint counts as standing at it
+LARGE = 1e6  # from which on numbers are written with an exponent
 
 Record = Mapping[str, Any]
 
 
-def drawn_designs(history: History, seed: int) -> tuple[list[int], list[int]]:
-    """Numbers of members of the front, and of other finished trials, drawn without repetition."""
-    rng = np.random.default_rng(seed)
-    front = [member.number for member in history.front]
-    others = [trial.number for trial in history if trial.number not in set(front)]
-    return _draw(front, N_PARETO, rng), _draw(others, N_RANDOM, rng)
+@dataclass(frozen=True)
+class Digits:
+    """Decimals that numbers are shown with: three, or more where a problem's own scale is small."""
+
+    length: int
+    torque: int
+    objectives: tuple[int, ...]
+
+    @classmethod
+    def of(cls, history: History) -> "Digits":
+        """By the space's longest arm, and by the largest objectives so far."""
+        space = history.problem.space
+        reach = space.joints * space.link[1]
+        heaviest = GRAVITY * reach * space.joints * space.mass.mass(space.link[1])  # [N m], more than any torque
+        largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
+        return cls(
+            max(3, _decimals(space.link[1])),
+            max(1, _decimals(heaviest / 2)),
+            tuple(max(3, _decimals(v)) for v in largest),
+        )
 
 
-def design_records(history: History, numbers: Sequence[int], targets: Sequence[int]) -> list[Record]:
-    """For each design its parameters, and what came of it at `targets` (places in the task's list), as text."""
-    if not numbers:
-        return []
-    evaluation = history.evaluation(numbers)
-    each = np.stack([objective.each(evaluation) for objective in history.problem.objectives], axis=-1)  # (n, T, M)
-    shown = list(targets)
-    return [
-        {
-            **_parameters(history, number),
-            "e_each": points(each[row, shown]),
-            "p_ik": points(evaluation.reached[row, shown]),
-            "tau_ik": points(evaluation.joint_torques[row, shown], digits=4),
-            "limits": _limits(history, evaluation, row),
+class Feedback:
+    """Members of the front and other finished designs, drawn by `seed`, as text.
+
+    front, others: numbers of the trials; of the front by its first objective, else in the order of the run.
+    """
+
+    def __init__(self, history: History, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        front = [member.number for member in history.front]
+        others = [trial.number for trial in history if trial.number not in set(front)]
+        self.front = _draw(front, N_PARETO, rng)
+        self.others = _draw(others, N_RANDOM, rng)
+        self._history = history
+        self.digits = Digits.of(history)
+        numbers = [*self.front, *self.others]
+        if numbers:
+            self._evaluation = history.evaluation(numbers)
+            objectives = history.problem.objectives
+            self._each = np.stack([objective.each(self._evaluation) for objective in objectives], axis=-1)  # (n, T, M)
+
+    def records(self, numbers: Sequence[int], targets: Sequence[int]) -> list[Record]:
+        """For each of these designs its parameters, and what came of it at `targets` (places in the task's list)."""
+        return [self._record(number, list(targets)) for number in numbers]
+
+    def _record(self, number: int, shown: list[int]) -> Record:
+        row = [*self.front, *self.others].index(number)
+        evaluation, at = self._evaluation, self.digits
+        return {
+            **_parameters(self._history, number, at.length),
+            "e_each": points(self._each[row, shown], at.objectives),
+            "p_ik": points(evaluation.reached[row, shown], at.length),
+            "tau_ik": points(evaluation.joint_torques[row, shown], at.torque),
+            "limits": _limits(self._history, evaluation, row),
             "load": _load(evaluation.joint_torques[row]),
-            "e_all": vector(history.trials[number].values),
+            "e_all": vector(self._history.trials[number].values, at.objectives),
         }
-        for row, number in enumerate(numbers)
-    ]
 
 
 def proposal_records(history: History, name: str) -> list[Record]:
     """The earlier designs of the proposer `name`: what it expected, what came out, and its reason."""
     front = {member.number for member in history.front}
+    at = Digits.of(history)
     return [
         {
-            **_parameters(history, trial.number),
-            "expected": "not said" if trial.expected is None else vector(trial.expected),
-            "e_all": vector(trial.values),
+            **_parameters(history, trial.number, at.length),
+            "expected": "not said" if trial.expected is None else vector(trial.expected, at.objectives),
+            "e_all": vector(trial.values, at.objectives),
             "on_front": trial.number in front,
-            "reason": trial.reason or "not said",
+            "reason": one_line(trial.reason, LONGEST_REASON) or "not said",
         }
         for trial in history
         if trial.source == name
     ]
 
 
-def points(rows: NDArray[np.float64], digits: int = 3) -> str:
+def points(rows: NDArray[np.float64], decimals: int | Sequence[int] = 3) -> str:
     """Rows of numbers as text."""
-    return "[" + ", ".join(vector(row, digits) for row in rows) + "]"
+    return "[" + ", ".join(vector(row, decimals) for row in rows) + "]"
 
 
-def vector(values: Sequence[float] | NDArray[np.float64], digits: int = 3) -> str:
-    """Numbers as text."""
-    # + 0.0 turns -0.0 into 0.0
-    return "(" + ", ".join(f"{round(float(value), digits) + 0.0:.{digits}f}" for value in values) + ")"
+def vector(values: Sequence[float] | NDArray[np.float64], decimals: int | Sequence[int] = 3) -> str:
+    """Numbers as text, with so many decimals (each)."""
+    each = [decimals] * len(values) if isinstance(decimals, int) else decimals
+    return "(" + ", ".join(_number(float(value), n) for value, n in zip(values, each, strict=True)) + ")"
 
 
-def _parameters(history: History, number: int) -> dict[str, Any]:
+def _number(value: float, decimals: int) -> str:
+    if not abs(value) < LARGE:
+        return f"{value:.4g}"
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"  # + 0.0 turns -0.0 into 0.0
+
+
+def _decimals(scale: float) -> int:
+    """That show three digits of a number of this size."""
+    return min(12, 2 - math.floor(math.log10(scale))) if scale > 0.0 else 3
+
+
+def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
     design = history.trials[number].design
     return {
         "number": number,
-        "origin": vector(design.origin),
+        "origin": vector(design.origin, decimals),
         "joints": "(" + ", ".join(design.joints) + ")",
-        "links": vector(design.links),
+        "links": vector(design.links, decimals),
     }
 
 
@@ -97,11 +146,15 @@ def _limits(history: History, evaluation: Evaluation, row: int) -> str:
 def _load(torques: NDArray[np.float64]) -> str:
     """Each joint's share of the torques' absolute sum over the targets; torques: (T, D) [N m]."""
     carried = np.abs(torques).sum(axis=0)
-    shares = 100.0 * carried / max(float(carried.sum()), 1e-12)
+    if not carried.any():
+        return "no torque at any joint"
+    shares = 100.0 * carried / carried.sum()
     return ", ".join(f"joint_{j + 1} {share:.0f} %" for j, share in enumerate(shares))
 
 
 def _draw(numbers: Sequence[int], n: int, rng: np.random.Generator) -> list[int]:
+    """`n` of the numbers, without repetition, in their order."""
     if len(numbers) <= n:
         return list(numbers)
-    return sorted(rng.choice(np.array(numbers), size=n, replace=False).tolist())
+    places = rng.choice(len(numbers), size=n, replace=False)
+    return [numbers[place] for place in sorted(places.tolist())]

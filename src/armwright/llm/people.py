@@ -3,15 +3,16 @@
 import os
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import AnswerPendingError, DesignError, FailureError
-from armwright.llm.answer import LONGEST_ANSWER
 from armwright.llm.speaker import CallError, Question, Reply, Speaker, TextReader
 
 LOOK_EVERY = 0.5  # [s]
+ENDINGS = ("md", "json", "txt")  # of an answer's file
+LARGEST_FILE = 10_000_000  # characters
 
 
 class People(Speaker):
@@ -50,21 +51,24 @@ class People(Speaker):
         started = time.perf_counter()
         number = f"{int(question.proposal.rpartition('-')[2]):03d}"
         asked = self.folder / f"{number}-prompt.md"
-        self._ask(asked, question.prompt)
+        answers = [self.folder / f"{number}-answer.{ending}" for ending in ENDINGS]
+        self._ask(asked, answers, question.prompt)
+        refused = ""
         while True:
-            answer = self._answer_file(number)
+            answer = next(filter(self._is_ready, answers), None)
             if answer is not None:
-                text = self._read(answer)
                 try:
-                    return Reply(read(text), requests=1, seconds=time.perf_counter() - started)
+                    return Reply(read(self._read(answer)), requests=1, seconds=time.perf_counter() - started)
                 except DesignError as refusal:
-                    self._refuse(number, answer, str(refusal))
+                    refused = str(refusal)
+                    self._refuse(number, answer, refused)
+                    continue  # another file may hold another answer
             if not self.wait:
-                raise AnswerPendingError(asked, self.folder / f"{number}-answer.md")
+                raise AnswerPendingError(asked, answers[0], refused)
             if self._cancelled.wait(LOOK_EVERY):
                 raise CallError("cancelled", "the wait for an answer was ended", Reply(""))
 
-    def _ask(self, file: Path, prompt: str) -> None:
+    def _ask(self, file: Path, answers: Sequence[Path], prompt: str) -> None:
         if os.path.isfile(file):
             if self._read(file) == prompt:
                 return
@@ -72,24 +76,24 @@ class People(Speaker):
                 f"{file} holds a question of another run, or of another version; give an empty folder, or move "
                 f"{file.name} and its answer away"
             )
+        early = next((answer for answer in answers if answer.exists()), None)
+        if early is not None:
+            raise FailureError(f"{early} lies there before its question; give an empty folder, or move it away")
         self._write(file, prompt)
 
-    def _answer_file(self, number: str) -> Path | None:
-        """The answer, once it has something in it and, where there is time to look twice, rests."""
-        for ending in ("md", "json", "txt"):
-            file = self.folder / f"{number}-answer.{ending}"
-            if os.path.isfile(file):
-                found = file.stat()
-                now = found.st_size, found.st_mtime_ns
-                before, self._seen[file] = self._seen.get(file), now
-                if now[0] and (before == now or not self.wait):
-                    return file
-        return None
+    def _is_ready(self, answer: Path) -> bool:
+        """Whether the answer has something in it and, where there is time to look twice, rests."""
+        if not os.path.isfile(answer):
+            return False
+        found = answer.stat()
+        now = found.st_size, found.st_mtime_ns
+        before, self._seen[answer] = self._seen.get(answer), now
+        return now[0] > 0 and (before == now or not self.wait)
 
     def _read(self, file: Path) -> str:
         try:
             with open(file, encoding="utf-8-sig", errors="replace") as content:
-                return content.read(LONGEST_ANSWER)
+                return content.read(LARGEST_FILE)
         except OSError as fault:
             raise FailureError(f"cannot read {file}: {fault.strerror or fault}") from fault
 

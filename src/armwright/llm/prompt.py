@@ -2,20 +2,23 @@
 
 import os
 import re
-from collections.abc import Sequence
+import traceback
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError, TemplateSyntaxError, meta
-from jinja2.sandbox import ImmutableSandboxedEnvironment
+from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 
+from armwright.arm import GRAVITY
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.history import History
 from armwright.kinematics.solve import UPDATES
-from armwright.llm.feedback import Record, design_records, drawn_designs, points, proposal_records, vector
+from armwright.llm.feedback import Feedback, Record, points, proposal_records, vector
+from armwright.llm.sandbox import Sandbox
+from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.problem import Problem
 from armwright.space import JOINT_WORDS
 
@@ -27,13 +30,17 @@ Form = Literal["text", "then-schema", "schema"]  # of the answer: free; free, an
 MOST_TOKENS = 12_000  # of a prompt; beyond it fewer targets, designs and earlier proposals are shown
 MOST_TARGETS, FEWEST_TARGETS = 64, 4  # shown
 MOST_PROPOSED, FEWEST_PROPOSED = 20, 4  # earlier proposals shown
-LARGEST_TEMPLATE = 256 * 1024  # characters
+LONGEST_DESCRIPTION = 2_000  # characters of a task's description
+LONGEST_ANALYSIS = 40_000  # characters of a free answer that the second call reads; the end counts
+LARGEST_TEMPLATE = 256 * 1024  # [bytes]
 
 # What a template may use; the answer to `armwright prompt --variables`.
 VARIABLES = {
     "space": "the design space: joints, joint_types, joint_range, origin_x, origin_y, origin_z, link, mass_note",
     "joint_words": "what each joint type is, by its letter",
-    "task": "the task: name, description",
+    "gravity": "[m/s²], along -z",
+    "task": "the task: name, and more",
+    "description": "what the task says of itself, on one line",
     "targets": "the target points as text; n_targets_shown of n_targets",
     "n_targets": "how many targets the task has",
     "n_targets_shown": "how many of them are listed",
@@ -44,7 +51,8 @@ VARIABLES = {
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
     "n_front": "how many of them are Pareto-optimal",
-    "front": "some members of the front: number, origin, joints, links, e_each, p_ik, tau_ik, limits, load, e_all",
+    "front": "members of the front, by rising first objective: number, origin, joints, links, e_each, p_ik, tau_ik, "
+    "limits, load, e_all",
     "others": "some other designs, with the same",
     "proposed": "--memory own: earlier proposals: number, origin, joints, links, expected, e_all, on_front, reason",
     "n_proposed": "how many proposals there were",
@@ -64,10 +72,22 @@ class Prompt:
     def __post_init__(self) -> None:
         """SettingsError where the template cannot be read."""
         try:
-            used = meta.find_undeclared_variables(_environment().parse(self.template))
+            tree = _sandbox().parse(self.template)
+            _sandbox().from_string(self.template)  # filters and tests, too
         except TemplateSyntaxError as fault:
             raise SettingsError(f"prompt {self.name}, line {fault.lineno}: {fault.message}") from fault
-        for name in sorted(used - VARIABLES.keys()):
+        except RecursionError as fault:
+            raise SettingsError(f"prompt {self.name} is nested too deeply") from fault
+        known = {**VARIABLES, **_sandbox().globals}
+        for other in set(meta.find_referenced_templates(tree)) - {None}:
+            there = _sandbox().list_templates()
+            if other not in there:
+                raise SettingsError(
+                    f'prompt {self.name} uses the template "{other}", which does not exist.'
+                    f"{did_you_mean(str(other), there)} Templates: {', '.join(there)}"
+                )
+            known |= dict.fromkeys(_exported(str(other)))
+        for name in sorted(meta.find_undeclared_variables(tree) - known.keys()):
             raise SettingsError(
                 f'prompt {self.name} uses "{name}", which does not exist.{did_you_mean(name, VARIABLES)} '
                 f"Names: {', '.join(VARIABLES)}"
@@ -88,25 +108,38 @@ class Prompt:
         memory: "own" shows the earlier proposals of the proposer `name`, too.
         proposals: how many designs are asked for.
 
-        At most about MOST_TOKENS long: of more targets, designs and proposals fewer are shown.
+        At most about MOST_TOKENS long, unless a template's own words are longer: of more targets, designs and
+        proposals fewer are shown.
         """
         proposed = proposal_records(history, name) if memory == "own" else []
-        numbers = drawn_designs(history, seed)
+        feedback = Feedback(history, seed)
         common = _common(history, memory, proposals, form) | {"n_proposed": len(proposed)}
-        most = MOST_TARGETS, len(numbers[0]) + len(numbers[1]), MOST_PROPOSED
+        most = MOST_TARGETS, max(len(feedback.front), len(feedback.others)), MOST_PROPOSED
         while True:
-            text = self._render({**common, **_shown(history, numbers, proposed, *most)})
+            text = self._render({**common, **_shown(history, feedback, proposed, *most)})
             fewer = _fewer(*most)
             if estimated_tokens(text) <= MOST_TOKENS or fewer == most:
                 return text
             most = fewer
 
-    def _render(self, values: dict[str, Any]) -> str:
+    def _render(self, values: Mapping[str, Any]) -> str:
+        sandbox = _sandbox()
         try:
-            text = _environment().from_string(self.template).render(values)
-        except (TemplateError, TypeError, ValueError, ArithmeticError, LookupError, AttributeError) as fault:
-            raise SettingsError(f"prompt {self.name} cannot be rendered: {' '.join(str(fault).split())}") from fault
-        return _tidy(text)
+            return _tidy(sandbox.rendered(sandbox.from_string(self.template), values))
+        except _FAULTS as fault:
+            line = next(
+                (f.lineno for f in reversed(traceback.extract_tb(fault.__traceback__)) if f.filename == "<template>"),
+                None,
+            )
+            where = "" if line is None else f", line {line}"
+            words = one_line(str(fault), 300) or type(fault).__name__
+            raise SettingsError(f"prompt {self.name}{where} cannot be rendered: {words}") from fault
+
+
+# What a template can run into.
+_FAULTS = (
+    TemplateError, TypeError, ValueError, ArithmeticError, LookupError, AttributeError, RecursionError, MemoryError
+)  # fmt: skip
 
 
 def load_prompt(name: str | Path) -> Prompt:
@@ -114,52 +147,64 @@ def load_prompt(name: str | Path) -> Prompt:
     if str(name) in PROMPTS:
         return Prompt(str(name), builtin_template(f"{name}.md.j2"))
     path = Path(name)
+    if os.path.isdir(path):
+        raise SettingsError(f"prompt {path} is a folder, not a template file")
     if not os.path.isfile(path):
         raise SettingsError(
             f'unknown prompt "{name}".{did_you_mean(str(name), PROMPTS)} Prompts: {", ".join(PROMPTS)}, or a file'
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        if path.stat().st_size > LARGEST_TEMPLATE:
+            raise SettingsError(f"{path} is larger than {LARGEST_TEMPLATE // 1024} KiB; that is no prompt")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as fault:
         raise SettingsError(f"cannot read {path}: {fault.strerror or fault}") from fault
     except UnicodeDecodeError as fault:
         raise SettingsError(f"{path} is not a text file in UTF-8") from fault
-    if len(text) > LARGEST_TEMPLATE:
-        raise SettingsError(f"{path} is larger than {LARGEST_TEMPLATE // 1024} KiB; that is no prompt")
-    return Prompt(path.name, text)
+    # A file that is called as a prompt of ours must not pass for it.
+    return Prompt(path.name if path.name not in PROMPTS else f"./{path.name}", text)
 
 
 def builtin_template(name: str) -> str:
     """The text of a template that comes with armwright."""
-    loader = _environment().loader
+    loader = _sandbox().loader
     assert loader is not None
-    return loader.get_source(_environment(), name)[0]
+    return loader.get_source(_sandbox(), name)[0]
 
 
 def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expected: bool = False) -> str:
     """The prompt of the second call: the free answer turned into parameters."""
-    template = _environment().get_template("parameters.md.j2")
-    values = {"parameters": problem.space.parameters, "proposals": proposals, "expected": expected, "answer": answer}
-    return _tidy(template.render(values))
+    answer = end_of(without_thoughts(answer).strip() or answer, LONGEST_ANALYSIS)
+    values = {
+        "parameters": problem.space.parameters,
+        "symbols": " and ".join(objective.symbol for objective in problem.objectives),
+        "proposals": proposals,
+        "expected": expected,
+        "answer": answer,
+        "fence": fence(answer),
+    }
+    return _tidy(_sandbox().rendered(_sandbox().get_template("parameters.md.j2"), values))
 
 
 def estimated_tokens(text: str) -> int:
     """About how many tokens a model makes of a text: words in pieces of 5 letters, numbers in pieces of 3 digits."""
-    return len(re.findall(r"\d{1,3}|[^\W\d_]{1,5}|[^\w\s]|_", text))
+    return len(re.findall(r"[0-9]{1,3}|[A-Za-z]{1,5}|\S", text))
 
 
 def _common(history: History, memory: str, proposals: int, form: Form) -> dict[str, Any]:
     problem = history.problem
+    reference = history.reference_point
     return {
         "space": problem.space,
         "joint_words": JOINT_WORDS,
+        "gravity": GRAVITY,
         "task": problem.task,
+        "description": one_line(problem.task.description, LONGEST_DESCRIPTION),
         "n_targets": len(problem.task.points),
-        "target_low": vector(problem.task.points.min(axis=0)),
-        "target_high": vector(problem.task.points.max(axis=0)),
         "updates": UPDATES,
         "objectives": problem.objectives,
-        "reference_point": history.reference_point,
+        # A task states two numbers; a problem with other objectives has no use for them.
+        "reference_point": reference if reference and len(reference) == len(problem.objectives) else None,
         "n_finished": len(history),
         "n_front": len(history.front),
         "proposals": proposals,
@@ -170,22 +215,24 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
 
 def _shown(
     history: History,
-    numbers: tuple[list[int], list[int]],
+    feedback: Feedback,
     proposed: Sequence[Record],
     most_targets: int,
     most_designs: int,
     most_proposed: int,
 ) -> dict[str, Any]:
-    """Targets, designs and earlier proposals, at most so many of each."""
-    points_ = history.problem.task.points
+    """At most so many targets, designs of the front, other designs, and earlier proposals."""
+    points_, decimals = history.problem.task.points, feedback.digits.length
     shown = spread(len(points_), most_targets)
-    others = numbers[1][: most_designs // 2]
-    front = numbers[0][: most_designs - len(others)]
+    front = [feedback.front[place] for place in spread(len(feedback.front), most_designs)]
+    others = [feedback.others[place] for place in spread(len(feedback.others), most_designs)]
     return {
-        "targets": points(points_[shown]),
+        "targets": points(points_[shown], decimals),
+        "target_low": vector(points_.min(axis=0), decimals),
+        "target_high": vector(points_.max(axis=0), decimals),
         "n_targets_shown": len(shown),
-        "front": design_records(history, front, shown),
-        "others": design_records(history, others, shown),
+        "front": feedback.records(front, shown),
+        "others": feedback.records(others, shown),
         "proposed": proposed[-most_proposed:],
     }
 
@@ -207,10 +254,13 @@ def _tidy(text: str) -> str:
     return re.sub(r"\n{3,}", "\n\n", re.sub(r"[ \t]+\n", "\n", text)).strip() + "\n"
 
 
+def _exported(template: str) -> set[str]:
+    """What a template that another extends gives to its blocks: macros, and names set at its top."""
+    tree = _sandbox().parse(builtin_template(template))
+    macros = {node.name for node in tree.find_all(nodes.Macro)}
+    return macros | {str(node.target.name) for node in tree.body if isinstance(node, nodes.Assign)}  # pyright: ignore
+
+
 @cache
-def _environment() -> Environment:
-    # A sandbox, because templates are files that people pass on. The output is a prompt, not a page: nothing is
-    # to be escaped.
-    return ImmutableSandboxedEnvironment(
-        loader=PackageLoader("armwright.llm"), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+def _sandbox() -> Sandbox:
+    return Sandbox("armwright.llm")

@@ -35,8 +35,8 @@ class ReplayProposer(AskingProposer):
             raise ReplayError(f"{file} holds no proposal")
         name = next(call.proposal for call in calls if call.proposal).rpartition("-")[0]
         recorded = read_config(folder) if (folder / CONFIG).is_file() else None
-        prompt, recorded_asking = _recorded_asking(recorded)
-        super().__init__(Recording(calls, file, strict), asking or recorded_asking, name, prompt=prompt)
+        prompt, then = recorded_asking(recorded)
+        super().__init__(Recording(calls, file, strict), asking or then, name, prompt=prompt)
         self.recording: Recording = self.speaker  # pyright: ignore[reportAttributeAccessIssue]
         self._trials = _recorded_trials(folder, recorded)
 
@@ -89,7 +89,8 @@ class ReplayProposer(AskingProposer):
         )
 
 
-def _recorded_asking(config: RunConfig | None) -> tuple[Prompt | None, Asking]:
+def recorded_asking(config: RunConfig | None) -> tuple[Prompt | None, Asking]:
+    """How the proposer of a run asked, and its prompt where that was a template of the user's own."""
     settings = config.method.proposer if config is not None else None
     if not settings or "prompt" not in settings:
         return None, Asking()
