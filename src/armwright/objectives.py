@@ -44,7 +44,7 @@ POSITION_ERROR = Objective(
     label="Position error",
     unit="m",
     symbol="E_pos",
-    words="the distance between the tip and the target in that posture",
+    words="the distance between the tip and the target in the kept posture",
     each=_position_error,
 )
 TORQUE = Objective(
@@ -52,7 +52,8 @@ TORQUE = Objective(
     label="Torque",
     unit=f"N m x {TORQUE_SCALE:g}",
     symbol="E_torque",
-    words=f"{TORQUE_SCALE:g} times the Euclidean norm of the joint torques [N m] that hold it against gravity",
+    words=f"{TORQUE_SCALE:g} times the Euclidean norm of the joint torques [N m] that hold the kept posture up against "
+    "gravity",
     each=_torque,
 )
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)

@@ -18,6 +18,7 @@ N_PARETO = 5  # members of the front shown
 N_RANDOM = 5  # other finished designs shown
 AT_LIMIT = 1e-3  # [rad] from a limit, from which a joint counts as standing at it
 LARGE = 1e6  # from which on numbers are written with an exponent
+NOISE = 1e-9  # below it a number counts as 0
 
 Record = Mapping[str, Any]
 
@@ -37,10 +38,11 @@ class Digits:
         reach = space.joints * space.link[1]
         heaviest = GRAVITY * reach * space.joints * space.mass.mass(space.link[1])  # [N m], more than any torque
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
+        rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres
         return cls(
             max(3, _decimals(space.link[1])),
-            max(1, _decimals(heaviest / 2)),
-            tuple(max(3, _decimals(v)) for v in largest),
+            max(2, _decimals(heaviest / 2)),
+            tuple(max(3, _decimals(v)) for v in rough),
         )
 
 
@@ -118,7 +120,7 @@ def _number(value: float, decimals: int) -> str:
 
 def _decimals(scale: float) -> int:
     """That show three digits of a number of this size."""
-    return min(12, 2 - math.floor(math.log10(scale))) if scale > 0.0 else 3
+    return 2 - math.floor(math.log10(scale)) if scale > NOISE else 3
 
 
 def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:

@@ -1,0 +1,98 @@
+"""Problems whose evaluation is a simple formula, the same on every machine; and histories of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armwright.evaluation import Evaluation
+from armwright.history import FinishedTrial, History
+from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
+from armwright.pareto import default_reference_point
+from armwright.problem import Problem
+from armwright.space import Design, DesignSpace, paper_space
+from armwright.task import Task
+
+
+class FixedProblem(Problem):
+    """The tip comes a part of the way to each target; joint j turns by j steps; torques fall from base to tip."""
+
+    def evaluation(self, designs: Sequence[Design]) -> Evaluation:
+        targets = self.task.points
+        n, t, d = len(designs), len(targets), self.space.joints
+        reach = np.array([sum(design.links) for design in designs])
+        base = np.array([design.origin for design in designs]).reshape(n, 3)
+        away = targets[None] - base[:, None]  # (N, T, 3)
+        distance = np.linalg.norm(away, axis=-1)
+        part = np.minimum(1.0, reach[:, None] / np.maximum(distance, 1e-9))
+        reached = base[:, None] + part[..., None] * away
+        lower, upper = self.space.joint_range
+        steps = 0.4 * np.arange(1, d + 1) * (1 + np.arange(t)[:, None] % 3) - 1.5  # (T, D)
+        q = np.broadcast_to(np.clip(steps, lower, upper), (n, t, d)).copy()
+        mass = self.space.joints * self.space.mass.mass(self.space.link[1])
+        lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
+        torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
+        return Evaluation(targets, q, reached, np.linalg.norm(reached - targets, axis=-1), torques)
+
+
+class OneObjective(FixedProblem):
+    objectives = (POSITION_ERROR,)
+
+
+LENGTH = Objective(
+    name="length",
+    label="Length",
+    unit="m",
+    symbol="E_length",
+    words="the distance of the tip from the world's origin, which stands for the room that the arm takes",
+    each=lambda evaluation: np.linalg.norm(evaluation.reached, axis=-1),
+)
+
+
+class ThreeObjectives(FixedProblem):
+    objectives = (*PAPER_OBJECTIVES, LENGTH)
+
+
+def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Sequence[FinishedTrial] = ()) -> History:
+    """`n` designs at random, then the given proposals (their numbers and values are filled in)."""
+    designs = [*problem.space.sample(n, seed=1), *(trial.design for trial in proposals)]
+    values = problem.evaluate(designs)
+    reference = problem.reference_point
+    if reference is None and len(designs) >= n_init and values.shape[1] == 2:
+        reference = default_reference_point(values[:n_init])
+    trials = [
+        FinishedTrial(number, "random" if number < n_init else "bbo", design, tuple(row))
+        for number, (design, row) in enumerate(zip(designs, values.tolist(), strict=True))
+    ]
+    for place, trial in enumerate(proposals, start=n):
+        trials[place] = FinishedTrial(
+            place, "llm", trial.design, trials[place].values, f"llm-{place:04d}", trial.reason, trial.expected
+        )
+    return History(problem, trials, n_init, reference)
+
+
+def proposal(design: Design, reason: str = "", expected: tuple[float, ...] | None = None) -> FinishedTrial:
+    return FinishedTrial(0, "llm", design, (), reason=reason, expected=expected)
+
+
+SIX_AXIS = DesignSpace(
+    name="six-axis",
+    joints=6,
+    joint_types=("Y", "P"),
+    joint_range=(-2.8, 2.0),
+    origin_x=(-0.25, 0.75),
+    origin_y=(0.0, 0.0),
+    origin_z=(0.125, 0.125),
+    link=(0.05, 0.4),
+    mass={"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},  # type: ignore[arg-type]
+)
+ONE_JOINT = paper_space(1).model_copy(update={"joint_types": ("P",), "link": (0.2, 0.2)})
+TWO_JOINTS = paper_space(2)
+SMALL = paper_space(2).model_copy(
+    update={"link": (0.0005, 0.004), "origin_x": (-0.001, 0.001), "origin_y": (-0.001, 0.001), "origin_z": (0, 1 / 3)}
+)
+
+
+def grid_task(n: int, name: str = "grid", **more: object) -> Task:
+    """`n` points in rows of ten, without a reference point unless one is given."""
+    points = tuple((0.3 + 0.02 * (i % 10), 0.05 * (i // 10), 0.4 + 0.01 * (i % 7)) for i in range(n))
+    return Task(name=name, targets=points, **more)  # type: ignore[arg-type]
