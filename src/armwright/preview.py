@@ -132,8 +132,9 @@ def _next(config: RunConfig, history: History, asked: Mapping[int, int], unused:
     before = number - len(history)
     if not before:
         return number, ""
+    trials = "1 trial comes" if before == 1 else f"{before} trials come"
     designs = f", {unused} of them of the calls so far" if unused else ""
-    return number, f"{before} trials come before it{designs}, and will be in it"
+    return number, f"{trials} before it{designs}, and will be in it"
 
 
 def _schedule(config: RunConfig) -> Schedule:

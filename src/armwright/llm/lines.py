@@ -20,7 +20,7 @@ _ITEM = re.compile(rf"({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
 _NAMED = re.compile(rf"((?:origin|link)_\w+)\s*[:=]\s*({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
 _NAMES_ALONE = re.compile(r"\((?:(?:origin|link|joint)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE)
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
-_LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ])")
+_LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
 _LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # what may stand between values
 
 # At the beginning of a line in any form of list or emphasis; in capitals, also further on in it.
@@ -48,7 +48,7 @@ def designs_in_lines(text: str) -> tuple[int, list[dict[str, Any]]]:
         if designs:
             for key, value in values.items():
                 before = designs[-1].setdefault(key, value)
-                if before != value and name in GROUPS:  # neither of the two, then
+                if repr(before) != repr(value) and name in GROUPS:  # neither of the two, then
                     designs[-1][key] = f"{before} and {value}"
     return last, designs
 
@@ -76,8 +76,8 @@ def plain_number(text: str, unit: str = "") -> float | None:
 def _named(text: str) -> Iterator[tuple[int, str, str]]:
     """Each name with its place and the words after it: of its line, or of the next where its own has none."""
     names = list(_NAME.finditer(text))
-    for match, following in zip(names, [*names[1:], None], strict=True):
-        end = len(text) if following is None else following.start()
+    ends = [*(match.start() for match in names[1:]), len(text)]
+    for match, end in zip(names, ends, strict=False):  # without a name there is one end too many
         lines = text[match.end() : end].lstrip(" \t*_`").lstrip("\n").splitlines()
         yield match.start(), (match["first"] or match["later"]).lower(), lines[0] if lines else ""
 

@@ -78,7 +78,7 @@ class Prompt:
             raise SettingsError(f"prompt {self.name}, line {fault.lineno}: {fault.message}") from fault
         except RecursionError as fault:
             raise SettingsError(f"prompt {self.name} is nested too deeply") from fault
-        known = {**VARIABLES, **_sandbox().globals}
+        known = {*VARIABLES, *_sandbox().globals, *_exported(tree)}
         for other in set(meta.find_referenced_templates(tree)) - {None}:
             there = _sandbox().list_templates()
             if other not in there:
@@ -86,8 +86,8 @@ class Prompt:
                     f'prompt {self.name} uses the template "{other}", which does not exist.'
                     f"{did_you_mean(str(other), there)} Templates: {', '.join(there)}"
                 )
-            known |= dict.fromkeys(_exported(str(other)))
-        for name in sorted(meta.find_undeclared_variables(tree) - known.keys()):
+            known |= _exported(_sandbox().parse(builtin_template(str(other))))
+        for name in sorted(meta.find_undeclared_variables(tree) - known):
             raise SettingsError(
                 f'prompt {self.name} uses "{name}", which does not exist.{did_you_mean(name, VARIABLES)} '
                 f"Names: {', '.join(VARIABLES)}"
@@ -254,11 +254,12 @@ def _tidy(text: str) -> str:
     return re.sub(r"\n{3,}", "\n\n", re.sub(r"[ \t]+\n", "\n", text)).strip() + "\n"
 
 
-def _exported(template: str) -> set[str]:
-    """What a template that another extends gives to its blocks: macros, and names set at its top."""
-    tree = _sandbox().parse(builtin_template(template))
+def _exported(tree: nodes.Template) -> set[str]:
+    """What a template gives to its blocks, and to those of templates that extend it: macros, and names it sets."""
     macros = {node.name for node in tree.find_all(nodes.Macro)}
-    return macros | {str(node.target.name) for node in tree.body if isinstance(node, nodes.Assign)}  # pyright: ignore
+    return macros | {
+        node.target.name for node in tree.body if isinstance(node, nodes.Assign) and isinstance(node.target, nodes.Name)
+    }
 
 
 @cache

@@ -12,7 +12,7 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from armwright.space import exact
 
 LARGEST_PROMPT = 1_000_000  # characters
-MOST_STEPS = 200_000  # rounds of loops and calls of macros in one prompt
+MOST_STEPS = 100_000  # rounds of loops and calls of macros in one prompt
 
 
 class _CountingGenerator(CodeGenerator):
