@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from armwright.cli import app
-from armwright.exceptions import ArmwrightError
+from armwright.exceptions import ArmwrightError, RunConflictError
 from armwright.llm.prompt import VARIABLES
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem import Problem
@@ -176,3 +176,15 @@ def test_a_mistake_in_a_template_is_one_line_on_stderr(in_folder: Path) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("armwright: prompt own.md, line 1 cannot be rendered: access to attribute")
     assert done.stderr.count("\n") == 1
+
+
+def test_another_template_for_the_same_run_is_refused_in_one_line(chat_server: ChatServer, in_folder: Path) -> None:
+    own = in_folder / "own.md"
+    for text in (OWN, OWN.replace("Only", "\n".join("Just"))):
+        own.write_text(text, encoding="utf-8")
+        if text == OWN:
+            run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, str(own)))
+    with pytest.raises(RunConflictError, match=r"proposer\.template: .* there, .* asked") as refusal:
+        run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, str(own)))
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 400

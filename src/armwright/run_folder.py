@@ -295,7 +295,9 @@ def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
     """RunConflictError where `asked` is another run than the one that lies there; a larger n_total is the same."""
     old, new = _identity(there), _identity(asked)
     differences = [
-        f"{key}: {old.get(key)} there, {new.get(key)} asked" for key in {**old, **new} if old.get(key) != new.get(key)
+        f"{key}: {_brief(old.get(key))} there, {_brief(new.get(key))} asked"
+        for key in {**old, **new}
+        if old.get(key) != new.get(key)
     ]
     if asked.method.n_total < there.method.n_total:
         differences.append(f"n_total: {there.method.n_total} there, {asked.method.n_total} asked (it can only grow)")
@@ -304,6 +306,12 @@ def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
             f"{path} holds a run with other settings ({'; '.join(differences)}). "
             "Give another --out DIR, or the same settings"
         )
+
+
+def _brief(value: Any) -> str:
+    """A setting on one line; a prompt of the user's own is a whole page."""
+    text = " ".join(str(value).split())
+    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _identity(config: RunConfig) -> dict[str, Any]:
