@@ -109,6 +109,11 @@ class Chat(Speaker):
         if seed is not None:
             self._settings["seed"] = seed
         self._pending: set[Future[Any]] = set()
+        self._cancelled = False
+
+    def begin(self) -> None:
+        """A session begins."""
+        self._cancelled = False
 
     def check(self) -> Reply:
         """One tiny question, so that a wrong name, key or address is known before any work is done."""
@@ -139,7 +144,8 @@ class Chat(Speaker):
         return replace(self._run(agent, question, CALL_SECONDS), text=accepted[-1])
 
     def cancel(self) -> None:
-        """Ends all calls under way."""
+        """Ends all calls under way, and those that are about to begin."""
+        self._cancelled = True
         for future in list(self._pending):
             future.cancel()
 
@@ -166,6 +172,8 @@ class Chat(Speaker):
         """
         future = asyncio.run_coroutine_threadsafe(coroutine, _loop())
         self._pending.add(future)
+        if self._cancelled:  # asked for only after the future was listed: `cancel` misses none
+            future.cancel()
         try:
             return future.result()
         except BaseException:

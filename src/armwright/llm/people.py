@@ -29,6 +29,10 @@ class People(Speaker):
         self._cancelled = threading.Event()
         self._seen: dict[Path, tuple[int, int]] = {}  # files' sizes and times when last looked at
 
+    def begin(self) -> None:
+        """A session begins."""
+        self._cancelled.clear()
+
     def check(self) -> Reply:
         """People are not asked before there is a question."""
         return Reply("")
