@@ -127,9 +127,9 @@ def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatSer
     notes: list[str] = []
     proposer = ReplayProposer(tmp_path / "first")
     run = optimize(PROBLEM, proposer=proposer, **SETTINGS, watch=lambda progress: notes.append(progress.note))
-    assert [note for note in notes if note] == ["the prompt for llm-0004 differs from the recorded one"]
+    assert [note for note in notes if note] == ["the prompt for scripted-0004 differs from the recorded one"]
     assert run.summary["proposer"]["differing_prompts"] == 1
-    with pytest.raises(ReplayError, match="reasoning prompt for llm-0004 differs"):
+    with pytest.raises(ReplayError, match="reasoning prompt for scripted-0004 differs"):
         optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), **SETTINGS)
 
 

@@ -235,11 +235,15 @@ def doctor(
 ) -> None:
     """Say what is installed and which models are configured; nothing is sent unless --call is given."""
     from armwright import console as view
-    from armwright.doctor import examine, try_model
+    from armwright.doctor import WRONG, examine, try_model
 
     words = view.stdout_console()
+    wrong = False
     for finding in examine(model, base_url):
         words.print(f"{finding.mark} {finding.subject}: {finding.words}")
+        wrong = wrong or finding.mark == WRONG
+    if wrong:
+        sys.exit(FailureError.exit_code)
     if call:
         words.print(try_model(model, base_url))
 

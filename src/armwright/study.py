@@ -217,7 +217,7 @@ class Study:
     def _step(self, number: int, turns: Turns) -> None:
         started = time.perf_counter()
         if self.proposer is not None and self._schedule.begins_block(number):
-            self._report("proposing", number, self.proposer.name, turns)
+            self._report("proposing", number, self.proposer.name, turns, note=self.proposer.announce(number))
         turn = turns.next(number)
         proposed = time.perf_counter()
         trial, design, source = self._ask(number, turn)

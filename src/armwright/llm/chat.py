@@ -33,6 +33,7 @@ except ImportError as fault:
 CALL_SECONDS = 120.0  # of one request, all attempts of the client included
 CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
 REASKS = 2  # after a refused answer
+ORIGINS = ("model", "scripted")
 SERVER_KEY = "ARMWRIGHT_API_KEY"  # for --base-url, where the server wants a key
 
 OutputMode = Literal["auto", "tool", "native", "prompted"]
@@ -97,6 +98,8 @@ class Chat(Speaker):
             raise SettingsError(
                 f'unknown output "{output}".{did_you_mean(output, OUTPUT_MODES)} Outputs: {", ".join(OUTPUT_MODES)}'
             )
+        if origin not in ORIGINS:
+            raise SettingsError(f'unknown origin "{origin}": {" or ".join(ORIGINS)} is needed')
         self.model = model
         self.origin = origin
         self._model, own_server = _model(model, base_url)

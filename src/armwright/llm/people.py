@@ -49,6 +49,10 @@ class People(Speaker):
         """Waits no longer."""
         self._cancelled.set()
 
+    def files(self, number: int) -> tuple[Path, Path]:
+        """The question for trial `number`, and its answer."""
+        return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
+
     def ask_people(self, question: Question, read: TextReader) -> Reply:
         """The answer as `read` gives it; what it refuses (DesignError) is put aside, with the reason, for another."""
         started = time.perf_counter()

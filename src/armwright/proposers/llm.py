@@ -24,7 +24,7 @@ class LlmProposer(AskingProposer):
     temperature, seed: sent only if they are set.
     output: how an answer is held to a schema: "tool", "native", "prompted"; "auto" chooses by the server.
     max_calls, max_cost: after so many calls, or [USD], of the whole run it asks no more.
-    origin: "scripted" where a stand-in answers instead of a model; it is written with every call.
+    origin: "scripted" where a stand-in answers instead of a model: written with every call, and the trials' source.
     """
 
     def __init__(
@@ -47,7 +47,9 @@ class LlmProposer(AskingProposer):
 
         asking = Asking(prompt, memory, answer, proposals)
         chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
-        super().__init__(chat, asking, "llm", max_calls=max_calls, max_cost=max_cost)
+        # A stand-in's designs must never be taken for a model's: they have a source of their own.
+        name = "llm" if origin == "model" else origin
+        super().__init__(chat, asking, name, max_calls=max_calls, max_cost=max_cost)
         self.model = model
         self.base_url = base_url
         self._sent = {"output": output, "temperature": temperature, "seed": seed, "origin": origin}

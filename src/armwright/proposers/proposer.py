@@ -84,6 +84,10 @@ class Proposer(Protocol):
         """About what `n` more proposals will take, in one line for the user; empty where that is nothing."""
         return ""
 
+    def announce(self, number: int) -> str:
+        """What the user should know while the proposal for trial `number` is waited for; empty for nothing."""
+        return ""
+
     def check(self) -> None:
         """Called before the first trial if a proposal is due; FailureError where the proposer cannot work."""
 

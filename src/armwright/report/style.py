@@ -19,6 +19,8 @@ _LOOKS = {
     BBO: Look("black box", "#0072B2", "o", 20),
     "rules": Look("rules", "#D55E00", "^", 44),
     "llm": Look("language model", "#D55E00", "^", 44),
+    "scripted": Look("scripted stand-in", "#D55E00", "v", 44),
+    "manual": Look("people", "#D55E00", "s", 36),
 }
 FRONT = "#111111"
 MISSED = "#CC0000"
