@@ -13,7 +13,7 @@ import pytest
 import yaml
 from rich.console import Console
 
-from armwright.console import watching
+from armwright.console import show_result, watching
 from armwright.problem import Problem
 from armwright.study import optimize
 from armwright.task import load_task
@@ -52,7 +52,7 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
     run = in_folder / "runs" / "target-1-seed0"
     assert f"results: runs/{run.name}/" in done.stdout
     figures = {path.name for path in (run / "figures").iterdir()}
-    for name in ("hypervolume", "samples", "front", "arms"):
+    for name in ("hypervolume", "samples", "credit", "front", "arms"):
         assert {f"{name}.png", f"{name}.pdf"} <= figures
     assert list((run / "designs").glob("*/arm.urdf"))
 
@@ -66,6 +66,19 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
     assert "resumed at trial 10 of 13" in longer.stdout
     message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
     assert "proposer.name: rules there, None asked" in message
+
+
+def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer() -> None:
+    def shown(proposer: str) -> str:
+        console = Console(file=io.StringIO(), width=80, markup=False, highlight=False)
+        show_result(console, optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_total=6), [])
+        return console.file.getvalue()  # type: ignore[attr-defined]
+
+    table = shown("rules").split("Who found what")[1].splitlines()[1:5]
+    assert table[0].split("  ")[0] == "source"
+    assert [row.split()[:2] for row in table[1:]] == [["random", "4"], ["rules", "1"], ["bbo", "5"]]
+    assert max(map(len, table)) < 60
+    assert "Who found what" not in shown("none")
 
 
 def test_what_is_missing_of_a_finished_run_is_made_again(in_folder: Path) -> None:

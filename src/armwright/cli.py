@@ -82,7 +82,9 @@ BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compati
 def optimize(
     task: TaskName,
     space: SpaceFile = None,
-    sampler: Annotated[str, typer.Option(help="Black-box sampler: tpe or random.")] = "tpe",
+    sampler: Annotated[
+        str, typer.Option(help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.")
+    ] = "tpe",
     proposer: Annotated[
         str,
         typer.Option(

@@ -95,7 +95,7 @@ def optimize(
     """Searches `problem` and returns the run; with `out`, every trial is kept there and a second call resumes.
 
     proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or any Proposer.
-    sampler: "tpe", "random", or a factory seed -> Optuna sampler.
+    sampler: "tpe", "tpe-multivariate", "nsga2", "gp", "random", or a factory seed -> Optuna sampler.
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials.
