@@ -195,7 +195,7 @@ class Study:
         recorded = self.proposer.recorded_turns()
         if recorded is not None:
             return Recorded(asker, recorded, self._history)
-        unused = [Turn(p.asked, p.known, p, note=p.note) for p in self.proposer.unused(self._history())]
+        unused = [Turn(p.asked, p.known or 0, p, note=p.note) for p in self.proposer.unused(self._history())]
         if self.method.in_flight is None:
             return Alternating(asker, self._schedule, self._history, unused)
         past = [turn for turn in map(_past_turn, self.trials) if turn is not None]

@@ -145,20 +145,26 @@ class AskingProposer(Proposer):
         """The next designs. An answer that was paid for in a run that was killed is used, not asked again."""
         over = self._over
         identity = f"{self.name}-{number:04d}"
-        prompt = self.prompt_for(history, seed)
-        if self._form == "then-schema":
-            thoughts = self._transcript.answer(identity, "reasoning")
-            if thoughts is None:
-                thoughts = self._call(Question(identity, "reasoning", prompt, len(history)), self.speaker.ask, over)
-            extract = parameters_prompt(
-                history.problem, thoughts, proposals=self.asking.proposals, expected=self._expects
-            )
-            question = Question(identity, "parameters", extract, len(history))
-        else:
-            question = Question(identity, "answer", prompt, len(history))
-        text = self._call(question, lambda asked: self.ask_designs(asked, history.problem), over)
-        answers = read_text(text, history.problem, self.asking.proposals)
-        return self._proposals(identity, answers, len(history))
+        known = len(history)
+        try:
+            if self._form == "then-schema":
+                thoughts = self._transcript.answered(identity, "reasoning")
+                if thoughts is None:
+                    question = Question(identity, "reasoning", self.prompt_for(history, seed), known)
+                    said = self._call(question, self.speaker.ask, over)
+                else:
+                    said, known = thoughts.answer, thoughts.known
+                question = Question(identity, "parameters", self._extract(history.problem, said), known)
+            else:
+                question = Question(identity, "answer", self.prompt_for(history, seed), known)
+            text = self._call(question, lambda asked: self.ask_designs(asked, history.problem), over)
+        except ProposalError as fault:
+            fault.known = known
+            raise
+        return self._proposals(identity, read_text(text, history.problem, self.asking.proposals), known)
+
+    def _extract(self, problem: Problem, said: str) -> str:
+        return parameters_prompt(problem, said, proposals=self.asking.proposals, expected=self._expects)
 
     def prompt_for(self, history: History, seed: int) -> str:
         """What is asked after `history`."""
