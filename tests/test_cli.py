@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from armwright.console import show_result, watching
 from armwright.problem import Problem
 from armwright.study import optimize
 from armwright.task import load_task
-from tests.chat_server import ChatServer
+from tests.chat_server import Answer, ChatServer, Request, designer
 
 SHORT = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
 
@@ -180,6 +181,19 @@ def test_version_and_help() -> None:
         (("target-1", "--base-url", "http://127.0.0.1:9"), "needs --model"),
         (("target-1", "--model", "m", "--proposer", "none"), "uses no language model"),
         (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--prompt", "x"), 'unknown prompt "x"'),
+        (("target-1", "--memory", "owm"), 'Did you mean "own"?'),
+        (("target-1", "--answer", "onestep"), 'Did you mean "one-step"?'),
+        (("target-1", "--proposals", "0"), "proposals = 0: a whole number from 1"),
+        (("target-1", "--in-flight", "2"), "goes with --overlap"),
+        (("target-1", "--overlap", "--in-flight", "0"), "in_flight = 0"),
+        (("target-1", "--once"), "--once goes with --proposer manual:PATH"),
+        (("target-1", "--proposer", "manual"), "needs a folder: manual:PATH"),
+        (("target-1", "--proposer", "rules:x"), 'unknown proposer "rules:x"'),
+        (("target-1", "--proposer", "manual:x", "--model", "m"), "uses no language model"),
+        (("target-1", "--on-model-failure", "ignore"), "on_model_failure"),
+        (("target-1", "--model", "m", "--base-url", "http://x/v1?key=secret"), "ARMWRIGHT_API_KEY"),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--output", "toool"), 'Did you mean "tool"?'),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--origin", "x"), 'unknown origin "x"'),
     ],
 )
 def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
@@ -195,6 +209,40 @@ def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...]
 def test_a_server_that_does_not_answer_is_code_1(in_folder: Path) -> None:
     message = refused(1, "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1")
     assert "--proposer rules needs none" in message
+
+
+def test_a_server_that_does_not_answer_may_be_passed_over(in_folder: Path) -> None:
+    where = ("--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--on-model-failure", "continue")
+    done = armwright("optimize", "target-1", *SHORT, *where)
+    assert done.returncode == 0, done.stderr
+    assert "m: Connection error" in done.stdout
+    assert "2 proposals failed and became black-box trials (2 connection)" in done.stdout
+    assert "FLAGGED: 100%" in done.stdout
+
+
+def test_a_record_that_is_not_there_is_code_1(in_folder: Path) -> None:
+    assert "there is no nothing to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:nothing")
+
+
+def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer, in_folder: Path) -> None:
+    done = armwright("doctor", OPENAI_API_KEY="sk-planted-in-the-environment")
+    assert done.returncode == 0, done.stderr
+    assert "ok openai-chat: OPENAI_API_KEY set" in done.stdout
+    assert "-- anthropic: ANTHROPIC_API_KEY not set" in done.stdout
+    assert "-- model: none is configured" in done.stdout
+    assert "planted" not in done.stdout + done.stderr
+    assert not chat_server.requests
+    where = ("--model", "m", "--base-url", chat_server.url)
+    assert not armwright("doctor", *where).stderr
+    assert not chat_server.requests  # nothing is sent unless it is asked for
+    assert "ok call: m answered" in armwright("doctor", *where, "--call").stdout
+    assert len(chat_server.requests) == 1
+    assert "Connection error" in refused(1, "doctor", "--model", "m", "--base-url", "http://127.0.0.1:9", "--call")
+    wrong = armwright("doctor", "--model", "openai-chat:gpt-4o")
+    assert wrong.returncode == 1
+    assert (
+        "!! model: openai-chat:gpt-4o, named by --model: model openai-chat:gpt-4o needs OPENAI_API_KEY" in wrong.stdout
+    )
 
 
 def test_a_damaged_folder_is_code_1(in_folder: Path) -> None:
@@ -278,6 +326,30 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
     done = armwright(*settings)
     assert f"resumed at trial {len(kept.splitlines())} of 2010" in done.stdout
     assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
+
+
+def test_ctrl_c_ends_the_calls_under_way(chat_server: ChatServer, in_folder: Path) -> None:
+    """While the server holds its answers back, the process ends and says how to go on."""
+    released, asked = threading.Event(), threading.Event()
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:
+            asked.set()
+            released.wait(60)
+        return designer(request)
+
+    chat_server.answer = answer
+    command = [sys.executable, "-m", "armwright", "optimize", "target-1", "--model", "m", "--base-url", chat_server.url]
+    process = subprocess.Popen([*command, "--overlap"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert asked.wait(60)
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=60)
+    assert not released.is_set()
+    released.set()
+    assert (process.returncode, errors) == (130, "")
+    assert "Go on with:" in output
+    transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
+    assert len(transcript) == 1  # the check; a call that was ended is no call
 
 
 @pytest.mark.parametrize("width", [60, 120])
