@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test check format bench clean
+.PHONY: demo test check gp format bench clean
 
 demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
 	$(BIN)/armwright optimize target-1 --seed 0
@@ -17,6 +17,8 @@ check: .venv/.test .venv/.check  ## format, lint, types, import staircase
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
+
+gp: .venv/.gp  ## what the sampler gp needs: torch, which is large; its tests are skipped without it
 
 format: .venv/.check
 	$(BIN)/ruff format .
@@ -44,6 +46,10 @@ bench: .venv/.test  ## the figures of docs/benchmarks.md; some 20 minutes on two
 
 .venv/.check: .venv/.run
 	$(PIP) --group check
+	@touch $@
+
+.venv/.gp: .venv/.run
+	$(PIP) --editable '.[gp,llm]'
 	@touch $@
 
 clean:

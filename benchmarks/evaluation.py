@@ -2,17 +2,21 @@
 
 Random arms of 4 joints at the 8 targets of target-1, 100 updates from the straight start each. Ours and Pinocchio's
 go on to the gravity torque of the posture; scikit-robot is asked for the posture alone. The others' time includes
-loading the URDF, once an arm.
+loading the URDF, once an arm. Where g++ is there, a yardstick by hand in C++ (yardstick.cpp) says what the machine has.
 
     python benchmarks/evaluation.py
 """
 
+import ctypes
 import io
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +27,7 @@ from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
 from armwright.kinematics.arrays import stack_arms
 from armwright.kinematics.solve import UPDATES, solve_postures
-from armwright.space import paper_space
+from armwright.space import MassPerMetre, paper_space
 from armwright.task import load_task
 
 TARGETS = load_task("target-1").points
@@ -46,6 +50,7 @@ def main() -> None:
     ours = rate(armwright, len(ARMS))
     print(f"  armwright, 1 core  {ours:10.0f}   (kernels alone {kernels_alone():.0f})")
     print(f"  armwright, one design at a time: {single_design_ms():.2f} ms")
+    compare_with_yardstick()
     for name, work, n in (("Pinocchio loop", pinocchio_loop, 20), ("scikit-robot", skrobot, 5)):
         theirs = rate(work, n)
         print(f"  {name:18s} {theirs:10.1f}   armwright is {ours / theirs:.0f} times as fast")
@@ -74,6 +79,49 @@ def kernels_alone() -> float:
         solve_postures(arrays, TARGETS)
 
     return rate(work, len(ARMS))
+
+
+def compare_with_yardstick() -> None:
+    """The same arms and targets by hand-written C++, its 3 x 3 algebra in double precision (as ours) and in single."""
+    library = built_yardstick()
+    if library is None:
+        print("  C++ yardstick: g++ is not there")
+        return
+    arrays, n = stack_arms(ARMS), len(ARMS)
+    links = np.ascontiguousarray(arrays.offset[..., 2])
+    targets = TARGETS.astype(np.float32)
+    error, torque = np.zeros(n, np.float32), np.zeros(n, np.float32)
+
+    def pointer(values: np.ndarray) -> ctypes.c_void_p:
+        return values.ctypes.data_as(ctypes.c_void_p)
+
+    ours = kernels_alone()
+    evaluation = evaluate(ARMS, TARGETS)
+    for wide, words in ((1, "double 3 x 3"), (0, "all float")):
+
+        def work(_: int, wide: int = wide) -> None:
+            library.yardstick(
+                n, pointer(arrays.base), pointer(arrays.axis), pointer(links), ctypes.c_float(2.4),
+                ctypes.c_float(MassPerMetre().kg), pointer(targets), UPDATES, wide, pointer(error), pointer(torque),
+            )  # fmt: skip
+
+        theirs = rate(work, n)
+        apart = error.mean() / evaluation.position_error.sum(axis=1).mean() - 1.0
+        print(
+            f"  C++, {words:12s}  {theirs:10.0f}   the kernels make {ours / theirs:.2f} of it (mean E_pos {apart:+.4%})"
+        )
+
+
+def built_yardstick() -> ctypes.CDLL | None:
+    """The shared library of yardstick.cpp, built anew."""
+    if shutil.which("g++") is None:
+        return None
+    source = Path(__file__).with_name("yardstick.cpp")
+    with tempfile.TemporaryDirectory() as folder:
+        built = Path(folder) / "yardstick.so"
+        flags = ["-O3", "-march=native", "-ffast-math", "-fno-finite-math-only", "-std=c++17", "-shared", "-fPIC"]
+        subprocess.run(["g++", *flags, str(source), "-o", str(built)], check=True)
+        return ctypes.CDLL(str(built))
 
 
 def single_design_ms() -> float:

@@ -7,17 +7,18 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 import yaml
 from rich.console import Console
 
-from armwright.console import watching
+from armwright.console import show_result, watching
 from armwright.problem import Problem
 from armwright.study import optimize
 from armwright.task import load_task
-from tests.chat_server import ChatServer
+from tests.chat_server import Answer, ChatServer, Request, designer
 
 SHORT = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
 
@@ -52,7 +53,7 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
     run = in_folder / "runs" / "target-1-seed0"
     assert f"results: runs/{run.name}/" in done.stdout
     figures = {path.name for path in (run / "figures").iterdir()}
-    for name in ("hypervolume", "samples", "front", "arms"):
+    for name in ("hypervolume", "samples", "credit", "front", "arms"):
         assert {f"{name}.png", f"{name}.pdf"} <= figures
     assert list((run / "designs").glob("*/arm.urdf"))
 
@@ -66,6 +67,19 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
     assert "resumed at trial 10 of 13" in longer.stdout
     message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
     assert "proposer.name: rules there, None asked" in message
+
+
+def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer() -> None:
+    def shown(proposer: str) -> str:
+        console = Console(file=io.StringIO(), width=80, markup=False, highlight=False)
+        show_result(console, optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_total=6), [])
+        return console.file.getvalue()  # type: ignore[attr-defined]
+
+    table = shown("rules").split("Who found what")[1].splitlines()[1:5]
+    assert table[0].split("  ")[0] == "source"
+    assert [row.split()[:2] for row in table[1:]] == [["random", "4"], ["rules", "1"], ["bbo", "5"]]
+    assert max(map(len, table)) < 60
+    assert "Who found what" not in shown("none")
 
 
 def test_what_is_missing_of_a_finished_run_is_made_again(in_folder: Path) -> None:
@@ -167,6 +181,19 @@ def test_version_and_help() -> None:
         (("target-1", "--base-url", "http://127.0.0.1:9"), "needs --model"),
         (("target-1", "--model", "m", "--proposer", "none"), "uses no language model"),
         (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--prompt", "x"), 'unknown prompt "x"'),
+        (("target-1", "--memory", "owm"), 'Did you mean "own"?'),
+        (("target-1", "--answer", "onestep"), 'Did you mean "one-step"?'),
+        (("target-1", "--proposals", "0"), "proposals = 0: a whole number from 1"),
+        (("target-1", "--in-flight", "2"), "goes with --overlap"),
+        (("target-1", "--overlap", "--in-flight", "0"), "in_flight = 0"),
+        (("target-1", "--once"), "--once goes with --proposer manual:PATH"),
+        (("target-1", "--proposer", "manual"), "needs a folder: manual:PATH"),
+        (("target-1", "--proposer", "rules:x"), 'unknown proposer "rules:x"'),
+        (("target-1", "--proposer", "manual:x", "--model", "m"), "uses no language model"),
+        (("target-1", "--on-model-failure", "ignore"), "on_model_failure"),
+        (("target-1", "--model", "m", "--base-url", "http://x/v1?key=secret"), "ARMWRIGHT_API_KEY"),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--output", "toool"), 'Did you mean "tool"?'),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--origin", "x"), 'unknown origin "x"'),
     ],
 )
 def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
@@ -182,6 +209,40 @@ def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...]
 def test_a_server_that_does_not_answer_is_code_1(in_folder: Path) -> None:
     message = refused(1, "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1")
     assert "--proposer rules needs none" in message
+
+
+def test_a_server_that_does_not_answer_may_be_passed_over(in_folder: Path) -> None:
+    where = ("--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--on-model-failure", "continue")
+    done = armwright("optimize", "target-1", *SHORT, *where)
+    assert done.returncode == 0, done.stderr
+    assert "m: Connection error" in done.stdout
+    assert "2 proposals failed and became black-box trials (2 connection)" in done.stdout
+    assert "FLAGGED: 100%" in done.stdout
+
+
+def test_a_record_that_is_not_there_is_code_1(in_folder: Path) -> None:
+    assert "there is no nothing to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:nothing")
+
+
+def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer, in_folder: Path) -> None:
+    done = armwright("doctor", OPENAI_API_KEY="sk-planted-in-the-environment")
+    assert done.returncode == 0, done.stderr
+    assert "ok openai-chat: OPENAI_API_KEY set" in done.stdout
+    assert "-- anthropic: ANTHROPIC_API_KEY not set" in done.stdout
+    assert "-- model: none is configured" in done.stdout
+    assert "planted" not in done.stdout + done.stderr
+    assert not chat_server.requests
+    where = ("--model", "m", "--base-url", chat_server.url)
+    assert not armwright("doctor", *where).stderr
+    assert not chat_server.requests  # nothing is sent unless it is asked for
+    assert "ok call: m answered" in armwright("doctor", *where, "--call").stdout
+    assert len(chat_server.requests) == 1
+    assert "Connection error" in refused(1, "doctor", "--model", "m", "--base-url", "http://127.0.0.1:9", "--call")
+    wrong = armwright("doctor", "--model", "openai-chat:gpt-4o")
+    assert wrong.returncode == 1
+    assert (
+        "!! model: openai-chat:gpt-4o, named by --model: model openai-chat:gpt-4o needs OPENAI_API_KEY" in wrong.stdout
+    )
 
 
 def test_a_damaged_folder_is_code_1(in_folder: Path) -> None:
@@ -265,6 +326,30 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
     done = armwright(*settings)
     assert f"resumed at trial {len(kept.splitlines())} of 2010" in done.stdout
     assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
+
+
+def test_ctrl_c_ends_the_calls_under_way(chat_server: ChatServer, in_folder: Path) -> None:
+    """While the server holds its answers back, the process ends and says how to go on."""
+    released, asked = threading.Event(), threading.Event()
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:
+            asked.set()
+            released.wait(60)
+        return designer(request)
+
+    chat_server.answer = answer
+    command = [sys.executable, "-m", "armwright", "optimize", "target-1", "--model", "m", "--base-url", chat_server.url]
+    process = subprocess.Popen([*command, "--overlap"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert asked.wait(60)
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=60)
+    assert not released.is_set()
+    released.set()
+    assert (process.returncode, errors) == (130, "")
+    assert "Go on with:" in output
+    transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
+    assert len(transcript) == 1  # the check; a call that was ended is no call
 
 
 @pytest.mark.parametrize("width", [60, 120])

@@ -1,5 +1,7 @@
 """An evaluation: its shapes, and what its arrays say of each other."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from armwright.evaluation import evaluate
 from armwright.exceptions import ArmError, TaskError
 from armwright.objectives import PAPER_OBJECTIVES, TORQUE_SCALE
 from armwright.problem import Problem
+from armwright.space import DesignSpace
 from armwright.task import load_task
 from tests import reference
 from tests.arms import general_arms, paper_arms
@@ -89,3 +92,22 @@ def test_targets_that_cannot_be(targets: np.ndarray) -> None:
 def test_no_arms() -> None:
     with pytest.raises(ArmError, match="no arms"):
         evaluate([], TARGETS)
+
+
+@pytest.mark.parametrize(
+    "mass",
+    [
+        {"kind": "per_metre"},
+        {"kind": "per_link", "kg": 0.002},
+        {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
+    ],
+)
+@pytest.mark.parametrize("joints", [1, 4, 8])
+def test_designs_as_rows_give_the_same_bits(joints: int, mass: dict[str, Any]) -> None:
+    space = DesignSpace.model_validate({"joints": joints, "mass": mass, "joint_types": ("Y", "R")})
+    problem = Problem(load_task("target-2"), space)
+    designs = space.sample(200, seed=joints)
+    matrix = space.matrix(designs)
+    assert matrix.shape == (200, 2 * joints + 3)
+    assert space.designs(matrix) == designs
+    assert problem.evaluate_matrix(matrix).tolist() == problem.evaluate(designs).tolist()

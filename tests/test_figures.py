@@ -6,7 +6,7 @@ import pytest
 
 from armwright.exceptions import RunFolderError
 from armwright.problem import Problem
-from armwright.report.figures import chosen_members, draw_hypervolume, draw_samples, write_figures
+from armwright.report.figures import chosen_members, draw_credit, draw_hypervolume, draw_samples, write_figures
 from armwright.study import Progress, Run, optimize
 from armwright.task import Task, load_task, random_task
 
@@ -63,6 +63,14 @@ def test_the_curve_begins_with_the_random_trials_and_ends_at_the_final_value(tmp
     line = draw_hypervolume(run.history).axes[0].lines[0]
     assert len(line.get_xdata()) == 13
     assert line.get_ydata()[-1] == run.hypervolume[-1]
+
+
+def test_the_stacks_end_at_the_final_hypervolume_and_the_size_of_the_front(tmp_path: Path) -> None:
+    run = short(tmp_path, Problem(load_task("target-1")))
+    volume, members = draw_credit(run.history).axes
+    assert volume.lines[-1].get_ydata()[-1] == pytest.approx(run.hypervolume[-1])
+    assert members.lines[-1].get_ydata()[-1] == len(run.front)
+    assert [text.get_text() for text in volume.figure.legends[0].texts] == ["black box", "rules", "random"]
 
 
 def test_sample_panels_are_at_the_papers_shares(tmp_path: Path) -> None:

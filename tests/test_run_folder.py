@@ -78,7 +78,9 @@ def test_summary(run: Run) -> None:
         "by_source",
         "hypervolume",
         "front_size",
+        "credit",
         "proposer",
+        "diagnostics",
         "seconds",
         "versions",
     ]
@@ -87,6 +89,18 @@ def test_summary(run: Run) -> None:
     assert len(summary["hypervolume"]["history"]) == 8
     assert summary["proposer"]["name"] == "rules"
     assert summary["front_size"] == len(run.front)
+    assert list(summary["credit"]) == ["random", "rules", "bbo"]
+    assert all(list(brought) == ["trials", "front", "hypervolume_gained"] for brought in summary["credit"].values())
+    gained = [brought["hypervolume_gained"] for brought in summary["credit"].values()]
+    assert sum(gained) == pytest.approx(summary["hypervolume"]["final"])
+    assert list(summary["diagnostics"]) == ["symmetry_planes", "proposer", "black_box", "front_share"]
+    assert summary["diagnostics"]["proposer"]["designs"] == 2
+
+
+def test_without_a_proposer_there_is_nothing_to_diagnose() -> None:
+    summary = optimize(PROBLEM, proposer="none", n_init=2, n_total=2).summary
+    assert summary["diagnostics"] is None
+    assert list(summary["credit"]) == ["random", "bbo"]
 
 
 def test_designs_of_the_front(run: Run) -> None:

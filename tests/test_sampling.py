@@ -5,16 +5,21 @@ import pytest
 from optuna.samplers import BaseSampler, NSGAIISampler, RandomSampler, TPESampler
 from optuna.trial import TrialState
 
-from armwright.exceptions import DesignError, SettingsError
-from armwright.history import BBO, RANDOM, FinishedTrial
+from armwright import sampling
+from armwright.exceptions import DesignError, MissingExtraError, SettingsError
+from armwright.history import BBO, RANDOM, FinishedTrial, History
 from armwright.problem import Problem
-from armwright.sampling import SAMPLING, BlackBox, distributions, sampler_factory
+from armwright.proposers.rules import RulesProposer
+from armwright.sampling import SAMPLERS, SAMPLING, BlackBox, distributions, sampler_factory
 from armwright.seeding import derived_seed
 from armwright.space import Design, paper_space
+from armwright.study import optimize
 from armwright.task import Task, load_task
+from tests.extras import NEEDS_GP
 
 SPACE = paper_space()
 PROBLEM = Problem(load_task("target-1"))
+LEARNING = ["tpe", "tpe-multivariate", "nsga2", pytest.param("gp", marks=NEEDS_GP)]
 
 
 def finished(number: int, design: Design, source: str = RANDOM) -> FinishedTrial:
@@ -67,6 +72,41 @@ def test_the_sampler_learns_from_injected_designs() -> None:
     for box, values in ((plain, (9.0, 9.0)), (taught, (0.1, 0.1))):
         box.tell(box.inject(SPACE.sample(1, 7)[0], 12, "rules", "rules-0012")[0], values)
     assert plain.draw(13, BBO)[1] != taught.draw(13, BBO)[1]
+
+
+@pytest.mark.parametrize("sampler", LEARNING)
+def test_every_named_sampler_learns_from_the_rules_proposals(sampler: str) -> None:
+    """What it draws depends on how well a proposal among the first ten did."""
+
+    def drawn(*values: float) -> list[Design]:
+        box = BlackBox(SPACE, sampler, seed=0)
+        trials = fill(box, 8)
+        proposal = RulesProposer().propose(History(PROBLEM, trials, 8), seed=0, number=8)
+        box.tell(box.inject(proposal.design, 8, "rules", proposal.id)[0], values)
+        assert box.study.trials[8].params == dict(proposal.design.params)
+        return [trial.design for trial in fill(box, 4, first=9)][1:]
+
+    assert drawn(9.0, 9.0) == drawn(9.0, 9.0)
+    assert drawn(9.0, 9.0) != drawn(0.1, 0.1)
+
+
+@pytest.mark.parametrize("sampler", [*LEARNING, "random"])
+def test_every_named_sampler_runs_with_proposals(sampler: str) -> None:
+    run = optimize(PROBLEM, proposer="rules", sampler=sampler, n_init=10, n_step=3, n_total=6)
+    assert [trial.source for trial in run.trials[10:]] == ["rules", "bbo", "bbo"] * 2
+    assert len({trial.design for trial in run.trials}) == 16
+    assert run.config.method.sampler == sampler
+
+
+def test_every_name_is_among_those_tested() -> None:
+    assert set(SAMPLERS) == {"tpe", "tpe-multivariate", "nsga2", "gp", "random"}
+
+
+def test_gp_without_its_packages_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sampling, "find_spec", lambda package: None if package == "torch" else object())
+    with pytest.raises(MissingExtraError, match=r'gp needs torch: pip install "armwright\[gp\]"'):
+        optimize(PROBLEM, proposer="none", sampler="gp")
+    optimize(PROBLEM, proposer="none", sampler="nsga2", n_init=1, n_total=1)
 
 
 def test_injected_designs_count_towards_the_startup_trials_of_tpe() -> None:
@@ -146,6 +186,8 @@ def test_tpe_is_the_papers() -> None:
 def test_an_unknown_sampler_is_refused_by_name() -> None:
     with pytest.raises(SettingsError, match=r'unknown sampler "tp".*Did you mean "tpe"'):
         sampler_factory("tp")
+    with pytest.raises(SettingsError, match=r'Did you mean "tpe-multivariate".*tpe-multivariate, nsga2, gp, random'):
+        sampler_factory("tpe_multivariate")
 
 
 def test_the_users_optuna_verbosity_is_left_as_it_was(capfd: pytest.CaptureFixture[str]) -> None:

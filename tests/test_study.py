@@ -20,6 +20,7 @@ from armwright.sampling import SamplerFactory
 from armwright.space import Design
 from armwright.study import Progress, Run, optimize
 from armwright.task import Task, load_task
+from tests.extras import NEEDS_GP
 
 PROBLEM = Problem(load_task("target-1"))
 OPEN = Problem(Task(name="open", targets=((0.3, 0.0, 0.3), (0.3, 0.2, 0.5))))  # states no reference point
@@ -123,13 +124,23 @@ def qmc(seed: int) -> BaseSampler:
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-@pytest.mark.parametrize("sampler", ["tpe", nsga2, qmc])
+@pytest.mark.parametrize("sampler", ["tpe", "tpe-multivariate", "nsga2", nsga2, qmc])
 @pytest.mark.parametrize("proposer", ["none", "rules", Listed()])
 @pytest.mark.parametrize("stop", [3, 5, 6, 12])
 def test_a_resumed_run_equals_an_uninterrupted_one(
     tmp_path: Path, proposer: Proposer | str, stop: int, sampler: str | SamplerFactory
 ) -> None:
-    settings: dict[str, Any] = {"proposer": proposer, "sampler": sampler, "n_init": 5, "n_step": 4, "n_total": 20}
+    check_resume(tmp_path / "run", stop, proposer=proposer, sampler=sampler, n_init=5, n_step=4, n_total=20)
+
+
+@NEEDS_GP
+@pytest.mark.parametrize("proposer", ["none", "rules"])
+def test_a_resumed_run_with_gp_equals_an_uninterrupted_one(tmp_path: Path, proposer: str) -> None:
+    """It draws by its model from the 11th trial on, some 0.3 s each: few trials, and a stop among them."""
+    check_resume(tmp_path / "run", 12, proposer=proposer, sampler="gp", n_init=5, n_step=4, n_total=12)
+
+
+def check_resume(out: Path, stop: int, **settings: Any) -> None:
     whole = optimize(PROBLEM, **settings)
 
     def interrupt(progress: Progress) -> None:
@@ -137,8 +148,8 @@ def test_a_resumed_run_equals_an_uninterrupted_one(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        optimize(PROBLEM, **settings, out=tmp_path / "run", watch=interrupt)
-    resumed = optimize(PROBLEM, **settings, out=tmp_path / "run")
+        optimize(PROBLEM, **settings, out=out, watch=interrupt)
+    resumed = optimize(PROBLEM, **settings, out=out)
     assert resumed.resumed == stop + 1
     assert designs(resumed) == designs(whole)
 

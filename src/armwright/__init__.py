@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from armwright.pareto import hypervolume
     from armwright.problem import Problem
     from armwright.proposers.llm import LlmProposer
+    from armwright.proposers.manual import ManualProposer
     from armwright.proposers.proposer import Proposal, Proposer
+    from armwright.proposers.replay import ReplayProposer
     from armwright.proposers.rules import RulesProposer
     from armwright.report.figures import write_figures
     from armwright.run_folder import read_run
@@ -42,10 +44,12 @@ _PLACES = {
     "Joint": "arm",
     "Link": "arm",
     "LlmProposer": "proposers.llm",
+    "ManualProposer": "proposers.manual",
     "Problem": "problem",
     "Proposal": "proposers.proposer",
     "ProposalError": "exceptions",
     "Proposer": "proposers.proposer",
+    "ReplayProposer": "proposers.replay",
     "RulesProposer": "proposers.rules",
     "Run": "study",
     "Task": "task",
@@ -77,10 +81,12 @@ __all__ = [
     "Joint",
     "Link",
     "LlmProposer",
+    "ManualProposer",
     "Problem",
     "Proposal",
     "ProposalError",
     "Proposer",
+    "ReplayProposer",
     "RulesProposer",
     "Run",
     "Task",

@@ -82,7 +82,9 @@ BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compati
 def optimize(
     task: TaskName,
     space: SpaceFile = None,
-    sampler: Annotated[str, typer.Option(help="Black-box sampler: tpe or random.")] = "tpe",
+    sampler: Annotated[
+        str, typer.Option(help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.")
+    ] = "tpe",
     proposer: Annotated[
         str,
         typer.Option(
@@ -265,11 +267,15 @@ def doctor(
 ) -> None:
     """Say what is installed and which models are configured; nothing is sent unless --call is given."""
     from armwright import console as view
-    from armwright.doctor import examine, try_model
+    from armwright.doctor import WRONG, examine, try_model
 
     words = view.stdout_console()
+    wrong = False
     for finding in examine(model, base_url):
         words.print(f"{finding.mark} {finding.subject}: {finding.words}")
+        wrong = wrong or finding.mark == WRONG
+    if wrong:
+        sys.exit(FailureError.exit_code)
     if call:
         words.print(try_model(model, base_url))
 

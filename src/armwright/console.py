@@ -41,8 +41,10 @@ def watching(console: Console) -> Generator[Watch]:
 def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     """The front and what the run came to."""
     history = run.history
-    console.print(_front_table(history))
     summary = run.summary
+    console.print(_front_table(history))
+    if summary["proposer"] is not None:
+        console.print(_credit_table(summary["credit"]))
     volume = summary["hypervolume"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
     sources = ", ".join(f"{count} {source}" for source, count in summary["by_source"].items())
@@ -109,6 +111,18 @@ def _front_table(history: History) -> Table:
         beyond = len(history.front) - len(inside)
         table.caption = f"and {left_out} more" + (f", {beyond} of them beyond the reference point" if beyond else "")
         table.caption_justify = "left"
+    return table
+
+
+def _credit_table(credit: dict[str, dict[str, Any]]) -> Table:
+    """Who found what. Black-box runs go without it: of their two sources one is only the beginning."""
+    table = Table(title="Who found what", title_justify="left", box=None, pad_edge=False)
+    table.add_column("source")
+    for name in ("trials", "on the front", "hypervolume gained"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for source, brought in credit.items():
+        gained = f"{brought['hypervolume_gained']:.3f}"
+        table.add_row(source, str(brought["trials"]), str(brought["front"]), gained)
     return table
 
 

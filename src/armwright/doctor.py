@@ -60,12 +60,12 @@ def try_model(model: str | None = None, base_url: str | None = None) -> str:
 
 
 def _kernels() -> Finding:
-    from armwright.history import sampled_history
     from armwright.problem import Problem
     from armwright.task import load_task
 
+    problem = Problem(load_task("target-1"))
     try:
-        sampled_history(Problem(load_task("target-1")), n=2)
+        problem.evaluate(problem.space.sample(2, seed=0))
     except ArmwrightError as fault:
         return Finding(WRONG, "kernels", str(fault))
     return Finding(OK, "kernels", "compiled, and they run on the CPU")

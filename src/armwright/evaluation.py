@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
 from armwright.exceptions import TaskError
-from armwright.kinematics.arrays import stack_arms
+from armwright.kinematics.arrays import ArmArrays, stack_arms
 from armwright.kinematics.solve import solve_postures
 
 Array = NDArray[np.float64]
@@ -33,14 +33,18 @@ def evaluate(arms: Sequence[Arm], targets: ArrayLike) -> Evaluation:
 
     targets: (T, 3) [m].
     """
+    return evaluate_arrays(stack_arms(arms), targets)
+
+
+def evaluate_arrays(arrays: ArmArrays, targets: ArrayLike) -> Evaluation:
+    """The same for arms that are stacked already."""
     targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
-    arrays = stack_arms(arms)
     postures = solve_postures(arrays, targets)
     reached = postures.reached.astype(np.float64)
     moving = list(arrays.joint_numbers)
-    q = np.zeros((len(arms), len(targets), arrays.n_joints))
+    q = np.zeros((len(arrays), len(targets), arrays.n_joints))
     torques = np.zeros_like(q)
     q[..., moving] = postures.q
     torques[..., moving] = postures.torque

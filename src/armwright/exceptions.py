@@ -82,7 +82,10 @@ class ProposalError(FailureError):
 
     kind: one word for statistics: timeout, connection, refused, …
     final: whether asking again in this session is of no use (a wrong key, a spent quota).
+    known: how many finished trials the question was made from, where fewer than there are now.
     """
+
+    known: int | None = None
 
     def __init__(self, kind: str, message: str, *, final: bool = False) -> None:
         super().__init__(message)

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation
-from armwright.pareto import default_reference_point, front_numbers, hypervolume_history
+from armwright.pareto import front_numbers, hypervolume_history
 from armwright.problem import Problem
 from armwright.space import Design
 
@@ -108,14 +108,3 @@ class History:
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
         """The physics of these trials' designs, computed again (the kernels give the same bits)."""
         return self.problem.evaluation([self.trials[number].design for number in numbers])
-
-
-def sampled_history(problem: Problem, n: int = 10, seed: int = 0) -> History:
-    """What a study of `n` uniformly random designs would have found."""
-    designs = problem.space.sample(n, seed)
-    values = problem.evaluate(designs).tolist()
-    trials = [
-        FinishedTrial(i, RANDOM, design, tuple(v)) for i, (design, v) in enumerate(zip(designs, values, strict=True))
-    ]
-    reference_point = problem.reference_point or default_reference_point(np.array(values))
-    return History(problem, trials, n, reference_point)

@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from armwright.arm import Arm
-from armwright.evaluation import Array, Evaluation, evaluate
+from armwright.evaluation import Array, Evaluation, evaluate, evaluate_arrays
+from armwright.kinematics.arrays import arrays_of
 from armwright.objectives import PAPER_OBJECTIVES, Objective
 from armwright.space import Design, DesignSpace, paper_space
 from armwright.task import Task
@@ -33,6 +34,10 @@ class Problem:
     def evaluation(self, designs: Sequence[Design]) -> Evaluation:
         """The physics of N designs at all targets."""
         return evaluate([self.arm(design) for design in designs], self.task.points)
+
+    def evaluate_matrix(self, matrix: Array) -> Array:
+        """(N, 2) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""
+        return self.values(evaluate_arrays(arrays_of(self.space, matrix), self.task.points))
 
     def values(self, evaluation: Evaluation) -> Array:
         """(N, 2): position error [m] and torque [α-scaled] of evaluated designs; minimised."""

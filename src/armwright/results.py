@@ -12,9 +12,12 @@ import json
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from armwright.credit import credit_by_source
+from armwright.diagnostics import diagnose
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.history import FinishedTrial, FrontMember, History
@@ -83,7 +86,9 @@ def summarize(history: History, config: RunConfig, proposer: ProposerSummary | N
             "history": curve.tolist(),
         },
         "front_size": len(history.front),
+        "credit": {source: asdict(credit) for source, credit in credit_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
+        "diagnostics": None if proposer is None else asdict(diagnose(history, proposer.name)),
         "seconds": {part: round(seconds[part], 6) for part in PARTS},
         "versions": dict(config.versions),
     }

@@ -33,7 +33,7 @@ from armwright.task import Task
 CONFIG = "config.yaml"
 TRIALS = "trials.jsonl"
 BEFORE_TRIALS = {".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl"}
-PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim")
+PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 
 class Method(BaseModel, frozen=True, extra="forbid"):

@@ -5,7 +5,7 @@ joint, one length for each link. Every number of it can be changed in a YAML fil
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import count, takewhile
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_validator, model_validator
 
 from armwright.arm import Arm, Axis, Joint, uniform_link
@@ -122,6 +123,10 @@ class MassPerMetre(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """Of a link of `length` [m], in [kg]."""
         return self.kg * length
 
+    def masses(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of links of these lengths [m], in [kg]."""
+        return self.kg * lengths
+
     def words(self) -> str:
         return f"{self.kg:g} kg per metre of link"
 
@@ -135,6 +140,10 @@ class MassPerLink(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def mass(self, length: float) -> float:
         """Of any link, in [kg]."""
         return self.kg
+
+    def masses(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of links of these lengths [m], in [kg]."""
+        return np.full_like(lengths, self.kg)
 
     def words(self) -> str:
         return f"{self.kg:g} kg for each link, whatever its length"
@@ -159,6 +168,12 @@ class MassOfTube(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         outer = self.outer_diameter / 2
         inner = outer - self.wall
         return self.density * math.pi * (outer**2 - inner**2) * length
+
+    def masses(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of links of these lengths [m], in [kg]."""
+        outer = self.outer_diameter / 2
+        inner = outer - self.wall
+        return self.density * math.pi * (outer**2 - inner**2) * lengths
 
     def words(self) -> str:
         return (
@@ -245,6 +260,18 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         values = [*origin, *joints, *links]
         return Design({p.name: _clip(p, value) for p, value in zip(self.parameters, values, strict=True)})
 
+    def matrix(self, designs: Sequence[Design]) -> NDArray[np.float64]:
+        """(N, P) designs as rows, for work on many at once: a category is its place among the choices."""
+        columns = [_column(parameter, designs) for parameter in self.parameters]
+        return np.array(columns, dtype=np.float64).T.reshape(len(designs), len(self.parameters))
+
+    def designs(self, matrix: NDArray[np.float64]) -> list[Design]:
+        """The designs that the rows of a matrix are."""
+        return [
+            Design({p.name: _entry(p, value) for p, value in zip(self.parameters, row, strict=True)})
+            for row in matrix.tolist()
+        ]
+
     def sample(self, n: int, seed: int) -> list[Design]:
         """`n` designs, uniform in every parameter."""
         rng = np.random.default_rng(seed)
@@ -296,6 +323,15 @@ def _clip(parameter: Parameter, value: Any) -> ParameterValue:
     if isinstance(parameter, FloatParameter):
         return min(max(float(value), parameter.low), parameter.high)
     return parameter.check(value)
+
+
+def _column(parameter: Parameter, designs: Sequence[Design]) -> list[float]:
+    values: list[Any] = [design.params[parameter.name] for design in designs]
+    return values if isinstance(parameter, FloatParameter) else [parameter.choices.index(value) for value in values]
+
+
+def _entry(parameter: Parameter, value: float) -> ParameterValue:
+    return value if isinstance(parameter, FloatParameter) else parameter.choices[int(value)]
 
 
 def _draw(parameter: Parameter, rng: np.random.Generator) -> ParameterValue:

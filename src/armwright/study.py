@@ -95,7 +95,7 @@ def optimize(
     """Searches `problem` and returns the run; with `out`, every trial is kept there and a second call resumes.
 
     proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or any Proposer.
-    sampler: "tpe", "random", or a factory seed -> Optuna sampler.
+    sampler: "tpe", "tpe-multivariate", "nsga2", "gp", "random", or a factory seed -> Optuna sampler.
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials.
@@ -195,7 +195,7 @@ class Study:
         recorded = self.proposer.recorded_turns()
         if recorded is not None:
             return Recorded(asker, recorded, self._history)
-        unused = [Turn(p.asked, p.known, p, note=p.note) for p in self.proposer.unused(self._history())]
+        unused = [Turn(p.asked, p.known or 0, p, note=p.note) for p in self.proposer.unused(self._history())]
         if self.method.in_flight is None:
             return Alternating(asker, self._schedule, self._history, unused)
         past = [turn for turn in map(_past_turn, self.trials) if turn is not None]
@@ -217,7 +217,7 @@ class Study:
     def _step(self, number: int, turns: Turns) -> None:
         started = time.perf_counter()
         if self.proposer is not None and self._schedule.begins_block(number):
-            self._report("proposing", number, self.proposer.name, turns)
+            self._report("proposing", number, self.proposer.name, turns, note=self.proposer.announce(number))
         turn = turns.next(number)
         proposed = time.perf_counter()
         trial, design, source = self._ask(number, turn)

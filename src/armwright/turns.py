@@ -94,9 +94,9 @@ class Asker:
             if fault.final and self._given_up is None:
                 self._given_up = fault.kind
                 note += "; no more questions are asked in this session"
-            return [Turn(number, known, fault=fault.kind, note=note)]
+            return [Turn(number, known if fault.known is None else fault.known, fault=fault.kind, note=note)]
         proposals = [made] if isinstance(made, Proposal) else list(made)
-        return [Turn(number, known, proposal, note=proposal.note) for proposal in proposals]
+        return [Turn(number, known if p.known is None else p.known, p, note=p.note) for p in proposals]
 
     def cancel(self) -> None:
         """Ends what is under way."""

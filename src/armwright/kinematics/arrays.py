@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Link, Vector
 from armwright.exceptions import ArmError
+from armwright.space import JOINT_AXES, DesignSpace
 
 MOST_JOINTS = 8
 LARGEST_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
@@ -66,6 +67,32 @@ def stack_arms(arms: Sequence[Arm]) -> ArmArrays:
         mass=np.array([[link.mass for link in links] for _, links in rigid], dtype=np.float32),
         joint_numbers=moving,
         n_joints=len(kinds),
+    )
+
+
+def arrays_of(space: DesignSpace, matrix: NDArray[np.float64]) -> ArmArrays:
+    """The arms that designs build, equal to the bit to `stack_arms` of their arms, without building them one by one.
+
+    matrix: (N, P) designs as rows (`DesignSpace.matrix`).
+    """
+    n, dof = len(matrix), space.joints
+    axes = np.array([AXES.index(JOINT_AXES[kind]) for kind in space.joint_types], dtype=np.int32)
+    links = matrix[:, 3 + dof :]
+    lower, upper = space.joint_range
+    offset = np.zeros((n, dof, 3), dtype=np.float32)
+    offset[..., 2] = links
+    com = np.zeros((n, dof, 3), dtype=np.float32)
+    com[..., 2] = links / 2
+    return ArmArrays(
+        base=np.ascontiguousarray(matrix[:, :3], dtype=np.float32),
+        axis=np.ascontiguousarray(axes[matrix[:, 3 : 3 + dof].astype(np.int64)]),
+        lower=np.broadcast_to(-_rounded_down([[-lower]]), (n, dof)),
+        upper=np.broadcast_to(_rounded_down([[upper]]), (n, dof)),
+        offset=offset,
+        com=com,
+        mass=np.ascontiguousarray(space.mass.masses(links), dtype=np.float32),
+        joint_numbers=tuple(range(dof)),
+        n_joints=dof,
     )
 
 

@@ -33,6 +33,7 @@ except ImportError as fault:
 CALL_SECONDS = 120.0  # of one request, all attempts of the client included
 CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
 REASKS = 2  # after a refused answer
+ORIGINS = ("model", "scripted")
 SERVER_KEY = "ARMWRIGHT_API_KEY"  # for --base-url, where the server wants a key
 
 OutputMode = Literal["auto", "tool", "native", "prompted"]
@@ -97,6 +98,8 @@ class Chat(Speaker):
             raise SettingsError(
                 f'unknown output "{output}".{did_you_mean(output, OUTPUT_MODES)} Outputs: {", ".join(OUTPUT_MODES)}'
             )
+        if origin not in ORIGINS:
+            raise SettingsError(f'unknown origin "{origin}": {" or ".join(ORIGINS)} is needed')
         self.model = model
         self.origin = origin
         self._model, own_server = _model(model, base_url)
@@ -109,6 +112,11 @@ class Chat(Speaker):
         if seed is not None:
             self._settings["seed"] = seed
         self._pending: set[Future[Any]] = set()
+        self._cancelled = False
+
+    def begin(self) -> None:
+        """A session begins."""
+        self._cancelled = False
 
     def check(self) -> Reply:
         """One tiny question, so that a wrong name, key or address is known before any work is done."""
@@ -139,7 +147,8 @@ class Chat(Speaker):
         return replace(self._run(agent, question, CALL_SECONDS), text=accepted[-1])
 
     def cancel(self) -> None:
-        """Ends all calls under way."""
+        """Ends all calls under way, and those that are about to begin."""
+        self._cancelled = True
         for future in list(self._pending):
             future.cancel()
 
@@ -166,6 +175,8 @@ class Chat(Speaker):
         """
         future = asyncio.run_coroutine_threadsafe(coroutine, _loop())
         self._pending.add(future)
+        if self._cancelled:  # asked for only after the future was listed: `cancel` misses none
+            future.cancel()
         try:
             return future.result()
         except BaseException:

@@ -30,6 +30,10 @@ class People(Speaker):
         self._cancelled = threading.Event()
         self._seen: dict[Path, tuple[int, int]] = {}  # files' sizes and times when last looked at
 
+    def begin(self) -> None:
+        """A session begins."""
+        self._cancelled.clear()
+
     def check(self) -> Reply:
         """People are not asked before there is a question."""
         return Reply("")
@@ -45,6 +49,10 @@ class People(Speaker):
     def cancel(self) -> None:
         """Waits no longer."""
         self._cancelled.set()
+
+    def files(self, number: int) -> tuple[Path, Path]:
+        """The question for trial `number`, and its answer."""
+        return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
 
     def ask_people(self, question: Question, read: TextReader) -> Reply:
         """The answer as `read` gives it; what it refuses (DesignError) is put aside, with the reason, for another."""

@@ -24,6 +24,9 @@ class Recording(Speaker):
         self.origin = next((call.origin for call in calls), "model")
         self.differing: list[str] = []
 
+    def begin(self) -> None:
+        """Nothing to begin."""
+
     def check(self) -> Reply:
         """The first recorded check."""
         return self._play(next(call for call in self.calls if call.step == "check"))

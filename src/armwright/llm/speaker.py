@@ -61,6 +61,10 @@ class Speaker(Protocol):
     model: str
     origin: str
 
+    def begin(self) -> None:
+        """A session begins; what was cancelled before is past."""
+        ...
+
     def check(self) -> Reply:
         """One tiny question, before any work is done; CallError where no answers are to be had."""
         ...
@@ -74,5 +78,5 @@ class Speaker(Protocol):
         ...
 
     def cancel(self) -> None:
-        """Ends all that is under way, at once."""
+        """Ends all that is under way, at once; until the next session nothing more begins."""
         ...

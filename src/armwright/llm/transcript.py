@@ -71,9 +71,9 @@ class Transcript:
             except OSError as fault:
                 raise RunFolderError(f"cannot write {self._path}: {fault.strerror or fault}") from fault
 
-    def answer(self, proposal: str, step: str) -> str | None:
-        """The answer that this step of a proposal got already, if it got one."""
-        found = [c.answer for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.fault is None]
+    def answered(self, proposal: str, step: str) -> Call | None:
+        """The call that answered this step of a proposal, if one did."""
+        found = [c for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.fault is None]
         return found[-1] if found else None
 
 

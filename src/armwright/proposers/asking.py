@@ -75,6 +75,7 @@ class AskingProposer(Proposer):
         self.max_cost = max_cost
         self._form: Form = ANSWERS[asking.answer]
         self._transcript = Transcript(None)
+        self._over = threading.Event()  # of the session, set when nothing more is wanted
         self._under_way = 0
         self._lock = threading.Lock()
 
@@ -92,11 +93,13 @@ class AskingProposer(Proposer):
     def open(self, folder: Path | None) -> None:
         """Reads what was said before in this run."""
         self._transcript = Transcript(None if folder is None else folder / TRANSCRIPTS)
+        self._over = threading.Event()
+        self.speaker.begin()
 
     def check(self) -> None:
         """Makes sure that answers are to be had."""
         try:
-            self._call(CHECK, lambda question: self.speaker.check())
+            self._call(CHECK, lambda question: self.speaker.check(), self._over)
         except ProposalError as fault:
             raise ModelError(
                 f"{fault}. Check the model, its key and --base-url; --proposer rules needs none"
@@ -134,26 +137,34 @@ class AskingProposer(Proposer):
         )
 
     def cancel(self) -> None:
-        """Ends the calls under way."""
+        """Ends the calls under way, and begins no more in this session."""
+        self._over.set()
         self.speaker.cancel()
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """The next designs. An answer that was paid for in a run that was killed is used, not asked again."""
+        over = self._over
         identity = f"{self.name}-{number:04d}"
-        prompt = self.prompt_for(history, seed)
-        if self._form == "then-schema":
-            thoughts = self._transcript.answer(identity, "reasoning")
-            if thoughts is None:
-                thoughts = self._call(Question(identity, "reasoning", prompt, len(history)), self.speaker.ask)
-            extract = parameters_prompt(
-                history.problem, thoughts, proposals=self.asking.proposals, expected=self._expects
-            )
-            question = Question(identity, "parameters", extract, len(history))
-        else:
-            question = Question(identity, "answer", prompt, len(history))
-        text = self._call(question, lambda asked: self.ask_designs(asked, history.problem))
-        answers = read_text(text, history.problem, self.asking.proposals)
-        return self._proposals(identity, answers, len(history))
+        known = len(history)
+        try:
+            if self._form == "then-schema":
+                thoughts = self._transcript.answered(identity, "reasoning")
+                if thoughts is None:
+                    question = Question(identity, "reasoning", self.prompt_for(history, seed), known)
+                    said = self._call(question, self.speaker.ask, over)
+                else:
+                    said, known = thoughts.answer, thoughts.known
+                question = Question(identity, "parameters", self._extract(history.problem, said), known)
+            else:
+                question = Question(identity, "answer", self.prompt_for(history, seed), known)
+            text = self._call(question, lambda asked: self.ask_designs(asked, history.problem), over)
+        except ProposalError as fault:
+            fault.known = known
+            raise
+        return self._proposals(identity, read_text(text, history.problem, self.asking.proposals), known)
+
+    def _extract(self, problem: Problem, said: str) -> str:
+        return parameters_prompt(problem, said, proposals=self.asking.proposals, expected=self._expects)
 
     def prompt_for(self, history: History, seed: int) -> str:
         """What is asked after `history`."""
@@ -196,7 +207,9 @@ class AskingProposer(Proposer):
             for id_, answer in zip(ids, answers, strict=True)
         ]
 
-    def _call(self, question: Question, ask: Callable[[Question], Reply]) -> str:
+    def _call(self, question: Question, ask: Callable[[Question], Reply], over: threading.Event) -> str:
+        if over.is_set():
+            raise ProposalError("cancelled", "the study is over")
         question = self._within_budget(question)
         error = None
         try:

@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
-from armwright.history import sampled_history
-from armwright.llm.prompt import estimated_tokens, parameters_prompt
+from armwright.history import History
+from armwright.llm.feedback import N_PARETO, N_RANDOM
+from armwright.llm.prompt import MOST_TARGETS, MOST_TOKENS, estimated_tokens, parameters_prompt
 from armwright.problem import Problem
 from armwright.proposers.asking import Asking, AskingProposer
 
+TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, by what prompts came to
 THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # that a model is taken to write, for an estimate
 
 
@@ -24,7 +26,7 @@ class LlmProposer(AskingProposer):
     temperature, seed: sent only if they are set.
     output: how an answer is held to a schema: "tool", "native", "prompted"; "auto" chooses by the server.
     max_calls, max_cost: after so many calls, or [USD], of the whole run it asks no more.
-    origin: "scripted" where a stand-in answers instead of a model; it is written with every call.
+    origin: "scripted" where a stand-in answers instead of a model: written with every call, and the trials' source.
     """
 
     def __init__(
@@ -47,7 +49,9 @@ class LlmProposer(AskingProposer):
 
         asking = Asking(prompt, memory, answer, proposals)
         chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
-        super().__init__(chat, asking, "llm", max_calls=max_calls, max_cost=max_cost)
+        # A stand-in's designs must never be taken for a model's: they have a source of their own.
+        name = "llm" if origin == "model" else origin
+        super().__init__(chat, asking, name, max_calls=max_calls, max_cost=max_cost)
         self.model = model
         self.base_url = base_url
         self._sent = {"output": output, "temperature": temperature, "seed": seed, "origin": origin}
@@ -73,18 +77,27 @@ class LlmProposer(AskingProposer):
         return f"{words}; " + ("price not known" if cost is None else f"about {cost:.2f} USD by public prices")
 
     def _tokens_each(self, problem: Problem) -> tuple[int, int]:
-        """Tokens in and out of one proposal: as those so far in this run, else by a prompt with designs at random."""
+        """Tokens in and out of one proposal: as those so far in this run, else as a full prompt has."""
         said = [call for call in self._transcript.calls if call.proposal and call.fault is None]
         asked = {call.proposal for call in said}
         if asked:
             return tuple(
                 sum(n) // len(asked) for n in zip(*((c.input_tokens, c.output_tokens) for c in said), strict=True)
             )  # pyright: ignore[reportReturnType]
-        prompt = self.prompt_for(sampled_history(problem), seed=0)
-        given, written = estimated_tokens(prompt), self.asking.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
+        given = min(
+            MOST_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + _feedback_tokens(problem)
+        )
+        written = self.asking.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
         if self._form == "then-schema":
             given += estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS
         return given, written
+
+
+def _feedback_tokens(problem: Problem) -> int:
+    """Of the feedback in a full prompt, without evaluating anything: an evaluator can be slow."""
+    joints, targets = problem.space.joints, min(len(problem.task.targets), MOST_TARGETS)
+    numbers = targets * (len(problem.objectives) + 3 + joints) + 2 * joints + len(problem.objectives) + 3
+    return (N_PARETO + N_RANDOM) * (TOKENS_A_NUMBER * numbers + TOKENS_A_DESIGN)
 
 
 def _thousands(n: int) -> str:

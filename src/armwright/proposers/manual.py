@@ -31,6 +31,11 @@ class ManualProposer(AskingProposer):
     def check(self) -> None:
         """Nobody is asked before there is a question."""
 
+    def announce(self, number: int) -> str:
+        """Which file waits for which."""
+        asked, answer = self.people.files(number)
+        return f"{asked} waits for your answer in {answer}"
+
     def ask_designs(self, question: Question, problem: Problem) -> Reply:
         """The answer's designs; what is refused is put aside with the reason, and another answer is waited for."""
 

@@ -16,8 +16,8 @@ class Proposal:
 
     reason: in one line.
     expected: the objectives that the proposer expects of it, where it says so.
-    asked, known: the trial that it was asked for, and how many finished trials the proposer knew; filled in for
-        proposals that were made in an earlier session.
+    asked: the trial that it was asked for; needed of proposals that were made in an earlier session.
+    known: how many finished trials it was made from, where fewer than the proposer was given.
     note: what the user should know of how it came about.
     """
 
@@ -26,7 +26,7 @@ class Proposal:
     reason: str = ""
     expected: tuple[float, ...] | None = None
     asked: int = 0
-    known: int = 0
+    known: int | None = None
     note: str = ""
 
 
@@ -82,6 +82,10 @@ class Proposer(Protocol):
 
     def forecast(self, problem: Problem, n: int) -> str:
         """About what `n` more proposals will take, in one line for the user; empty where that is nothing."""
+        return ""
+
+    def announce(self, number: int) -> str:
+        """What the user should know while the proposal for trial `number` is waited for; empty for nothing."""
         return ""
 
     def check(self) -> None:

@@ -1,5 +1,6 @@
 """A recorded run's proposals, played again."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ class ReplayProposer(AskingProposer):
         self.source = Path(source)
         folder = self.source if self.source.is_dir() else self.source.parent
         file = folder / TRANSCRIPTS if self.source.is_dir() else self.source
-        if not file.is_file():
+        if not os.path.isfile(file):
             raise ReplayError(f"there is no {file} to replay; give a run folder or its {TRANSCRIPTS}")
         calls = Transcript(file, read_only=True).calls
         if not any(call.proposal for call in calls):

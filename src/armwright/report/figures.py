@@ -2,7 +2,7 @@
 
 import math
 import shutil
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
@@ -50,6 +52,7 @@ def write_figures(folder: str | Path) -> list[Path]:
 def _figures(history: History) -> Iterator[tuple[str, Figure]]:
     yield "hypervolume", draw_hypervolume(history)
     yield "samples", draw_samples(history)
+    yield "credit", draw_credit(history)
     yield "front", draw_front(history)
     chosen = chosen_members(history)
     yield "arms", draw_arms(history, chosen)
@@ -127,6 +130,25 @@ def draw_samples(history: History) -> Figure:
         axes.set_visible(False)
     panels[0].set_ylabel(_label(history, 1))
     figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_sources(history)) + 1)
+    return figure
+
+
+def draw_credit(history: History) -> Figure:
+    """Who found what over the counted trials: hypervolume gained and designs on the front, stacked by source."""
+    figure = Figure(figsize=(8.4, 3.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    volume, members = figure.subplots(1, 2)
+    _stack(volume, gained_by_source(history) or {})
+    _stack(members, front_by_source(history))
+    for axes, words in ((volume, "Hypervolume gained"), (members, "Designs on the front")):
+        axes.set_xlabel(f"Iteration (after {history.n_init} random trials)")
+        axes.set_ylabel(words)
+    volume.set_title(f"{history.problem.task.name}, reference point {_pair(_reference(history))}")
+    members.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+    if not np.any(history.hypervolume > 0.0):
+        _say(volume, "No design lies within the reference box.")
+    areas = [Patch(**_fill(look(source)), label=look(source).label) for source in reversed(_sources(history))]
+    figure.legend(handles=areas, loc="outside right center", title="found by", alignment="left")
     return figure
 
 
@@ -234,6 +256,20 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
         _say(axes, "No design lies within the reference box.")
 
 
+def _stack(axes: Any, layers: Mapping[str, np.ndarray]) -> None:
+    """Each source's numbers after 0, 1, …, I iterations (I + 1,), one upon the other."""
+    n = max(map(len, layers.values()), default=1)
+    iterations, lower = np.arange(n), np.zeros(n)
+    for source, numbers in layers.items():
+        upper = lower + numbers
+        axes.fill_between(iterations, lower, upper, step="post", **_fill(look(source)), linewidth=0)
+        axes.step(iterations, upper, where="post", color="white", linewidth=0.8)
+        lower = upper
+    axes.step(iterations, lower, where="post", color=FRONT, linewidth=1.2)
+    axes.set_xlim(0, max(1, n - 1))
+    axes.set_ylim(bottom=0)
+
+
 def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
@@ -296,6 +332,10 @@ def _paint(style: Look) -> dict[str, Any]:
     if style.marker == "x":
         return {"color": style.colour, "linewidths": 1.0}
     return {"color": style.colour, "edgecolors": "white", "linewidths": 0.4}
+
+
+def _fill(style: Look) -> dict[str, Any]:
+    return {"facecolor": style.colour, "hatch": style.hatch, "edgecolor": "white"}
 
 
 def _words(history: History, member: FrontMember) -> str:

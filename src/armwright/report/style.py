@@ -12,13 +12,16 @@ class Look(NamedTuple):
     colour: str
     marker: str
     size: float  # [pt²]
+    hatch: str = ""  # of areas
 
 
 _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
     BBO: Look("black box", "#0072B2", "o", 20),
-    "rules": Look("rules", "#D55E00", "^", 44),
-    "llm": Look("language model", "#D55E00", "^", 44),
+    "rules": Look("rules", "#D55E00", "^", 44, "////"),
+    "llm": Look("language model", "#D55E00", "^", 44, "////"),
+    "scripted": Look("scripted stand-in", "#D55E00", "v", 44, "////"),
+    "manual": Look("people", "#D55E00", "s", 36, "////"),
 }
 FRONT = "#111111"
 MISSED = "#CC0000"
@@ -38,6 +41,7 @@ RC: Any = {  # read-only by custom
     "grid.color": "#E6E6E6",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
+    "hatch.linewidth": 0.6,
     "legend.frameon": False,
     "figure.dpi": 100,
     "savefig.dpi": 160,
@@ -48,4 +52,4 @@ RC: Any = {  # read-only by custom
 
 def look(source: str) -> Look:
     """The look of a source; proposers of a user's own look like the built-in ones."""
-    return _LOOKS.get(source, Look(source, "#D55E00", "^", 44))
+    return _LOOKS.get(source, Look(source, "#D55E00", "^", 44, "////"))

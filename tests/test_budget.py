@@ -1,0 +1,80 @@
+"""What a run may spend, and what it says about it."""
+
+from pathlib import Path
+
+import pytest
+
+from armwright.exceptions import ModelError
+from armwright.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.study import Progress, Run, optimize
+from armwright.task import load_task
+from tests.chat_server import ChatServer
+
+PROBLEM = Problem(load_task("target-1"))
+
+
+def run(proposer: LlmProposer, out: Path | None = None, n_total: int = 12, seen: list[Progress] | None = None) -> Run:
+    watch = None if seen is None else seen.append
+    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch)
+
+
+@pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (4, 1), (5, 2), (9, 4), (50, 4)])
+def test_after_so_many_calls_it_asks_no_more(chat_server: ChatServer, most: int, proposals: int) -> None:
+    seen: list[Progress] = []
+    result = run(LlmProposer("m", chat_server.url, max_calls=most), seen=seen)
+    assert len(chat_server.requests) <= most
+    assert sum(trial.source == "llm" for trial in result.trials) == proposals
+    assert result.summary["proposer"]["failures"] == ({"budget": 4 - proposals} if proposals < 4 else {})
+    notes = [progress.note for progress in seen if "--max-calls" in progress.note]
+    assert len(notes) == (proposals < 4)  # said once
+
+
+def test_a_refused_answers_calls_count(chat_server: ChatServer) -> None:
+    """Three requests for one answer; the budget bounds the requests within one call, too."""
+    good = chat_server.answer
+    chat_server.answer = lambda request: "no JSON" if "response_format" in request else good(request)
+    run(LlmProposer("m", chat_server.url, max_calls=4), n_total=6)
+    assert len(chat_server.requests) == 4
+
+
+def test_the_budget_is_the_whole_runs(chat_server: ChatServer, tmp_path: Path) -> None:
+    """Earlier sessions included; a larger one goes on asking."""
+    run(LlmProposer("m", chat_server.url, max_calls=5), tmp_path / "run", n_total=6)
+    again = run(LlmProposer("m", chat_server.url, max_calls=6), tmp_path / "run", n_total=12)
+    assert len(chat_server.requests) == 6
+    assert [trial.fault for trial in again.trials[10:]] == ["budget", None, None, "budget", None, None]
+    more = run(LlmProposer("m", chat_server.url, max_calls=50), tmp_path / "run", n_total=15)
+    assert more.trials[16].source == "llm"
+
+
+def test_a_bound_on_cost_needs_a_price(chat_server: ChatServer) -> None:
+    with pytest.raises(ModelError, match="price of m is not known, so --max-cost cannot hold; use --max-calls"):
+        run(LlmProposer("m", chat_server.url, max_cost=1.0))
+
+
+def test_what_a_run_will_take_is_said_before_it_begins(chat_server: ChatServer) -> None:
+    seen: list[Progress] = []
+    run(LlmProposer("m", chat_server.url), seen=seen)
+    assert seen[0].doing == "beginning"
+    assert seen[0].note.startswith("4 proposals: about 9 calls, ")
+    assert seen[0].note.endswith("; on a server of your own")
+
+
+def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-test-of-a-forecast")
+    forecast = LlmProposer("openai-chat:gpt-4o").forecast(PROBLEM, 20)
+    assert forecast.startswith("20 proposals: about 41 calls, ")
+    assert "USD by public prices" in forecast
+    half = LlmProposer("openai-chat:gpt-4o", answer="one-step", proposals=4).forecast(PROBLEM, 20)
+    assert half.startswith("20 proposals: about 6 calls, ")
+    unknown = LlmProposer("openai-chat:a-model-of-tomorrow").forecast(PROBLEM, 20)
+    assert unknown.endswith("price not known")
+
+
+def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatServer, tmp_path: Path) -> None:
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=6)
+    seen: list[Progress] = []
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=12, seen=seen)
+    # the server counts 100 tokens in and 20 out for each of two calls
+    assert seen[0].note == "2 proposals: about 5 calls, 400 tokens in, 80 out; on a server of your own"
