@@ -81,7 +81,7 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
     """The designs of an answer in free text: its last JSON object, else its last ORIGIN, JOINTS and LINKS lines."""
     text = re.sub(r"<think>.*?</think>", "", text[-LONGEST_ANSWER:], flags=re.DOTALL)
     names = {parameter.name for parameter in problem.space.parameters}
-    for content in _objects(text):
+    for content, _ in _objects(text):
         if names & content.keys() or "designs" in content:
             return read_answers(content, problem, proposals)
     answers = [_read(lines, problem) for lines in _named_lines(text, problem.space)[-proposals:]]
@@ -90,6 +90,11 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
             "no design found: give JSON with one value a parameter, or the lines ORIGIN, JOINTS and LINKS"
         )
     return answers
+
+
+def without_words_around(text: str) -> str:
+    """The last JSON object of a text, as it is written there; the text itself where it holds none."""
+    return next((written for _, written in _objects(text[-LONGEST_ANSWER:])), text)
 
 
 def _property(parameter: Parameter) -> dict[str, Any]:
@@ -141,16 +146,16 @@ def _content(answer: Answer, problem: Problem) -> dict[str, Any]:
     return {**content, "reason": answer.reason}
 
 
-def _objects(text: str) -> Iterator[dict[str, Any]]:
-    """The outermost JSON objects of a text, the last first."""
-    found: list[dict[str, Any]] = []
+def _objects(text: str) -> Iterator[tuple[dict[str, Any], str]]:
+    """The outermost JSON objects of a text with what is written there, the last first."""
+    found: list[tuple[dict[str, Any], str]] = []
     decoder, place = json.JSONDecoder(), text.find("{")
     for _ in range(MOST_OBJECTS):
         if place < 0:
             break
         try:
             content, end = decoder.raw_decode(text, place)
-            found.append(content)
+            found.append((content, text[place:end]))
         except (ValueError, RecursionError):
             end = place + 1
         place = text.find("{", end)
