@@ -12,7 +12,7 @@ from armwright.problem import Problem
 from armwright.study import Run, optimize
 from armwright.task import load_task
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, wants_design
-from tests.wires import OUTPUTS, WIRES, proposer
+from tests.wires import OUTPUTS, proposer
 
 PROBLEM = Problem(load_task("target-1"))
 EXPECTED = {name: value for name, value in GOOD_DESIGN.items() if name != "reason"}
@@ -47,7 +47,7 @@ REFUSED = {
     "null": ({**GOOD_DESIGN, "origin_x": None}, "origin_x"),
 }
 
-every_wire = pytest.mark.parametrize("wire", WIRES)
+both_formats = pytest.mark.parametrize("wire", ["openai", "anthropic"])
 every_output = pytest.mark.parametrize("output", OUTPUTS)
 
 
@@ -69,7 +69,7 @@ def giving(answer: Answer) -> Callable[[Request], Answer]:
 
 @pytest.mark.parametrize("form", IN_ANY_FORM)
 @every_output
-@every_wire
+@both_formats
 def test_the_form_of_an_answer_is_free(
     chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, form: str
 ) -> None:
@@ -81,7 +81,7 @@ def test_the_form_of_an_answer_is_free(
 
 @pytest.mark.parametrize("form", IN_TEXT)
 @pytest.mark.parametrize("output", ["native", "prompted"])
-@every_wire
+@both_formats
 def test_what_stands_around_an_answer_does_not_matter(
     chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, form: str
 ) -> None:
@@ -92,7 +92,7 @@ def test_what_stands_around_an_answer_does_not_matter(
 
 
 @every_output
-@every_wire
+@both_formats
 def test_one_step_takes_thoughts_and_design_from_one_answer(
     chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str
 ) -> None:
@@ -106,7 +106,7 @@ def test_one_step_takes_thoughts_and_design_from_one_answer(
 
 @pytest.mark.parametrize("name", REFUSED)
 @every_output
-@every_wire
+@both_formats
 def test_what_the_space_refuses_is_asked_again_in_its_words(
     chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str, name: str
 ) -> None:
@@ -124,7 +124,7 @@ def test_what_the_space_refuses_is_asked_again_in_its_words(
 
 
 @pytest.mark.parametrize("output", ["native", "prompted"])
-@every_wire
+@both_formats
 def test_a_refused_answer_is_kept_with_the_words_around_it(
     chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str
 ) -> None:
@@ -136,7 +136,7 @@ def test_a_refused_answer_is_kept_with_the_words_around_it(
 
 
 @every_output
-@every_wire
+@both_formats
 def test_a_mended_answer_is_taken(chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str) -> None:
     answers = iter([REFUSED["missing link"][0], REFUSED["NaN"][0], GOOD_DESIGN])
     chat_server.answer = lambda request: json.dumps(next(answers)) if wants_design(request) else designer(request)
@@ -144,7 +144,7 @@ def test_a_mended_answer_is_taken(chat_server: ChatServer, ask: Callable[..., Ru
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-@every_wire
+@both_formats
 def test_numbers_that_are_none_in_json_are_refused(
     chat_server: ChatServer, ask: Callable[..., Run], wire: str, number: str
 ) -> None:

@@ -65,12 +65,6 @@ def ask(
     return run
 
 
-def short_deadlines(name: str, monkeypatch: pytest.MonkeyPatch, deadline: str) -> None:
-    """Where a fault lasts until the deadline, that comes soon."""
-    if name in ENDLESS:
-        monkeypatch.setattr(chat, deadline, 0.2)
-
-
 def after(n: int, fault: Answer, last: int | None = None) -> Callable[[Request], Answer]:
     """Good answers to the first n requests, then the fault: for good, or up to the last-th request."""
     count = iter(range(1, 1_000_000))
@@ -87,7 +81,7 @@ def sources(run: Run) -> Sequence[str]:
 
 
 @every_fault
-@every_wire
+@both_formats
 def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
@@ -97,7 +91,8 @@ def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
     kind: str,
     name: str,
 ) -> None:
-    short_deadlines(name, monkeypatch, "CHECK_SECONDS")
+    if name in ENDLESS:
+        monkeypatch.setattr(chat, "CHECK_SECONDS", 0.2)
     chat_server.answer = lambda request: FAULTS[kind][name]
     with pytest.raises(ModelError) as caught:
         ask(wire)
@@ -121,9 +116,15 @@ def test_later_a_fault_is_a_black_box_trial_and_is_counted(
     kind: str,
     name: str,
 ) -> None:
-    short_deadlines(name, monkeypatch, "CALL_SECONDS")
+    shown: list[Progress] = []
+
+    def watch(progress: Progress) -> None:
+        shown.append(progress)
+        if name in ENDLESS and progress.number == 7:
+            monkeypatch.setattr(chat, "CALL_SECONDS", 0.2)
+
     chat_server.answer = after(3, FAULTS[kind][name])
-    run, shown = ask(wire)
+    run, _ = ask(wire, watch=watch)
     assert sources(run) == ["llm", "bbo", "bbo"] + ["bbo"] * 3
     assert [trial.fault for trial in run.trials[4:]] == [None, None, None, kind, None, None]
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())["proposer"]

@@ -57,7 +57,7 @@ _LOCAL = {
 for _logger in ("openai._base_client", "anthropic._base_client", "httpx2", "httpcore2.http11"):
     logging.getLogger(_logger).addFilter(WithoutKeys())
 
-_WRITTEN = "armwright: written"
+_WRITTEN = "armwright: written"  # in a response's metadata: its text, where only its JSON was kept
 
 Result = TypeVar("Result")
 
