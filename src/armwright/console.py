@@ -181,10 +181,9 @@ def _state(progress: StudyProgress) -> str:
 
 
 def _note(progress: StudyProgress) -> str:
-    """What the user should be told beside the numbers; empty where that is nothing."""
-    if progress.fault:
-        words = progress.note or progress.fault
-        return f"trial {progress.number}: no usable proposal ({words}); a black-box trial took its place"
+    """What the user should be told beside the numbers; empty where that is nothing, or was told before."""
+    if progress.fault and progress.note:
+        return f"trial {progress.number}: no usable proposal ({progress.note}); a black-box trial took its place"
     return progress.note
 
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, cast
 
 from armwright.exceptions import DesignError
@@ -106,6 +107,18 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
     if "designs" in last:
         return read_answers(last, problem, proposals)
     return _read_all([content for _, content in found if "designs" not in content][-proposals:], problem)
+
+
+def without_words_around(text: str) -> str:
+    """The last JSON object of a text, as it is written there; the text itself where it holds none."""
+    text = text[-LONGEST_ANSWER:]
+    found, end = text, 0
+    for brace in islice(re.finditer(r"\{", text), MOST_OBJECTS):
+        if brace.start() >= end:
+            with suppress(ValueError, RecursionError):
+                _, end = _decoder.raw_decode(text, brace.start())
+                found = text[brace.start() : end]
+    return found
 
 
 def _property(parameter: Parameter) -> dict[str, Any]:

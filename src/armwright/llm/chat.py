@@ -1,6 +1,7 @@
-"""Talking to a language model. The only file that imports pydantic-ai."""
+"""Talking to a language model. Only this file and faults.py import pydantic-ai."""
 
 import asyncio
+import logging
 import os
 import re
 import threading
@@ -12,7 +13,8 @@ from functools import cache
 from typing import Any, Literal, TypeVar, get_args
 
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
-from armwright.llm.secrets import redacted
+from armwright.llm.answer import without_words_around
+from armwright.llm.secrets import WithoutKeys, redacted
 from armwright.llm.speaker import CHECK, CallError, Question, Reader, Reply, Speaker
 
 try:
@@ -21,18 +23,23 @@ try:
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
     from pydantic_ai.messages import ModelMessage, ModelResponse, TextPart, ToolCallPart
-    from pydantic_ai.models import Model, infer_model
+    from pydantic_ai.models import Model, ModelRequestParameters, infer_model
     from pydantic_ai.models.openai import OpenAIChatModel
+    from pydantic_ai.models.wrapper import WrapperModel
     from pydantic_ai.output import StructuredDict
     from pydantic_ai.providers.openai_compatible import OpenAICompatibleProvider
     from pydantic_ai.settings import ModelSettings
     from pydantic_ai.usage import UsageLimits
+
+    from armwright.llm.faults import CALL_FAULTS, PASSING, kind_of, words_of
 except ImportError as fault:
     raise MissingExtraError('language models need an extra: pip install "armwright[llm]"') from fault
 
-CALL_SECONDS = 120.0  # of one request, all attempts of the client included
+CALL_SECONDS = 120.0  # of one request, all attempts included
 CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
 REASKS = 2  # after a refused answer
+RETRIES = 2  # after a fault that may pass
+RETRY_SECONDS = 0.5  # before the first retry, where the server says nothing; doubled before the next
 ORIGINS = ("model", "scripted")
 SERVER_KEY = "ARMWRIGHT_API_KEY"  # for --base-url, where the server wants a key
 
@@ -46,31 +53,41 @@ _LOCAL = {
     "vllm": ("http://localhost:8000/v1", "VLLM_BASE_URL", "VLLM_API_KEY"),
 }
 
+# OPENAI_LOG=debug and its like show what a server sent, and what it was sent.
+for _logger in ("openai._base_client", "anthropic._base_client", "httpx2", "httpcore2.http11"):
+    logging.getLogger(_logger).addFilter(WithoutKeys())
+
+_WRITTEN = "armwright: written"  # in a response's metadata: its text, where only its JSON was kept
+
 Result = TypeVar("Result")
 
-# The word for statistics, by the most specific class first.
-_KINDS: tuple[tuple[type[Exception], str], ...] = (
-    (faults.ModelAuthenticationError, "key"),
-    (faults.ModelQuotaExceededError, "quota"),
-    (faults.ModelRateLimitError, "rate_limit"),
-    (faults.ModelNotFoundError, "unknown_model"),
-    (faults.ModelContextWindowExceededError, "context"),
-    (faults.ModelRequestRejectedError, "rejected"),
-    (faults.ModelRequestTimeout, "timeout"),
-    (faults.ModelTimeoutError, "timeout"),
-    (faults.ModelConnectionError, "connection"),
-    (faults.ModelUnavailableError, "server"),
-    (faults.ModelServerError, "server"),
-    (faults.ModelAPIError, "server"),
-    (faults.ContentFilterError, "refused"),
-    (faults.UnexpectedModelBehavior, "answer"),
-    (faults.UsageLimitExceeded, "limit"),
-    (faults.RunCancelled, "cancelled"),
-)
 
+class _Server(WrapperModel):
+    """A model that is asked again after a fault that may pass, and whose JSON may stand among words.
 
-# What pydantic-ai trips over in some malformed responses, such as an empty list of choices.
-_MALFORMED = (LookupError, TypeError, ValueError, AttributeError)
+    Vendors' clients ask again, too, but also after a spent quota, and wait for an hour if they are told to; here a
+    server that wants more patience than the deadline leaves has failed.
+    """
+
+    async def request(
+        self,
+        messages: list[ModelMessage],
+        model_settings: ModelSettings | None,
+        model_request_parameters: ModelRequestParameters,
+    ) -> ModelResponse:
+        deadline = time.monotonic() + (model_settings or {}).get("request_timeout", CALL_SECONDS)
+        retries = 0
+        while True:
+            try:
+                response = await super().request(messages, model_settings, model_request_parameters)
+                in_text = model_request_parameters.output_mode in ("native", "prompted")
+                return _json_alone(response) if in_text else response
+            except PASSING as fault:
+                pause = RETRY_SECONDS * 2**retries if fault.retry_after is None else fault.retry_after
+                if retries == RETRIES or time.monotonic() + pause >= deadline:
+                    raise
+            retries += 1
+            await asyncio.sleep(pause)
 
 
 class Chat(Speaker):
@@ -102,7 +119,8 @@ class Chat(Speaker):
             raise SettingsError(f'unknown origin "{origin}": {" or ".join(ORIGINS)} is needed')
         self.model = model
         self.origin = origin
-        self._model, own_server = _model(model, base_url)
+        inner, own_server = _model(model, base_url)
+        self._model = _Server(inner)
         if output == "auto":
             output = "native" if own_server else "tool"
         self._output = _OUTPUTS[output]
@@ -144,7 +162,7 @@ class Chat(Speaker):
         output = self._output(StructuredDict(dict(schema)))
         agent: Agent[None, Any] = Agent(self._model, output_type=output, retries=REASKS)
         agent.output_validator(accept)
-        return replace(self._run(agent, question, CALL_SECONDS), text=accepted[-1])
+        return replace(self._run(agent, question, CALL_SECONDS), text=_clean(accepted[-1]))
 
     def cancel(self) -> None:
         """Ends all calls under way, and those that are about to begin."""
@@ -154,7 +172,7 @@ class Chat(Speaker):
 
     def _run(self, agent: Agent[None, Any], question: Question, seconds: float) -> Reply:
         started = time.perf_counter()
-        settings: ModelSettings = {**self._settings, "request_timeout": seconds}
+        settings: ModelSettings = {**self._settings, "request_timeout": seconds, "max_retries": 0}
         limits = UsageLimits(request_limit=question.most_requests)
         with capture_run_messages() as messages:
             try:
@@ -162,9 +180,9 @@ class Chat(Speaker):
             except CancelledError as fault:
                 reply = _reply(messages, time.perf_counter() - started)
                 raise CallError("cancelled", f"{self.model}: the call was ended", reply) from fault
-            except (faults.AgentRunError, faults.UserError, *_MALFORMED) as fault:
+            except CALL_FAULTS as fault:
                 reply = _reply(messages, time.perf_counter() - started)
-                raise CallError(_kind(fault), f"{self.model}: {_first_line(fault)}", reply) from fault
+                raise CallError(kind_of(fault), f"{self.model}: {_one_line(words_of(fault))}", reply) from fault
         return _reply(messages, time.perf_counter() - started)
 
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
@@ -222,10 +240,10 @@ def _model(name: str, base_url: str | None) -> tuple[Model, bool]:
         return infer_model(name), False
     except faults.UserError as fault:
         key = re.search(r"\b[A-Z_]+_(?:API_KEY|ENDPOINT)\b", str(fault))
-        words = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_first_line(fault)}"
+        words = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_one_line(fault)}"
         raise SettingsError(f"model {name} {words}") from fault
     except ImportError as fault:
-        raise MissingExtraError(f"model {name} needs another package: {_first_line(fault)}") from fault
+        raise MissingExtraError(f"model {name} needs another package: {_one_line(fault)}") from fault
 
 
 def _own_server(name: str, base_url: str, key_name: str) -> Model:
@@ -256,14 +274,22 @@ def _reply(messages: Sequence[ModelMessage], seconds: float) -> Reply:
     )
 
 
-def _text(response: ModelResponse) -> str:
-    """What the model wrote, the arguments of a tool call included, so that a refused answer can be read later.
+def _json_alone(response: ModelResponse) -> ModelResponse:
+    """The response without the words around its JSON; `_text` finds them in its metadata."""
+    parts = [
+        replace(p, content=without_words_around(p.content)) if isinstance(p, TextPart) else p for p in response.parts
+    ]
+    return replace(response, parts=parts, metadata={**(response.metadata or {}), _WRITTEN: _text(response)})
 
-    Without lone surrogates, which JSON can carry and UTF-8 cannot.
-    """
-    written = [part.content for part in response.parts if isinstance(part, TextPart)]
-    written += [part.args_as_json_str() for part in response.parts if isinstance(part, ToolCallPart)]
-    return redacted("\n".join(written).encode("utf-8", "replace").decode("utf-8"))
+
+def _text(response: ModelResponse) -> str:
+    """What the model wrote, the arguments of a tool call included, so that a refused answer can be read later."""
+    if response.metadata and _WRITTEN in response.metadata:
+        return response.metadata[_WRITTEN]
+    written = [str(part.content or "") for part in response.parts if isinstance(part, TextPart)]  # null, from some
+    calls = [part for part in response.parts if isinstance(part, ToolCallPart)]
+    written += [call.args if isinstance(call.args, str) else call.args_as_json_str() for call in calls]
+    return _clean("\n".join(written))
 
 
 def _cost(response: ModelResponse) -> float | None:
@@ -274,15 +300,14 @@ def _cost(response: ModelResponse) -> float | None:
         return None
 
 
-def _kind(fault: Exception) -> str:
-    if isinstance(fault, _MALFORMED):
-        return "answer"
-    return next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
+def _clean(text: str) -> str:
+    """Without keys, and without lone surrogates, which JSON can carry and UTF-8 cannot."""
+    return redacted(text.encode("utf-8", "replace").decode("utf-8"))
 
 
-def _first_line(fault: BaseException) -> str:
-    text = redacted(" ".join(str(fault).split())).encode("utf-8", "replace").decode("utf-8").rstrip(".")
-    return text if len(text) <= 300 else text[:297] + "..."
+def _one_line(text: object) -> str:
+    line = _clean(" ".join(str(text).split())).rstrip(".")
+    return line if len(line) <= 300 else line[:297] + "..."
 
 
 @cache

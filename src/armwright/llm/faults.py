@@ -1,0 +1,101 @@
+"""What goes wrong in a call to a model: in one word for statistics, and in words for people."""
+
+from typing import Any, cast
+
+import httpx2
+from pydantic_ai import exceptions as faults
+
+# The word for statistics, by the most specific class first.
+_KINDS: tuple[tuple[type[Exception], str], ...] = (
+    (faults.ModelAuthenticationError, "key"),
+    (faults.ModelQuotaExceededError, "quota"),
+    (faults.ModelRateLimitError, "rate_limit"),
+    (faults.ModelNotFoundError, "unknown_model"),
+    (faults.ModelContextWindowExceededError, "context"),
+    (faults.ModelRequestRejectedError, "rejected"),
+    (faults.ModelRequestTimeout, "timeout"),
+    (faults.ModelTimeoutError, "timeout"),
+    (faults.ModelConnectionError, "connection"),
+    (faults.ModelUnavailableError, "server"),
+    (faults.ModelServerError, "server"),
+    (faults.ModelHTTPError, "rejected"),  # another status than the usual ones
+    (faults.ModelAPIError, "answer"),  # no error of the server's, but nothing that can be read
+    (faults.ContentFilterError, "refused"),
+    (faults.UnexpectedModelBehavior, "answer"),
+    (faults.UsageLimitExceeded, "limit"),
+    (faults.RunCancelled, "cancelled"),
+    (httpx2.TransportError, "connection"),
+)
+
+# What pydantic-ai trips over in some malformed responses: an empty list of choices, a stream without a beginning,
+# JSON that never ends its brackets, what is not compressed though it says so.
+_MALFORMED = (
+    LookupError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    AssertionError,
+    ArithmeticError,
+    RecursionError,
+    httpx2.DecodingError,
+)
+
+# All that a call may end with, a bug of ours excepted.
+CALL_FAULTS = (faults.AgentRunError, faults.UserError, httpx2.TransportError, *_MALFORMED)
+
+# What may be gone a moment later.
+PASSING = (
+    faults.ModelRateLimitError,
+    faults.ModelUnavailableError,
+    faults.ModelServerError,
+    faults.ModelConnectionError,
+)
+
+
+def kind_of(fault: Exception) -> str:
+    """One word: key, quota, rate_limit, server, timeout, connection, context, refused, answer, …"""
+    if _key_cannot_be_sent(fault):
+        return "key"
+    if isinstance(fault, _MALFORMED):
+        return "answer"
+    return next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
+
+
+def words_of(fault: Exception) -> str:
+    """What went wrong, in the server's own words where it gave some, else with the reason behind it."""
+    if _key_cannot_be_sent(fault):
+        return "its key cannot be sent: it holds a line break, or a letter that no key has"
+    if isinstance(fault, faults.ModelHTTPError):
+        said = _message(fault.body)
+        return f"{said} (HTTP {fault.status_code})" if said else str(fault)
+    if isinstance(fault, faults.UnexpectedModelBehavior | faults.ModelConnectionError):
+        behind = _causes(fault)[-1]
+        reason = str(behind) or type(behind).__name__
+        return fault.message if reason in str(fault) else f"{fault.message.rstrip('.')}: {reason}"
+    return str(fault)
+
+
+def _message(body: Any) -> str | None:
+    """The message of an error's body: OpenAI's {"message": …}, Anthropic's {"error": {"message": …}}."""
+    for _ in range(2):
+        if isinstance(body, dict):
+            content = cast("dict[str, Any]", body)
+            body = content.get("message") or content.get("error")
+    return body if isinstance(body, str) else None
+
+
+def _key_cannot_be_sent(fault: BaseException) -> bool:
+    """Headers hold no line breaks, and ASCII alone."""
+    return any(
+        (isinstance(cause, UnicodeEncodeError) and cause.encoding == "ascii")
+        or str(cause).startswith("Illegal header value")
+        for cause in _causes(fault)
+    )
+
+
+def _causes(fault: BaseException) -> list[BaseException]:
+    """The fault, and what is behind it."""
+    causes = [fault]
+    while (cause := causes[-1].__cause__) is not None and cause not in causes:
+        causes.append(cause)
+    return causes

@@ -1,0 +1,149 @@
+"""Keys stay in the environment: a server that repeats them everywhere, and everything that is shown and written."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from armwright.llm.secrets import redacted
+from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, wants_design
+from tests.wires import ANTHROPIC_KEY, OPENAI_KEY, SERVER_KEY, WIRES, environment
+
+SHORT = ("--n-init", "4", "--n-step", "1", "--n-total", "6")
+KEYS = (OPENAI_KEY, ANTHROPIC_KEY, SERVER_KEY)
+
+
+def armwright(server: ChatServer, *args: str, **more: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "armwright", *args],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment(server), **more},
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def model_of(wire: str, server: ChatServer) -> tuple[str, ...]:
+    model = WIRES[wire]
+    return ("--model", "m", "--base-url", server.url) if model is None else ("--model", model)
+
+
+def no_key_in(text: str) -> None:
+    """Neither whole, nor its beginning or end."""
+    for key in KEYS:
+        assert key not in text
+        assert key[:12] not in text
+        assert key[-8:] not in text
+
+
+def sent_key(server: ChatServer) -> str:
+    """What the request under way carries."""
+    headers = server.headers[-1]
+    return headers.get("x-api-key") or headers["authorization"].removeprefix("Bearer ")
+
+
+def parrot(server: ChatServer) -> Callable[[Request], Answer]:
+    """Repeats the key in what it answers: a design, an error, a value that is refused, a page, a wrong key."""
+    answers = iter(["text", "text", "design", "rejected", "text", "value", "value", "value", *["page"] * 3, "key"])
+
+    def answer(request: Request) -> Answer:
+        key, kind = sent_key(server), next(answers)
+        if kind == "text":
+            assert not wants_design(request)
+            return f"Your key is {key}, in short {key[:14]}, or {key[:8]}****{key[-4:]}."
+        if kind == "design":
+            return json.dumps({**GOOD_DESIGN, "reason": f"{key} told me, that is {key[-14:]}"})
+        if kind == "value":
+            return json.dumps({**GOOD_DESIGN, "joint_1": key, "link_1": f"{key} m"})
+        if kind == "rejected":
+            return 400, json.dumps({"error": {"message": f"{key} may not", "type": key, "code": key}})
+        if kind == "page":
+            headers = {"retry-after": "0", "set-cookie": key}
+            return Response(f"<h1>500</h1><pre>{request}\nauthorization: {key}</pre>", 500, headers, "text/html")
+        words = f"Incorrect API key provided: {key[:8]}{'*' * 20}{key[-4:]}. You can find your API key at …"
+        return 401, json.dumps(
+            {"error": {"message": words, "type": "invalid_request_error", "code": "invalid_api_key"}}
+        )
+
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("wire", "logs"),
+    [("own server", {}), ("openai", {"OPENAI_LOG": "debug"}), ("anthropic", {"ANTHROPIC_LOG": "debug"})],
+)
+def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wire: str, logs: dict[str, str]) -> None:
+    chat_server.answer = parrot(chat_server)
+    how = ("--json",) if logs else ()
+    done = armwright(
+        chat_server, "optimize", "target-1", *SHORT, *model_of(wire, chat_server), "--out", "run", *how, **logs
+    )
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((in_folder / "run" / "summary.json").read_text())
+    assert summary["proposer"]["failures"] == {"rejected": 1, "answer": 1, "server": 1, "key": 2}
+    assert sent_key(chat_server) in KEYS
+    files = [path for path in in_folder.rglob("*") if path.is_file()]
+    assert {"config.yaml", "transcripts.jsonl", "trials.jsonl", "summary.json"} <= {path.name for path in files}
+    for path in files:
+        no_key_in(path.read_bytes().decode("latin-1"))
+    no_key_in(done.stdout + done.stderr)
+    assert "_API_KEY>" in (in_folder / "run" / "transcripts.jsonl").read_text()
+    shown = done.stderr if how else done.stdout
+    assert "DEBUG] HTTP Re" in shown or not logs
+    assert "iteration 6/6" in shown
+    assert "failed 5" in shown
+    assert shown.count("no usable proposal") == 4  # the last fault is told once
+    assert shown.count("no more questions are asked in this session") == 1
+
+
+@pytest.mark.parametrize("command", [("optimize", "target-1", *SHORT), ("doctor", "--call")], ids=lambda c: c[0])
+def test_no_key_is_shown_where_the_first_call_fails(
+    chat_server: ChatServer, in_folder: Path, command: tuple[str, ...]
+) -> None:
+    chat_server.answer = lambda request: (401, json.dumps({"error": {"message": f"bad: {sent_key(chat_server)}"}}))
+    done = armwright(chat_server, *command, *model_of("openai", chat_server))
+    assert done.returncode == 1
+    assert done.stderr.startswith("armwright: openai-chat:gpt-4o: bad: <OPENAI_API_KEY> (HTTP 401)")
+    assert len(done.stderr.splitlines()) == 1
+    no_key_in(done.stdout + done.stderr)
+
+
+def test_no_key_is_shown_where_the_first_call_repeats_it(chat_server: ChatServer, in_folder: Path) -> None:
+    chat_server.answer = parrot(chat_server)
+    done = armwright(chat_server, "doctor", "--call", *model_of("anthropic", chat_server))
+    assert done.returncode == 0, done.stderr
+    assert '"Your key is <ANTHROPIC_API_KEY>' in done.stdout
+    no_key_in(done.stdout + done.stderr)
+
+
+KEY = "sk-proj-abcdefghijklmnopqrstuvwxyz0123"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        (f"key {KEY}!", "key <MY_KEY>!"),
+        (f"{KEY}{KEY}", "<MY_KEY><MY_KEY>"),
+        (f"key {KEY[:20]}", "key <MY_KEY>"),
+        (f"ends in {KEY[-12:]}", "ends in <MY_KEY>"),
+        ("sk-proj-************0123.", "<MY_KEY>."),
+        ("sk-p...0123", "<MY_KEY>"),
+        ("sk-proj-abc…", "<MY_KEY>"),
+        ("**bold**, 2**3, and so on...", "**bold**, 2**3, and so on..."),
+        ("sk-other-*******9999", "sk-other-*******9999"),
+        ("a short word: shortest", "a short word: shortest"),
+    ],
+)
+def test_keys_are_blotted_out(monkeypatch: pytest.MonkeyPatch, text: str, shown: str) -> None:
+    monkeypatch.setenv("MY_KEY", KEY)
+    monkeypatch.setenv("SHORT_KEY", "short")
+    assert redacted(text) == shown
+
+
+def test_a_key_with_line_breaks_is_blotted_out_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MY_TOKEN", "first-piece\nsecond-piece\n")
+    assert redacted("b'first-piece\\nsecond-piece\\n'") == "b'<MY_TOKEN>\\n<MY_TOKEN>\\n'"
