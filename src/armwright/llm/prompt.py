@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -138,9 +138,13 @@ def builtin_template(name: str) -> str:
 
 def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expected: bool = False) -> str:
     """The prompt of the second call: the free answer turned into parameters."""
-    template = _environment().get_template("parameters.md.j2")
     values = {"parameters": problem.space.parameters, "proposals": proposals, "expected": expected, "answer": answer}
-    return _tidy(template.render(values))
+    return rendered("parameters.md.j2", values)
+
+
+def rendered(name: str, values: Mapping[str, Any]) -> str:
+    """A template that comes with armwright, with these values."""
+    return _tidy(_environment().get_template(name).render(values))
 
 
 def estimated_tokens(text: str) -> int:
