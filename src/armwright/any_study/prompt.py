@@ -57,6 +57,7 @@ def study_prompt(
     best = best_trials(complete, study.directions)
     drawn = _drawn(complete, best, seed, ranked=len(objectives) == 1)
     own = [trial for trial in complete if _is_of(trial, name)] if memory == "own" else []
+    under_way = [_params(_given(trial), parameters) for trial in trials if _is_proposal_under_way(trial)]
     common = {
         "description": description.strip(),
         "parameters": parameters,
@@ -65,6 +66,7 @@ def study_prompt(
         "n_complete": len(complete),
         "n_pruned": sum(trial.state == TrialState.PRUNED for trial in trials),
         "n_failed": sum(trial.state == TrialState.FAIL for trial in trials),
+        "under_way": under_way[-N_RANDOM:],
         "n_proposed": len(own),
         "expected": memory == "own",
         "form": form,
@@ -121,21 +123,31 @@ def _some(trials: Sequence[FrozenTrial], n: int, rng: np.random.Generator) -> li
 def _record(
     trial: FrozenTrial, parameters: Sequence[Parameter], objectives: Sequence[Told], best: Sequence[FrozenTrial]
 ) -> Mapping[str, Any]:
-    params = [
-        f"{p.key} = {value_text(trial.params[p.name], p.distribution)}" for p in parameters if p.name in trial.params
-    ]
     violated = [f"{name} = {_short(value)}" for name, value in trial.constraints.items() if not value <= 0.0]
     expected = trial.user_attrs.get("expected")
     return {
         "number": trial.number,
         "proposed": "proposal" in trial.user_attrs,
-        "params": ", ".join(params),
-        "values": _values(trial.values, objectives),
+        "params": _params(trial.params, parameters),
+        "outcome": _values(trial.values, objectives),
         "violated": ", ".join(violated),
         "expected": "not said" if expected is None else _values(expected, objectives),
         "reason": trial.user_attrs.get("reason") or "not said",
         "best": any(trial.number == other.number for other in best),
     }
+
+
+def _params(params: Mapping[str, Any], parameters: Sequence[Parameter]) -> str:
+    return ", ".join(f"{p.key} = {value_text(params[p.name], p.distribution)}" for p in parameters if p.name in params)
+
+
+def _is_proposal_under_way(trial: FrozenTrial) -> bool:
+    return "proposal" in trial.user_attrs and not trial.state.is_finished()
+
+
+def _given(trial: FrozenTrial) -> Mapping[str, Any]:
+    """What an enqueued trial will be evaluated with, as far as that is fixed."""
+    return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
 
 
 def _values(values: Sequence[float], objectives: Sequence[Told]) -> str:
