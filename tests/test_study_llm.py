@@ -237,7 +237,15 @@ def test_names_that_vendors_do_not_take_have_plain_ones(chat_server: ChatServer)
     assert "- layer_1_units (layer 1/units): whole number, 1 to 9" in chat_server.prompts()[0]
 
 
-@pytest.mark.parametrize("settings", [{"memory": "all"}, {"answer": "three-step"}, {"answer": "text"}])
+def test_a_given_space_of_another_kind_is_refused(chat_server: ChatServer) -> None:
+    llm = proposer(chat_server, space={"C": IntDistribution(1, 9)})
+    with pytest.raises(SettingsError, match="C is whole number, 1 to 9; in the study's trials it is number"):
+        llm.propose(study_of(2), 0, 2)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"memory": "all"}, {"answer": "three-step"}, {"answer": "text"}, {"transcript": "no/where.jsonl"}]
+)
 def test_wrong_settings_are_refused(chat_server: ChatServer, settings: dict[str, str]) -> None:
     with pytest.raises(SettingsError):
         proposer(chat_server, **settings)
