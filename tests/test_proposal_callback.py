@@ -186,10 +186,10 @@ def test_several_processes_on_one_storage_share_the_proposals(
     assert [worker.wait() for worker in workers] == [0, 0, 0]
     finished = [trial.number for trial in study.trials if trial.state.is_finished()]
     assert len(finished) == 30
-    asked = {f"llm-{number + 1:04d}" for number in finished if number % 5 == 3}
+    asked = {f"scripted-{number + 1:04d}" for number in finished if number % 5 == 3}
     study.sampler = NSGAIISampler(population_size=8, seed=9)
     study.optimize(lambda trial: (trial.suggest_float("x", 0.0, 1.0), 0.0), n_trials=3)  # what was left waiting
-    came = [trial for trial in study.trials if trial.user_attrs.get("source") == "llm"]
+    came = [trial for trial in study.trials if trial.user_attrs.get("source") == "scripted"]
     assert Counter(trial.user_attrs["proposal"] for trial in came) == dict.fromkeys(asked, 1)
     assert len(chat_server.requests) == len(asked) >= 5
     assert {trial.params["x"] for trial in came} == {0.125}
@@ -370,7 +370,7 @@ def test_the_language_model_for_arms_works_in_a_plain_study(chat_server: ChatSer
     proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
     study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 8, ProposalCallback(proposer, 4, problem=PROBLEM))
     assert [trial.user_attrs.get("proposal") for trial in study.trials] == [
-        *(None, None, None, "llm-0003", None, None, None, "llm-0007")
+        *(None, None, None, "scripted-0003", None, None, None, "scripted-0007")
     ]
     assert study.trials[3].user_attrs["reason"] == "a universal shoulder at the centre"
     assert "3 designs have been evaluated" in chat_server.prompts()[0]

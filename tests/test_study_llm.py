@@ -73,12 +73,18 @@ def test_the_models_parameters_are_evaluated_as_it_gave_them(chat_server: ChatSe
     for number in (9, 19):
         trial = study.trials[number]
         assert trial.params == {"kernel": "rbf", "C": 10.0, "gamma": 0.01, "shrinking": True}
-        assert trial.user_attrs == {"source": "llm", "proposal": f"llm-{number:04d}", "reason": "a usual start"}
+        assert trial.user_attrs == {
+            "source": "scripted",
+            "proposal": f"scripted-{number:04d}",
+            "reason": "a usual start",
+        }
         assert trial.state is TrialState.COMPLETE
     assert (callback.proposed, callback.faults) == (2, {})
     calls = Transcript(tmp_path / "calls.jsonl").calls
     assert [(call.proposal, call.step, call.known, call.origin) for call in calls] == [
-        (f"llm-{number:04d}", step, number, "scripted") for number in (9, 19) for step in ("reasoning", "parameters")
+        (f"scripted-{number:04d}", step, number, "scripted")
+        for number in (9, 19)
+        for step in ("reasoning", "parameters")
     ]
     assert json.loads(calls[1].answer)["parameters"]["C"] == 10.0
     assert callback.proposer.summary().calls == 4
@@ -142,7 +148,7 @@ def test_one_step_asks_once(chat_server: ChatServer) -> None:
     study = study_of(10, ProposalCallback(proposer(chat_server, answer="one-step"), every=10))
     assert len(chat_server.requests) == 1
     assert "reasoning" in chat_server.requests[0]["response_format"]["json_schema"]["schema"]["properties"]
-    assert study.trials[9].user_attrs["source"] == "llm"
+    assert study.trials[9].user_attrs["source"] == "scripted"
 
 
 def test_with_a_memory_it_sees_what_it_expected_and_what_came_out(chat_server: ChatServer) -> None:
@@ -171,7 +177,7 @@ def test_a_refused_answer_goes_back_in_words(chat_server: ChatServer, wrong: dic
     study = study_of()
     study.enqueue_trial({"kernel": "poly"})
     study.optimize(objective, n_trials=10, callbacks=[callback])
-    assert study.trials[9].user_attrs["source"] == "llm"
+    assert study.trials[9].user_attrs["source"] == "scripted"
     assert words in chat_server.prompts()[-1]
     assert callback.faults == {}
 

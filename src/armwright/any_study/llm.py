@@ -31,7 +31,7 @@ class StudyLlmProposer(Dialogue, StudyProposer):
     temperature, seed: sent only if they are set.
     output: how an answer is held to a schema: "tool", "native", "prompted"; "auto" chooses by the server.
     max_calls, max_cost: after so many calls, or [USD], of the whole transcript it asks no more.
-    origin: "scripted" where a stand-in answers instead of a model; it is written with every call.
+    origin: "scripted" where a stand-in answers instead of a model: written with every call, and the trials' source.
     """
 
     def __init__(
@@ -57,7 +57,8 @@ class StudyLlmProposer(Dialogue, StudyProposer):
         if answer == "text":
             raise SettingsError('answer "text" is for people; "two-step" or "one-step" is needed')
         chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
-        super().__init__(chat, "llm", max_calls=max_calls, max_cost=max_cost)
+        # A stand-in's trials must never be taken for a model's: they have a source of their own.
+        super().__init__(chat, "llm" if origin == "model" else origin, max_calls=max_calls, max_cost=max_cost)
         self.description = description
         self.memory = memory
         self._form: Form = ANSWERS[answer]
