@@ -11,6 +11,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from armwright.any_study.callback import ProposalCallback
+    from armwright.any_study.llm import StudyLlmProposer
+    from armwright.any_study.proposals import StudyProposal, StudyProposer
     from armwright.arm import Arm, Joint, Link, uniform_link
     from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
@@ -47,11 +50,15 @@ _PLACES = {
     "ManualProposer": "proposers.manual",
     "Problem": "problem",
     "Proposal": "proposers.proposer",
+    "ProposalCallback": "any_study.callback",
     "ProposalError": "exceptions",
     "Proposer": "proposers.proposer",
     "ReplayProposer": "proposers.replay",
     "RulesProposer": "proposers.rules",
     "Run": "study",
+    "StudyLlmProposer": "any_study.llm",
+    "StudyProposal": "any_study.proposals",
+    "StudyProposer": "any_study.proposals",
     "Task": "task",
     "UsageError": "exceptions",
     "builtin_tasks": "task",
@@ -84,11 +91,15 @@ __all__ = [
     "ManualProposer",
     "Problem",
     "Proposal",
+    "ProposalCallback",
     "ProposalError",
     "Proposer",
     "ReplayProposer",
     "RulesProposer",
     "Run",
+    "StudyLlmProposer",
+    "StudyProposal",
+    "StudyProposer",
     "Task",
     "UsageError",
     "builtin_tasks",

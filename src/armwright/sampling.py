@@ -4,8 +4,9 @@ A fresh sampler, seeded from (seed, trial number), draws each trial: a resumed s
 whole run would repeat its first draws, this one goes on as if it had never stopped.
 """
 
+import threading
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from importlib.util import find_spec
 from typing import Any
 
@@ -30,6 +31,8 @@ SAMPLING = 1  # the place of its seeds under the run's seed
 # 8.7 (TPE 12.0); with the rules 14.7, 14.7, 14.7, 14.5, 14.5 (TPE 14.7). So few seeds tell 10 from 50, not from 5.
 POPULATION = 10
 GP_PACKAGES = ("torch", "scipy", "greenlet")  # the extra armwright[gp]
+
+_verbosity = threading.Lock()  # of the process; else two threads would put back each other's
 
 
 def _tpe(seed: int) -> BaseSampler:
@@ -112,7 +115,7 @@ class BlackBox:
         self._seed = seed
         self._distributions = distributions(space)
         self._storage = InMemoryStorage()
-        self._study = _quiet_study(self._storage, n_objectives)
+        self._study = quiet_study(self._storage, [StudyDirection.MINIMIZE] * n_objectives)
         self._study_id = self._storage.get_study_id_from_name(self._study.study_name)
         self._study_notes = self._storage.get_study_system_attrs(self._study_id)
 
@@ -190,11 +193,13 @@ def _attributes(source: str, proposal: str | None) -> dict[str, Any]:
     return {"source": source} if proposal is None else {"source": source, "proposal": proposal}
 
 
-def _quiet_study(storage: InMemoryStorage, n_objectives: int) -> optuna.Study:
-    # Optuna announces each study at INFO; the user's own verbosity is put back.
-    verbosity = optuna.logging.get_verbosity()
-    optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
-    try:
-        return optuna.create_study(storage=storage, directions=[StudyDirection.MINIMIZE] * n_objectives)
-    finally:
-        optuna.logging.set_verbosity(verbosity)
+def quiet_study(storage: InMemoryStorage, directions: Sequence[StudyDirection]) -> optuna.Study:
+    """A new study that Optuna does not announce."""
+    with _verbosity:
+        # Optuna announces each study at INFO; the user's own verbosity is put back.
+        verbosity = optuna.logging.get_verbosity()
+        optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
+        try:
+            return optuna.create_study(storage=storage, directions=directions)
+        finally:
+            optuna.logging.set_verbosity(verbosity)

@@ -183,7 +183,12 @@ def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expe
         "answer": answer,
         "fence": fence(answer),
     }
-    return _tidy(_sandbox().rendered(_sandbox().get_template("parameters.md.j2"), values))
+    return rendered("parameters.md.j2", values)
+
+
+def rendered(name: str, values: Mapping[str, Any]) -> str:
+    """A template that comes with armwright, with these values."""
+    return _tidy(_sandbox().rendered(_sandbox().get_template(name), values))
 
 
 def estimated_tokens(text: str) -> int:

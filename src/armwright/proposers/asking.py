@@ -1,10 +1,8 @@
 """A proposer that asks: what the language model, a recording of one, and people in its place have in common."""
 
-import threading
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +10,13 @@ from armwright.exceptions import DesignError, ModelError, ProposalError, Setting
 from armwright.history import History
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.llm.prompt import MEMORIES, Form, Prompt, load_prompt, parameters_prompt
-from armwright.llm.speaker import CHECK, CallError, Question, Reply, Speaker
-from armwright.llm.transcript import Call, Transcript
+from armwright.llm.speaker import CHECK, Question, Reply, Speaker
 from armwright.problem import Problem
-from armwright.proposers.proposer import Proposal, Proposer, ProposerSummary
+from armwright.proposers.dialogue import Dialogue
+from armwright.proposers.proposer import Proposal, Proposer
 
 TRANSCRIPTS = "transcripts.jsonl"
 ANSWERS: Mapping[str, Form] = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
-NEVER_MADE = ("missing", "cancelled")  # faults of calls that nobody answered, and that cost nothing
 LAST_STEPS = ("parameters", "answer")  # the steps whose answers are designs
 MOST_PROPOSALS = 100  # a call
 
@@ -49,7 +46,7 @@ class Asking:
             raise SettingsError(f"proposals = {self.proposals}: a whole number from 1 to {MOST_PROPOSALS} is needed")
 
 
-class AskingProposer(Proposer):
+class AskingProposer(Dialogue, Proposer):
     """Asks a speaker for each proposal, and keeps what was said.
 
     name: the `source` of its trials.
@@ -66,18 +63,11 @@ class AskingProposer(Proposer):
         max_calls: int | None = None,
         max_cost: float | None = None,
     ) -> None:
-        self.name = name
+        super().__init__(speaker, name, max_calls=max_calls, max_cost=max_cost)
         self.asking = asking
         self.per_call = asking.proposals
         self.prompt = prompt or load_prompt(asking.prompt)
-        self.speaker = speaker
-        self.max_calls = max_calls
-        self.max_cost = max_cost
         self._form: Form = ANSWERS[asking.answer]
-        self._transcript = Transcript(None)
-        self._over = threading.Event()  # of the session, set when nothing more is wanted
-        self._under_way = 0
-        self._lock = threading.Lock()
 
     def settings(self) -> Mapping[str, Any]:
         """Prompt, memory and form of the answer; of a prompt of one's own the whole template."""
@@ -92,9 +82,7 @@ class AskingProposer(Proposer):
 
     def open(self, folder: Path | None) -> None:
         """Reads what was said before in this run."""
-        self._transcript = Transcript(None if folder is None else folder / TRANSCRIPTS)
-        self._over = threading.Event()
-        self.speaker.begin()
+        self._begin(None if folder is None else folder / TRANSCRIPTS)
 
     def check(self) -> None:
         """Makes sure that answers are to be had."""
@@ -119,27 +107,6 @@ class AskingProposer(Proposer):
                     answers = read_text(call.answer, history.problem, self.asking.proposals)
                     found.update({p.id: p for p in self._proposals(call.proposal, answers, call.known)})
         return [proposal for proposal in found.values() if proposal.id not in used]
-
-    def summary(self) -> ProposerSummary:
-        """Calls, tokens and cost of the whole run, earlier sessions included."""
-        calls = self._transcript.calls
-        costs = [call.cost_usd for call in calls if call.requests]
-        return ProposerSummary(
-            name=self.name,
-            model=self.speaker.model,
-            origin=self.speaker.origin,
-            calls=sum(max(1, call.requests) for call in calls),
-            call_failures=dict(Counter(call.fault for call in calls if call.fault)),
-            input_tokens=sum(call.input_tokens for call in calls),
-            output_tokens=sum(call.output_tokens for call in calls),
-            cost_usd=sum(cost or 0.0 for cost in costs) if costs and None not in costs else None,
-            seconds=round(sum(call.seconds for call in calls), 3),
-        )
-
-    def cancel(self) -> None:
-        """Ends the calls under way, and begins no more in this session."""
-        self._over.set()
-        self.speaker.cancel()
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """The next designs. An answer that was paid for in a run that was killed is used, not asked again."""
@@ -206,55 +173,3 @@ class AskingProposer(Proposer):
             Proposal(answer.design, id_, answer.reason, answer.expected, asked, known)
             for id_, answer in zip(ids, answers, strict=True)
         ]
-
-    def _call(self, question: Question, ask: Callable[[Question], Reply], over: threading.Event) -> str:
-        if over.is_set():
-            raise ProposalError("cancelled", "the study is over")
-        question = self._within_budget(question)
-        error = None
-        try:
-            reply = ask(question)
-        except CallError as fault:
-            error, reply = fault, fault.reply
-        finally:
-            with self._lock:
-                self._under_way -= 1
-        if error is None or error.kind not in NEVER_MADE:
-            self._transcript.add(self._record(question, reply, error))
-        if error is not None:
-            raise error
-        return reply.text
-
-    def _record(self, question: Question, reply: Reply, error: CallError | None) -> Call:
-        return Call(
-            proposal=question.proposal,
-            step=question.step,
-            known=question.known,
-            origin=self.speaker.origin,
-            model=self.speaker.model,
-            prompt=question.prompt,
-            answer=reply.text,
-            requests=reply.requests,
-            input_tokens=reply.input_tokens,
-            output_tokens=reply.output_tokens,
-            cost_usd=reply.cost_usd,
-            seconds=round(reply.seconds, 3),
-            fault=None if error is None else error.kind,
-            error=None if error is None else str(error),
-        )
-
-    def _within_budget(self, question: Question) -> Question:
-        """The question, bounded by what is left of the budget; ProposalError where nothing is left."""
-        with self._lock:
-            spent = self.summary()
-            if self.max_calls is not None:
-                left = self.max_calls - spent.calls - self._under_way
-                if left <= 0:
-                    raise ProposalError("budget", f"--max-calls {self.max_calls} is used up", final=True)
-                question = replace(question, most_requests=left)
-            if self.max_cost is not None:
-                each = (spent.cost_usd or 0.0) / max(1, spent.calls)
-                if (spent.cost_usd or 0.0) + each * (1 + self._under_way) > self.max_cost:
-                    raise ProposalError("budget", f"--max-cost {self.max_cost:g} USD is used up", final=True)
-            self._under_way += 1
-        return question

@@ -1,0 +1,123 @@
+"""What proposes for any Optuna study, and armwright's own proposers in that place."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import optuna
+from optuna.study import StudyDirection
+from optuna.trial import FrozenTrial, TrialState
+
+from armwright.any_study.parameters import Space, observed_space
+from armwright.exceptions import DesignError, SettingsError
+from armwright.history import BBO, FinishedTrial, History
+from armwright.pareto import default_reference_point
+from armwright.problem import Problem
+from armwright.proposers.proposer import Proposal, Proposer
+from armwright.sampling import distributions
+
+N_REFERENCE = 10  # the first complete trials, which bound the hypervolume of a task that does not
+
+
+@dataclass(frozen=True)
+class StudyProposal:
+    """Parameters to evaluate next; what they leave out the study's sampler draws.
+
+    id: of this proposal alone, within the study.
+    reason: in one line.
+    expected: the values that the proposer expects, where it says so.
+    """
+
+    params: Mapping[str, Any]
+    id: str
+    reason: str = ""
+    expected: tuple[float, ...] | None = None
+
+
+class StudyProposer(Protocol):
+    """Proposes trials for an Optuna study; inherit from it and write `propose`.
+
+    name: the `source` of its trials.
+    """
+
+    name: str
+
+    def space(self, study: optuna.Study) -> Space:
+        """The distributions that its parameters must lie in: those of the trials so far, if it knows no better."""
+        return observed_space(study)
+
+    def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
+        """The next trial; ProposalError where there is none.
+
+        number: that of the trial that is asked for, or thereabouts; ids are made from it. Several threads may ask at
+        a time.
+        """
+        ...
+
+
+class ArmProposer(StudyProposer):
+    """A proposer of arms, for somebody's own Optuna study over an armwright design space."""
+
+    def __init__(self, proposer: Proposer, problem: Problem) -> None:
+        self.name = proposer.name
+        self.proposer = proposer
+        self.problem = problem
+        self._ready: deque[Proposal] = deque()  # of a call that gave several designs
+
+    def space(self, study: optuna.Study) -> Space:
+        """The design space's."""
+        return distributions(self.problem.space)
+
+    def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
+        """What the proposer says to the study's complete trials."""
+        history = study_history(study, self.problem)
+        try:
+            proposal = self._ready.popleft()
+        except IndexError:
+            made = self.proposer.propose(history, seed, number)
+            proposal, *rest = [made] if isinstance(made, Proposal) else list(made)
+            self._ready.extend(rest)
+        design = self.problem.space.design(proposal.design.params)
+        return StudyProposal(dict(design.params), proposal.id, proposal.reason, proposal.expected)
+
+
+def study_history(study: optuna.Study, problem: Problem) -> History:
+    """The complete trials of a study over `problem`, numbered without gaps.
+
+    SettingsError where its trials are none of the problem's.
+    """
+    if study.directions != [StudyDirection.MINIMIZE] * len(problem.objectives):
+        names = ", ".join(objective.name for objective in problem.objectives)
+        raise SettingsError(
+            f"the study has directions {', '.join(d.name.lower() for d in study.directions)}; "
+            f"a study over an armwright problem minimises {len(problem.objectives)} objectives: {names}"
+        )
+    trials: list[FinishedTrial] = []
+    refusal: DesignError | None = None
+    for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,)):
+        try:
+            trials.append(_finished(len(trials), trial, problem))
+        except DesignError as fault:  # a trial of another space teaches nothing
+            refusal = fault
+    if refusal is not None and not trials:
+        raise SettingsError(f"the study's trials are not of the design space {problem.space.name}: {refusal}")
+    reference_point = problem.reference_point
+    if reference_point is None and trials:
+        reference_point = default_reference_point(np.array([trial.values for trial in trials[:N_REFERENCE]]))
+    return History(problem, tuple(trials), 0, reference_point)
+
+
+def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTrial:
+    noted = trial.user_attrs
+    expected = noted.get("expected")
+    return FinishedTrial(
+        number,
+        str(noted.get("source", BBO)),
+        problem.space.design(trial.params),
+        tuple(trial.values),
+        proposal=noted.get("proposal"),
+        reason=str(noted.get("reason", "")),
+        expected=None if expected is None else tuple(expected),
+    )

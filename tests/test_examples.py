@@ -1,0 +1,72 @@
+"""The examples, run as a user runs them."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.chat_server import Answer, ChatServer, Request
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def run(example: str, *options: str) -> str:
+    command = [sys.executable, "-W", "error", EXAMPLES / example, *options]
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def told(server: ChatServer) -> tuple[str, ...]:
+    return ("--model", "test-model", "--base-url", server.url, "--origin", "scripted")
+
+
+def test_the_scikit_learn_example(chat_server: ChatServer) -> None:
+    def answer(request: Request) -> Answer:
+        if "response_format" not in request:
+            return "A linear machine, I should say."
+        parameters = {"classifier": "svc", "svc_kernel": "linear", "svc_C": 0.1}
+        return json.dumps({"parameters": parameters, "reason": "few samples"})
+
+    chat_server.answer = answer
+    text = run("optuna_scikit_learn.py", "--n-trials", "10", *told(chat_server))
+    assert re.search(r"Optuna alone: +accuracy 0\.\d{4} with \{'classifier'", text)
+    assert re.search(r"  trial 9: accuracy 0\.97\d\d; few samples", text)
+    assert "1 proposals by test-model, faults: none" in text
+    prompt = chat_server.prompts()[0]
+    assert "- forest_trees: whole number, 10 to 100 in steps of 10; conditional: " in prompt
+    assert "always with classifier = forest" in prompt
+
+
+def test_the_zdt1_example(chat_server: ChatServer) -> None:
+    def answer(request: Request) -> Answer:
+        if "response_format" not in request:
+            return "All but the first at 0."
+        parameters = {f"x{i:02d}": 0.0 for i in range(1, 31)} | {"x01": 0.25}
+        return json.dumps({"parameters": parameters, "reason": "g = 1", "expected": {"value_1": 0.25, "value_2": 0.5}})
+
+    chat_server.answer = answer
+    text = run("optuna_zdt1.py", "--n-trials", "40", *told(chat_server))
+    alone, proposed = (float(volume) for volume in re.findall(r"hypervolume ([\d.]+)", text))
+    assert proposed > alone
+    assert "4 proposals by test-model, 4 of them on the front, faults: none" in text
+    assert (
+        "EXPECTED: value_1 = 0.25, value_2 = 0.5  CAME OUT: value_1 = 0.25, value_2 = 0.5" in chat_server.prompts()[-2]
+    )
+
+
+def test_without_a_model_an_example_says_so() -> None:
+    assert "No language model is configured" in run("optuna_zdt1.py", "--n-trials", "5")
+
+
+def test_the_python_of_the_optuna_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (EXAMPLES.parent / "docs" / "optuna.md").read_text()
+    asking, *others = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    compile(asking, "optuna.md", "exec")  # needs a model
+    assert len(others) == 2
+    for code in others:
+        exec(code, {})
+    arm, counts = capsys.readouterr().out.splitlines()
+    assert "link_4" in arm
+    assert counts == "3 Counter()"
