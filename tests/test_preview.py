@@ -127,16 +127,16 @@ def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: P
         assert shown("--after", "run", "--number", number)[0] == call.prompt
 
 
-def test_template_and_variables(in_folder: Path) -> None:
-    template = shown("--template", "--prompt", "minus")[0]
-    assert '{% extends "proposal.md.j2" %}' in template
-    assert "{% block evaluation %}" in template
+def test_variables() -> None:
     assert [line.partition(":")[0] for line in shown("--variables")[0].splitlines()] == list(VARIABLES)
-    # A copy of what is printed is a prompt of one's own, once the first line says what it extends.
-    whole = template.partition("{# ---- minus ---- #}")[0]
+
+
+@pytest.mark.parametrize("name", ["plus", "minus"])
+def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Path, name: str) -> None:
+    whole = shown("--template", "--prompt", name)[0]
     (in_folder / "own.md").write_text(whole, encoding="utf-8")
-    told = shown("target-1", "--prompt", "own.md")[0]
-    assert told == shown("target-1", "--prompt", "minus")[0]
+    assert shown("target-1", "--prompt", "own.md")[0] == shown("target-1", "--prompt", name)[0]
+    assert shown("--template", "--prompt", "own.md")[0] == whole
 
 
 @pytest.mark.parametrize(

@@ -218,7 +218,7 @@ def prompt_(
     variables: Annotated[bool, typer.Option("--variables", help="Print what a template may use instead.")] = False,
 ) -> None:
     """Print exactly what would be sent to a model for TASK, or how to write a prompt of your own."""
-    from armwright.llm.prompt import VARIABLES, builtin_template, load_prompt
+    from armwright.llm.prompt import VARIABLES, whole_template
     from armwright.preview import preview, preview_after
     from armwright.proposers.asking import Asking
     from armwright.space import load_space
@@ -228,8 +228,7 @@ def prompt_(
         print("\n".join(f"{name}: {words}" for name, words in VARIABLES.items()))
         return
     if template:
-        name = prompt or "plus"
-        print(f"{builtin_template('proposal.md.j2')}\n{{# ---- {name} ---- #}}\n{load_prompt(name).template}")
+        print(whole_template(prompt or "plus"), end="")
         return
     said = {"prompt": prompt, "memory": memory, "answer": answer, "proposals": proposals}
     wishes: dict[str, Any] = {name: value for name, value in said.items() if value is not None}

@@ -172,6 +172,18 @@ def builtin_template(name: str) -> str:
     return loader.get_source(_sandbox(), name)[0]
 
 
+def whole_template(name: str) -> str:
+    """The template of a prompt as one text to make one's own from: that of `plus` and `minus` with what they extend."""
+    template = load_prompt(name).template
+    if name not in PROMPTS:
+        return template
+    whole = builtin_template("proposal.md.j2")
+    for block, content in re.findall(r"{% block (\w+) %}\n(.*?){% endblock %}", template, re.DOTALL):
+        start = f"{{% block {block} %}}\n"
+        whole = whole.replace(start, start + content, 1)
+    return whole
+
+
 def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expected: bool = False) -> str:
     """The prompt of the second call: the free answer turned into parameters."""
     answer = end_of(without_thoughts(answer).strip() or answer, LONGEST_ANALYSIS)
