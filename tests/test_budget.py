@@ -9,6 +9,7 @@ from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.study import Progress, Run, optimize
 from armwright.task import load_task
+from tests import wires
 from tests.chat_server import ChatServer
 
 PROBLEM = Problem(load_task("target-1"))
@@ -78,3 +79,21 @@ def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatS
     run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=12, seen=seen)
     # the server counts 100 tokens in and 20 out for each of two calls
     assert seen[0].note == "2 proposals: about 5 calls, 400 tokens in, 80 out; on a server of your own"
+
+
+@pytest.mark.parametrize("wire", ["openai", "anthropic"])
+def test_after_so_many_dollars_it_asks_no_more(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
+) -> None:
+    """The price is the public one of the tokens that the server counts; every call costs the same here."""
+    free = run(wires.proposer(wire, chat_server, monkeypatch), n_total=3).summary["proposer"]
+    each = free["cost_usd"] / free["calls"]
+    assert each > 0.0
+    chat_server.requests.clear()
+    seen: list[Progress] = []
+    result = run(wires.proposer(wire, chat_server, monkeypatch, max_cost=5.5 * each), seen=seen)
+    proposer = result.summary["proposer"]
+    assert (proposer["calls"], len(chat_server.requests)) == (5, 5)
+    assert proposer["cost_usd"] == pytest.approx(5 * each)
+    assert proposer["failures"] == {"budget": 2}
+    assert sum("--max-cost" in progress.note for progress in seen) == 1
