@@ -15,18 +15,21 @@ from armwright.space import Design
 
 RANDOM = "random"
 BBO = "bbo"
+POLISH = "polish"  # a design of the front, refined
+FRONT = "front"  # of a search for the whole front
 
 
 @dataclass(frozen=True)
 class FinishedTrial:
     """One evaluated design.
 
-    source: `random`, `bbo`, or the name of the proposer.
+    source: `random`, `bbo`, `polish`, `front`, or the name of the proposer.
     proposal, reason, expected: the proposal's id and reason, and the objectives that were expected of it, where a
         proposer made the design (and said so).
     fault: why a trial that was a proposer's became a black-box one.
     asked: the trial that a proposal was asked for, where it came for another (overlap, several proposals a call).
     feedback: how many finished trials the proposer knew, where not all before this one.
+    evaluations: designs that were evaluated to find it (a refined one: many).
     seconds: wall time by part (proposing, sampling, evaluation).
     sampler_notes: what the sampler noted on its trial and study (a genetic one: generations), needed to resume.
     """
@@ -41,6 +44,7 @@ class FinishedTrial:
     fault: str | None = None
     asked: int | None = None
     feedback: int | None = None
+    evaluations: int = 1
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
 

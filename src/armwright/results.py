@@ -16,13 +16,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from armwright.best_known import standing
 from armwright.credit import credit_by_source
 from armwright.diagnostics import diagnose
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.history import FinishedTrial, FrontMember, History
+from armwright.pareto import hypervolume
 from armwright.proposers.proposer import ProposerSummary
 from armwright.run_folder import RunConfig, RunFolder
+from armwright.verification import Verification
 
 SUMMARY = "summary.json"
 DESIGNS = "designs"
@@ -32,12 +35,19 @@ MOST_FALLBACKS = 0.1  # of a proposer's turns, beyond which its run is flagged a
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
 
 
-def write_results(folder: RunFolder, history: History, summary: Mapping[str, Any]) -> None:
-    """Writes all of it; the summary last, as the sign that all is there."""
+def write_results(
+    folder: RunFolder, history: History, summary: Mapping[str, Any], verification: Verification | None
+) -> None:
+    """Writes all of it; the summary last, as the sign that all is there.
+
+    verification: of the front, by rising position error; None where none was made.
+    """
+    verdicts = _verdicts(history, verification)
     folder.write_text("trials.csv", _csv(_rows(history)))
     on_front = {member.number for member in history.front}
-    folder.write_text("front.csv", _csv(row for row in _rows(history) if row["number"] in on_front))
-    _write_designs(folder, history)
+    rows = [row | _flat_verdict(verdicts.get(row["number"])) for row in _rows(history) if row["number"] in on_front]
+    folder.write_text("front.csv", _csv(rows))
+    _write_designs(folder, history, verdicts)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
@@ -68,9 +78,15 @@ def read_summary(path: Path) -> dict[str, Any] | None:
         return None
 
 
-def summarize(history: History, config: RunConfig, proposer: ProposerSummary | None) -> dict[str, Any]:
-    """What a run came to, as summary.json says it."""
+def summarize(
+    history: History,
+    config: RunConfig,
+    proposer: ProposerSummary | None,
+    verification: Verification | None = None,
+) -> dict[str, Any]:
+    """What a study came to, as summary.json says it."""
     curve = history.hypervolume
+    counted = curve[: config.study.n_total]  # without what was refined afterwards
     seconds: Counter[str] = Counter()
     for trial in history:
         seconds.update(trial.seconds)
@@ -82,16 +98,88 @@ def summarize(history: History, config: RunConfig, proposer: ProposerSummary | N
         "hypervolume": {
             "reference_point": list(history.reference_point or ()),
             "final": float(curve[-1]) if len(curve) else None,
-            "mean": float(curve.mean()) if len(curve) else None,
+            "mean": float(counted.mean()) if len(counted) else None,
             "history": curve.tolist(),
         },
+        "best_known": _standing_record(history),
         "front_size": len(history.front),
+        "verification": _verification_record(history, verification),
+        "evaluations": sum(trial.evaluations for trial in history),
         "credit": {source: asdict(credit) for source, credit in credit_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
         "diagnostics": None if proposer is None else asdict(diagnose(history, proposer.name)),
         "seconds": {part: round(seconds[part], 6) for part in PARTS},
         "versions": dict(config.versions),
     }
+
+
+def summarize_front(
+    history: History, config: RunConfig, search: Mapping[str, Any], verification: Verification | None
+) -> dict[str, Any]:
+    """What a search for the whole front came to, as summary.json says it.
+
+    search: evaluations, seconds, why it ended, and the hypervolume over the evaluations.
+    """
+    reference = history.reference_point or ()
+    return {
+        "task": history.problem.task.name,
+        "seed": config.seed,
+        "n_trials": len(history),
+        "by_source": dict(Counter(trial.source for trial in history)),
+        "hypervolume": {"reference_point": list(reference), "final": hypervolume(history.values, reference)},
+        "best_known": _standing_record(history),
+        "front_size": len(history.front),
+        "verification": _verification_record(history, verification),
+        "search": dict(search),
+        "versions": dict(config.versions),
+    }
+
+
+def _standing_record(history: History) -> dict[str, Any] | None:
+    """How the front compares with the best known one, where there is one."""
+    if history.reference_point is None:
+        return None
+    found = standing(history.problem, history.values, history.reference_point)
+    return None if found is None else asdict(found)
+
+
+def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
+    """How many designs of the front are solid, and what hypervolume these have, and the worst cases of all."""
+    if verification is None:
+        return None
+    solid = [member.number for member, holds in zip(history.front, verification.solid, strict=True) if holds]
+    reference = history.reference_point or ()
+    return {
+        "solid": len(solid),
+        "fragile": len(history.front) - len(solid),
+        "solid_numbers": solid,
+        "hypervolume_of_solid": hypervolume(history.values[solid], reference),
+        "hypervolume_of_worst_cases": hypervolume(verification.worst, reference),
+    }
+
+
+def _verdicts(history: History, verification: Verification | None) -> dict[int, dict[str, Any]]:
+    """For each design of the front: whether it is solid, and its objectives under each disturbance."""
+    if verification is None:
+        return {}
+    return {
+        member.number: {
+            "solid": bool(verification.solid[i]),
+            "exact": _objectives(history, verification.exact[i].tolist()),
+            "moved": _objectives(history, verification.moved[i].tolist()),
+            "started": _objectives(history, verification.started[i].tolist()),
+        }
+        for i, member in enumerate(history.front)
+    }
+
+
+def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A verdict as columns of front.csv."""
+    if verdict is None:
+        return {}
+    kinds = ("exact", "moved", "started")
+    columns = {f"{name}_{kind}": value for kind in kinds for name, value in verdict[kind].items()}
+    return {"solid": "solid" if verdict["solid"] else "fragile", **columns}
 
 
 def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:
@@ -118,18 +206,18 @@ def _proposer_record(history: History, config: RunConfig, proposer: ProposerSumm
 
 def _overlap_record(history: History, config: RunConfig, turns: Sequence[FinishedTrial]) -> dict[str, Any] | None:
     """With --overlap: the proposals' share of the counted trials, and how old [trials] what they knew was."""
-    if config.method.in_flight is None:
+    if config.study.in_flight is None:
         return None
     ages = [trial.number - trial.feedback if trial.feedback is not None else 0 for trial in turns if trial.proposal]
     return {
-        "in_flight": config.method.in_flight,
-        "ratio_planned": 1.0 / config.method.n_step,
+        "in_flight": config.study.in_flight,
+        "ratio_planned": 1.0 / config.study.n_step,
         "ratio": round(len(turns) / max(1, len(history) - history.n_init), 4),
         "feedback_age": {"mean": round(sum(ages) / len(ages), 2), "max": max(ages)} if ages else None,
     }
 
 
-def _write_designs(folder: RunFolder, history: History) -> None:
+def _write_designs(folder: RunFolder, history: History, verdicts: Mapping[int, Mapping[str, Any]]) -> None:
     names = {_name(member) for member in history.front}
     for stale in (folder.path / DESIGNS).glob("[0-9]*"):
         if stale.name not in names:
@@ -138,7 +226,9 @@ def _write_designs(folder: RunFolder, history: History) -> None:
         place = f"{DESIGNS}/{_name(member)}"
         urdf = to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}")
         folder.write_text(f"{place}/arm.urdf", urdf)
-        folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
+        verdict = verdicts.get(member.number)
+        content = record if verdict is None else record | {"verification": dict(verdict)}
+        folder.write_text(f"{place}/design.json", json.dumps(content, indent=2) + "\n")
 
 
 def _name(member: FrontMember) -> str:

@@ -3,6 +3,7 @@
     config.yaml        everything needed to repeat the run
     trials.jsonl       one line a finished trial, written before the next begins: the truth
     transcripts.jsonl  every call to a language model (llm/transcript.py)
+    search.npz, proposals/  where a search for the whole front stands, and what it began with (front.py)
     trials.csv, front.csv, summary.json, designs/NNNN/ (results.py) and figures/ (report/figures.py)
 
 What stands in the last line is made from the finished trials, and can be made again.
@@ -12,12 +13,12 @@ import errno
 import json
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Self, cast
+from typing import Any, BinaryIO, Literal, Self, cast
 
 import yaml
 from filelock import FileLock, Timeout
@@ -26,13 +27,16 @@ from pydantic import BaseModel, Field, ValidationError
 from armwright.documents import parse_document
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
 from armwright.history import FinishedTrial, History
+from armwright.kinematics.devices import Device
 from armwright.problem import Problem
 from armwright.space import DesignSpace
 from armwright.task import Task
 
 CONFIG = "config.yaml"
 TRIALS = "trials.jsonl"
-BEFORE_TRIALS = {".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl"}
+PROPOSALS = "proposals"
+SEARCH = "search.npz"
+BEFORE_TRIALS = {".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", f"{SEARCH}.part", PROPOSALS}
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 
@@ -41,6 +45,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
 
     proposer: its name and settings; None for black-box trials only.
     in_flight: how many questions go on while black-box trials run; None: the study waits for each.
+    polish_every: after so many counted trials the next free one refines a design of the front; None: never.
     """
 
     proposer: dict[str, Any] | None
@@ -49,18 +54,39 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     n_step: int = Field(ge=1)
     n_total: int = Field(ge=1)
     in_flight: int | None = Field(default=None, ge=1)
+    polish_every: int | None = Field(default=None, ge=1)
+
+    @property
+    def n_trials(self) -> int:
+        """Of the whole study, the random ones included."""
+        return self.n_init + self.n_total
+
+
+class FrontMethod(BaseModel, frozen=True, extra="forbid"):
+    """How a search for the whole front searches (front.py): there is nothing to choose but what it begins with."""
+
+    search: Literal["front"] = "front"
+    begin_with: dict[str, Any] | None = None
+
+    @property
+    def n_init(self) -> int:
+        """Its trials are the front alone."""
+        return 0
 
 
 class RunConfig(BaseModel, frozen=True, extra="forbid"):
     """Everything needed to repeat a run.
 
+    tolerance, device: `Problem`'s.
     reference_point: as the task states it, or as frozen after the first n_init trials (None until then).
     """
 
     task: Task
     space: DesignSpace
+    tolerance: float = Field(default=0.0, ge=0.0)
+    device: Device = "cpu"
     reference_point: tuple[float, float] | None
-    method: Method
+    method: Method | FrontMethod
     seed: int
     versions: dict[str, str]
     earlier_versions: list[dict[str, str]] = []  # of sessions that made earlier trials, where they were others
@@ -68,7 +94,14 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     @property
     def problem(self) -> Problem:
         """The problem of the run."""
-        return Problem(task=self.task, space=self.space)
+        return Problem(task=self.task, space=self.space, tolerance=self.tolerance, device=self.device)
+
+    @property
+    def study(self) -> Method:
+        """How its study searches; RunFolderError where it is a search for the whole front."""
+        if isinstance(self.method, FrontMethod):
+            raise RunFolderError("this run is a search for the whole front (armwright front), not a study")
+        return self.method
 
 
 def versions() -> dict[str, str]:
@@ -113,17 +146,21 @@ class RunFolder:
 
         RunConflictError with the differences where the folder holds a run with other settings.
         """
-        trials = self.path / TRIALS
-        if not (trials.is_file() and b"\n" in trials.read_bytes()):  # no run, or one that never came to a trial
+        if not self._holds_run():
             self._check_free()
             self.write_config(config)
             return config
         there = read_config(self.path)
         _check_same_run(self.path, there, config)
-        if config.method.n_total != there.method.n_total:
+        if config.method != there.method:  # a larger n_total
             there = there.model_copy(update={"method": config.method})
             self.write_config(there)
         return there
+
+    def _holds_run(self) -> bool:
+        """Whether a run lies here that came to a trial, or to a first state of its search."""
+        trials = self.path / TRIALS
+        return (self.path / SEARCH).exists() or (trials.is_file() and b"\n" in trials.read_bytes())
 
     def _check_free(self) -> None:
         """RunConflictError where the folder holds anything but what a run without trials leaves."""
@@ -164,13 +201,21 @@ class RunFolder:
         except OSError as fault:
             raise _write_error(self.path / TRIALS, fault) from fault
 
+    def replace_trials(self, trials: Iterable[FinishedTrial]) -> None:
+        """Writes all trials anew."""
+        self.write_bytes(TRIALS, b"".join(map(_trial_line, trials)))
+
     def write_text(self, name: str, text: str) -> None:
         """Replaces a file in one step, so that a crash leaves the old or the new one."""
+        self.write_bytes(name, text.encode())
+
+    def write_bytes(self, name: str, content: bytes) -> None:
+        """The same for a file that is no text."""
         target = self.path / name
         part = target.with_name(target.name + ".part")
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            part.write_text(text, encoding="utf-8", newline="\n")
+            part.write_bytes(content)
             os.replace(part, target)
         except OSError as fault:
             raise _write_error(target, fault) from fault
@@ -219,6 +264,7 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     fault: str | None = None
     asked: int | None = None
     feedback: int | None = None
+    evaluations: int = Field(default=1, ge=1)
     params: dict[str, float | str]
     values: list[float] = Field(min_length=2, max_length=2)
     seconds: dict[str, float]
@@ -235,6 +281,7 @@ def _trial_line(trial: FinishedTrial) -> bytes:
         fault=trial.fault,
         asked=trial.asked,
         feedback=trial.feedback,
+        evaluations=trial.evaluations,
         params=dict(trial.design.params),
         values=list(trial.values),
         seconds=dict(trial.seconds),
@@ -279,6 +326,7 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
         fault=record.fault,
         asked=record.asked,
         feedback=record.feedback,
+        evaluations=record.evaluations,
         seconds=record.seconds,
         sampler_notes=record.sampler_notes,
     )
@@ -299,8 +347,9 @@ def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
         for key in {**old, **new}
         if old.get(key) != new.get(key)
     ]
-    if asked.method.n_total < there.method.n_total:
-        differences.append(f"n_total: {there.method.n_total} there, {asked.method.n_total} asked (it can only grow)")
+    n_there, n_asked = (getattr(config.method, "n_total", 0) for config in (there, asked))
+    if n_asked < n_there:
+        differences.append(f"n_total: {n_there} there, {n_asked} asked (it can only grow)")
     if differences:
         raise RunConflictError(
             f"{path} holds a run with other settings ({'; '.join(differences)}). "
@@ -319,7 +368,9 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     content = config.model_dump(mode="json")
     content["task"] = {key: content["task"][key] for key in ("name", "targets", "reference_point")}
     method = content.pop("method")
-    del content["versions"], content["earlier_versions"], content["reference_point"], method["n_total"]
+    method.pop("n_total", None)
+    for key in ("versions", "earlier_versions", "reference_point"):
+        del content[key]
     return _flat({**content, **method})
 
 

@@ -1,0 +1,256 @@
+"""The whole front at once: our own search over the batched kernels, kept in a run folder.
+
+    search.npz    where the search stands, written every few seconds: a killed search loses no more than these
+    trials.jsonl  the designs of the final front; those that were evaluated on the way are counted only
+    proposals/    the run in which a proposer gave the first designs, where one did
+"""
+
+import io
+import math
+import re
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from armwright.evaluation import Array
+from armwright.exceptions import RunFolderError, SettingsError
+from armwright.history import FRONT, FinishedTrial, FrontMember, History
+from armwright.pareto import default_reference_point
+from armwright.problem import Problem
+from armwright.proposers.proposer import Proposer
+from armwright.results import discard_results, read_summary, results_are_there, summarize_front, write_results
+from armwright.run_folder import PROPOSALS, SEARCH, FrontMethod, RunConfig, RunFolder, read_run, versions
+from armwright.search.front import FrontSearch
+from armwright.study import optimize, whole
+from armwright.verification import verify_front
+
+SAVE_SECONDS = 5.0
+N_SAMPLE = 10  # random designs that give the reference point, where the task states none
+N_PROPOSED = 20  # designs of a proposer that the search begins with
+LARGEST_BUDGET = 10**12
+_BUDGET = re.compile(r"(\d+(?:\.\d+)?(?:e\d+)?)(s|min|h)?")
+_SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much a search may spend, over all its sessions; None where there is no bound."""
+
+    evaluations: int | None = None
+    seconds: float | None = None
+
+    @classmethod
+    def of(cls, words: str) -> "Budget":
+        """`5s`, `2min`, `1h`, or a number of evaluations such as `100000` or `1e6`."""
+        match = _BUDGET.fullmatch(words.strip().replace("_", ""))
+        amount = float(match[1]) if match else 0.0
+        if match is None or not 0.0 < amount <= LARGEST_BUDGET or (match[2] is None and amount != int(amount)):
+            raise SettingsError(
+                f'budget = "{words}" is neither a time above 0 (5s, 2min, 1h) nor a number of evaluations (100000, 1e6)'
+            )
+        return cls(evaluations=int(amount)) if match[2] is None else cls(seconds=amount * _SECONDS[match[2]])
+
+    def is_spent(self, evaluations: int, seconds: float) -> bool:
+        """Whether that much is all, or more."""
+        return evaluations >= (self.evaluations or math.inf) or seconds >= (self.seconds or math.inf)
+
+
+@dataclass(frozen=True)
+class FrontProgress:
+    """What a search has come to so far; seconds: of all its sessions."""
+
+    evaluations: int
+    seconds: float
+    hypervolume: float
+    front_size: int
+    budget: Budget
+
+
+@dataclass(frozen=True)
+class FrontRun:
+    """A search's result: its history holds the designs of the front alone."""
+
+    history: History
+    config: RunConfig
+    summary: dict[str, Any]
+    folder: Path | None
+    resumed: int  # evaluations of earlier sessions
+
+    @property
+    def front(self) -> list[FrontMember]:
+        """The Pareto set, by rising position error."""
+        return self.history.front
+
+
+def find_front(
+    problem: Problem,
+    *,
+    budget: str | Budget = "5s",
+    seed: int = 0,
+    begin_with: str | Path | Proposer | None = None,
+    stop_at_stall: bool = True,
+    out: str | Path | None = None,
+    watch: Callable[[FrontProgress], None] | None = None,
+) -> FrontRun:
+    """The Pareto front of `problem`, as nearly as the budget allows; with `out` a second call goes on.
+
+    budget: a time such as "5s" (loading the kernels not included), or a number of evaluations. With a number the result
+        depends on the seed alone.
+    begin_with: a run folder, all of whose designs are taken, or a proposer, who gives the first designs.
+    stop_at_stall: whether to end early when the hypervolume hardly grows any more.
+    """
+    budget = Budget.of(budget) if isinstance(budget, str) else budget
+    seed = whole("seed", seed, 0)
+    with ExitStack() as stack:
+        folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
+        rows, origin = _beginning(problem, begin_with, seed, None if folder is None else folder.path)
+        config = RunConfig(
+            task=problem.task,
+            space=problem.space,
+            tolerance=problem.tolerance,
+            device=problem.device,
+            reference_point=problem.reference_point or _reference_point(problem, seed),
+            method=FrontMethod(begin_with=origin),
+            seed=seed,
+            versions=versions(),
+        )
+        if folder is not None:
+            config = folder.adopt(config)
+        return _Search(problem, config, folder, rows, watch).run(budget, stop_at_stall)
+
+
+class _Search:
+    """One session of a search."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        config: RunConfig,
+        folder: RunFolder | None,
+        rows: Array,
+        watch: Callable[[FrontProgress], None] | None,
+    ) -> None:
+        self.problem = problem
+        self.config = config
+        self.folder = folder
+        self.watch = watch
+        assert config.reference_point is not None
+        self.search = FrontSearch(
+            problem.space.parameters, problem.evaluate_matrix, config.reference_point, config.seed, rows
+        )
+        self.seconds = 0.0  # of earlier sessions, then of all
+        if folder is not None:
+            self._restore(folder)
+
+    def run(self, budget: Budget, stop_at_stall: bool) -> FrontRun:
+        """Searches as long as the budget lasts, then writes what was found."""
+        resumed = self.search.evaluations
+        self.problem.evaluate_matrix(self.problem.space.matrix(self.problem.space.sample(1, 0)))  # loads the kernels
+        ended = self._end(budget, stop_at_stall)
+        if not ended and self.folder is not None:
+            discard_results(self.folder.path)
+        try:
+            before, saved = self.seconds, time.monotonic()
+            started = saved
+            while not (ended := self._end(budget, stop_at_stall)):
+                self.search.step()
+                now = time.monotonic()
+                self.seconds = before + now - started
+                if now - saved >= SAVE_SECONDS:
+                    self._save()
+                    saved = now
+                if self.watch is not None:
+                    self.watch(self._progress(budget))
+        finally:
+            if self.search.evaluations > resumed:
+                self._save()
+        return self._finish(ended, resumed)
+
+    def _end(self, budget: Budget, stop_at_stall: bool) -> str:
+        """Why the search ends; empty where it goes on."""
+        if budget.is_spent(self.search.evaluations, self.seconds):
+            return "budget"
+        return "stall" if stop_at_stall and self.search.evaluations and self.search.stalled else ""
+
+    def _progress(self, budget: Budget) -> FrontProgress:
+        search = self.search
+        return FrontProgress(search.evaluations, self.seconds, search.hypervolume, len(search.rows), budget)
+
+    def _save(self) -> None:
+        if self.folder is None:
+            return
+        content = io.BytesIO()
+        np.savez_compressed(content, seconds=self.seconds, **self.search.state())
+        self.folder.write_bytes(SEARCH, content.getvalue())
+
+    def _restore(self, folder: RunFolder) -> None:
+        path = folder.path / SEARCH
+        if not path.exists():
+            return
+        try:
+            with np.load(path, allow_pickle=False) as state:
+                self.search.restore(state)
+                self.seconds = float(state["seconds"])
+        except (OSError, ValueError, KeyError, BadZipFile) as fault:
+            raise RunFolderError(
+                f"{path} is damaged ({fault}); delete it, and the search begins anew from the front in {folder.path}"
+            ) from fault
+
+    def _finish(self, ended: str, resumed: int) -> FrontRun:
+        trials = [
+            FinishedTrial(number, FRONT, design, tuple(values))
+            for number, (design, values) in enumerate(
+                zip(self.problem.space.designs(self.search.rows), self.search.values.tolist(), strict=True)
+            )
+        ]
+        history = History(self.problem, trials, 0, self.config.reference_point)
+        searched = {
+            "evaluations": self.search.evaluations,
+            "seconds": round(self.seconds, 3),
+            "ended_by": ended,
+            "hypervolume_history": self.search.history.tolist(),
+        }
+        if self.folder is None:
+            return FrontRun(history, self.config, summarize_front(history, self.config, searched, None), None, resumed)
+        path = self.folder.path
+        there = read_summary(path)
+        if there is None or not results_are_there(path, history) or there["search"]["ended_by"] != ended:
+            self.folder.replace_trials(trials)
+            verification = verify_front(history)
+            there = summarize_front(history, self.config, searched, verification)
+            write_results(self.folder, history, there, verification)
+        return FrontRun(history, self.config, there, path, resumed)
+
+
+def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
+    """For a task that states none: from a few random designs."""
+    return default_reference_point(problem.evaluate(problem.space.sample(N_SAMPLE, seed)))
+
+
+def _beginning(
+    problem: Problem, begin_with: str | Path | Proposer | None, seed: int, out: Path | None
+) -> tuple[Array, dict[str, Any] | None]:
+    """Designs to begin with, and where they come from."""
+    if begin_with is None:
+        return np.empty((0, len(problem.space.parameters))), None
+    if isinstance(begin_with, (str, Path)):
+        _, run = read_run(begin_with)
+        if run.problem.space != problem.space or run.problem.task.targets != problem.task.targets:
+            raise SettingsError(
+                f"{begin_with} holds a run of another task or design space ({run.problem.task.name}, "
+                f"{run.problem.space.name})"
+            )
+        rows = problem.space.matrix([trial.design for trial in run])
+        return rows, {"run": str(begin_with), "designs": len(rows), "sha256": sha256(rows.tobytes()).hexdigest()}
+    # A study in which every counted trial is the proposer's: what it says is kept and paid for as in any other.
+    folder = None if out is None else out / PROPOSALS
+    proposed = optimize(problem, proposer=begin_with, n_step=1, n_total=N_PROPOSED, seed=seed, out=folder)
+    rows = problem.space.matrix([trial.design for trial in proposed.history])
+    return rows, {"proposer": {"name": begin_with.name, **begin_with.settings()}}
