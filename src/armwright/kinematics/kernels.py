@@ -17,14 +17,12 @@ every variant: its matrix squares the condition of the Jacobian, and weights nea
 import math
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any, Literal
+from typing import Any
 
 import warp as wp
 
 from armwright.arm import GRAVITY
-from armwright.kinematics.arrays import MOST_JOINTS
-
-Precision = Literal["float32", "float64"]
+from armwright.kinematics.arrays import MOST_JOINTS, Precision
 
 # At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
 _OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
@@ -38,6 +36,7 @@ class Kernels:
     """One variant of the kernels. Each compiles when it is first loaded, and is kept on disk."""
 
     lanes: int
+    Lane: Any  # the vector of a number for each lane
     Arms: Any  # `ArmArrays` on the device, a Warp struct
     descend: Any  # the inverse kinematics
     hold: Any  # the posture kept, its tip and its torque
@@ -48,8 +47,7 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     """The kernels that solve `lanes` targets a thread in this precision.
 
     One long function on purpose: what Warp compiles takes its types and constants from the function around it.
-    Targets and angles come as plain arrays of numbers, (N, T, D) and the like. Target `group` x lanes + i stands in
-    lane i of a group; the last target fills up the last group.
+    T targets stand in G groups: target g x lanes + i in lane i of group g, and the last one fills up its group.
     """
     real, Vector3 = {"float32": (wp.float32, wp.vec3f), "float64": (wp.float64, wp.vec3d)}[precision]
     Lane = wp.types.vector(length=lanes, dtype=real)
@@ -77,16 +75,8 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         mass: wp.array2d(dtype=real)  # (N, D)
 
     @wp.func
-    def taken(values: wp.array3d(dtype=real), arm: int, group: int, column: int):
-        """Of values (N, T, C): one column at the targets of a group."""
-        result = Lane()
-        for i in range(lanes):
-            result[i] = values[arm, wp.min(group * lanes + i, values.shape[1] - 1), column]
-        return result
-
-    @wp.func
     def put(values: wp.array3d(dtype=real), arm: int, group: int, column: int, x: Lane):
-        """The opposite of `taken`."""
+        """Writes one column of values (N, T, C) at the targets of a group."""
         for i in range(lanes):
             if group * lanes + i < values.shape[1]:
                 values[arm, group * lanes + i, column] = x[i]
@@ -198,32 +188,31 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     @_kernel
     def descend(
         arms: Arms,
-        targets: wp.array3d(dtype=real),
+        targets: wp.array2d(dtype=Lane),
         updates: int,
-        q_last: wp.array3d(dtype=real),
-        h_last: wp.array3d(dtype=real),
-        q_kept: wp.array3d(dtype=real),
+        q_last: wp.array3d(dtype=Lane),
+        h_last: wp.array3d(dtype=Lane),
+        q_kept: wp.array3d(dtype=Lane),
     ):
         """Inverse kinematics of an arm at a group of targets.
 
-        targets: (1, T, 3) [m].  q_last: (N, T, D), the start's angles, then those after the last update [rad].
-        h_last: (N, T, D), the limit gradients H before the first, then of the last update.
-        q_kept: (N, T, D), the angles nearest to the target of all but the last.
+        targets: (G, 3) [m].  q_last: (N, G, D), the start's angles, then those after the last update [rad].
+        h_last: (N, G, D), the limit gradients H before the first, then of the last update.
+        q_kept: (N, G, D), the angles nearest to the target of all but the last.
 
         One long function on purpose: the arrays over joints live in its registers and stack, and handing them to
         functions copies them, which made a prototype three times slower.
         """
         arm, group = wp.tid()
         base = arms.base[arm]
-        tx, ty, tz = taken(targets, 0, group, 0), taken(targets, 0, group, 1), taken(targets, 0, group, 2)
         q, kept = Joints(), Joints()
         limit_n, limit_d = Joints(), Joints()  # H of the update before, n / d: fractions compare without division
         ux, uy, uz = Joints(), Joints(), Joints()  # joint axes, then the columns of the Jacobian J
         ox, oy, oz = Joints(), Joints(), Joints()  # joint positions
         weight, pull = Joints(), Joints()
         for j in range(arms.dof):
-            q[j] = taken(q_last, arm, group, j)
-            limit_n[j] = taken(h_last, arm, group, j)
+            q[j] = q_last[arm, group, j]
+            limit_n[j] = h_last[arm, group, j]
             limit_d[j] = Lane(one)
         nearest = Lane(largest)
         for _ in range(updates):
@@ -250,9 +239,9 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
                 pz += offset[0] * xz + offset[1] * yz + offset[2] * zz
 
             # The posture nearest to the target is kept, the earliest of equals.
-            ex = tx - px
-            ey = ty - py
-            ez = tz - pz
+            ex = targets[group, 0] - px
+            ey = targets[group, 1] - py
+            ez = targets[group, 2] - pz
             square = square_of(ex, ey, ez)
             nearer = Lane(one) - at_least(square, nearest)
             nearest = wp.min(nearest, square)
@@ -321,20 +310,20 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
                 q[j] = wp.min(wp.max(moved, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
 
         for j in range(arms.dof):
-            put(q_last, arm, group, j, q[j])
-            put(h_last, arm, group, j, wp.cw_div(limit_n[j], limit_d[j]))
-            put(q_kept, arm, group, j, kept[j])
+            q_last[arm, group, j] = q[j]
+            h_last[arm, group, j] = wp.cw_div(limit_n[j], limit_d[j])
+            q_kept[arm, group, j] = kept[j]
 
     @wp.func
-    def tip(arms: Arms, arm: int, group: int, q: wp.array3d(dtype=real)):
-        """The tip's position at angles q (N, T, D)."""
+    def tip(arms: Arms, arm: int, group: int, q: wp.array3d(dtype=Lane)):
+        """The tip's position at angles q (N, G, D)."""
         base = arms.base[arm]
         xx, xy, xz = Lane(one), Lane(zero), Lane(zero)
         yx, yy, yz = Lane(zero), Lane(one), Lane(zero)
         zx, zy, zz = Lane(zero), Lane(zero), Lane(one)
         px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
         for j in range(arms.dof):
-            s, c = sine_cosine(taken(q, arm, group, j))
+            s, c = sine_cosine(q[arm, group, j])
             axis = arms.axis[arm, j]
             xx, yx, zx, _x = turned(axis, xx, yx, zx, s, c)
             xy, yy, zy, _y = turned(axis, xy, yy, zy, s, c)
@@ -348,19 +337,20 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     @_kernel
     def hold(
         arms: Arms,
-        targets: wp.array3d(dtype=real),
-        q_last: wp.array3d(dtype=real),
-        q_kept: wp.array3d(dtype=real),
+        targets: wp.array2d(dtype=Lane),
+        q_last: wp.array3d(dtype=Lane),
+        q_kept: wp.array3d(dtype=Lane),
+        q: wp.array3d(dtype=real),
         reached: wp.array3d(dtype=real),
         torque: wp.array3d(dtype=real),
     ):
         """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
 
-        targets: (1, T, 3) [m].  q_last, q_kept: (N, T, D) [rad].  reached: (N, T, 3) [m].
-        torque: (N, T, D), +dV/dq [N m].
+        targets: (G, 3) [m].  q_last, q_kept: (N, G, D) of `descend`.  What it says is out of lanes: q (N, T, D) [rad],
+        reached (N, T, 3) [m], torque (N, T, D), +dV/dq [N m].
         """
         arm, group = wp.tid()
-        tx, ty, tz = taken(targets, 0, group, 0), taken(targets, 0, group, 1), taken(targets, 0, group, 2)
+        tx, ty, tz = targets[group, 0], targets[group, 1], targets[group, 2]
         lx, ly, lz = tip(arms, arm, group, q_last)
         kx, ky, kz = tip(arms, arm, group, q_kept)
         farther = at_least(square_of(tx - lx, ty - ly, tz - lz), square_of(tx - kx, ty - ky, tz - kz))
@@ -377,9 +367,9 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         zx, zy = Lane(zero), Lane(zero)
         px, py = Lane(base[0]), Lane(base[1])
         for j in range(arms.dof):
-            q = chosen(farther, taken(q_kept, arm, group, j), taken(q_last, arm, group, j))
-            put(q_kept, arm, group, j, q)
-            s, c = sine_cosine(q)
+            angle = chosen(farther, q_kept[arm, group, j], q_last[arm, group, j])
+            put(q, arm, group, j, angle)
+            s, c = sine_cosine(angle)
             axis = arms.axis[arm, j]
             xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
             xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
@@ -406,4 +396,4 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
             lever_y = beyond_y - mass_beyond * oy[j]
             put(torque, arm, group, j, gravity * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x)))
 
-    return Kernels(lanes, Arms, descend, hold)
+    return Kernels(lanes, Lane, Arms, descend, hold)
