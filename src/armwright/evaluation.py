@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from armwright.arm import Arm
 from armwright.exceptions import TaskError
 from armwright.kinematics.arrays import ArmArrays, stack_arms
+from armwright.kinematics.devices import Device
 from armwright.kinematics.solve import solve_postures
 
 Array = NDArray[np.float64]
@@ -28,20 +29,20 @@ class Evaluation:
         return len(self.q)
 
 
-def evaluate(arms: Sequence[Arm], targets: ArrayLike) -> Evaluation:
+def evaluate(arms: Sequence[Arm], targets: ArrayLike, device: Device = "cpu") -> Evaluation:
     """Every arm at every target. Not reaching a target is a result, never an exception.
 
     targets: (T, 3) [m].
     """
-    return evaluate_arrays(stack_arms(arms), targets)
+    return evaluate_arrays(stack_arms(arms), targets, device)
 
 
-def evaluate_arrays(arrays: ArmArrays, targets: ArrayLike) -> Evaluation:
+def evaluate_arrays(arrays: ArmArrays, targets: ArrayLike, device: Device = "cpu") -> Evaluation:
     """The same for arms that are stacked already."""
     targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
-    postures = solve_postures(arrays, targets)
+    postures = solve_postures(arrays, targets, device=device)
     reached = postures.reached.astype(np.float64)
     moving = list(arrays.joint_numbers)
     q = np.zeros((len(arrays), len(targets), arrays.n_joints))

@@ -9,17 +9,24 @@ import numpy as np
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation, evaluate, evaluate_arrays
 from armwright.kinematics.arrays import arrays_of
+from armwright.kinematics.devices import Device
 from armwright.objectives import PAPER_OBJECTIVES, Objective
 from armwright.space import Design, DesignSpace, paper_space
 from armwright.task import Task
 
+POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
+
 
 @dataclass(frozen=True)
 class Problem:
-    """Which arm of `space` serves `task` best, by position error and torque."""
+    """Which arm of `space` serves `task` best, by position error and torque.
+
+    device: where arms are evaluated; `resolve_device` says which there are.
+    """
 
     task: Task
     space: DesignSpace = field(default_factory=paper_space)
+    device: Device = "cpu"
     objectives: ClassVar[tuple[Objective, ...]] = PAPER_OBJECTIVES
 
     @property
@@ -33,11 +40,20 @@ class Problem:
 
     def evaluation(self, designs: Sequence[Design]) -> Evaluation:
         """The physics of N designs at all targets."""
-        return evaluate([self.arm(design) for design in designs], self.task.points)
+        return evaluate([self.arm(design) for design in designs], self.task.points, self.device)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
-        """(N, 2) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""
-        return self.values(evaluate_arrays(arrays_of(self.space, matrix), self.task.points))
+        """(N, 2) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
+
+        Only the postures of a chunk of them are in memory at a time.
+        """
+        size = max(1, POSTURES_AT_ONCE[self.device] // len(self.task.points))
+        values = np.empty((len(matrix), len(self.objectives)))
+        for first in range(0, len(matrix), size):
+            rows = slice(first, first + size)
+            arrays = arrays_of(self.space, matrix[rows])
+            values[rows] = self.values(evaluate_arrays(arrays, self.task.points, self.device))
+        return values
 
     def values(self, evaluation: Evaluation) -> Array:
         """(N, 2): position error [m] and torque [α-scaled] of evaluated designs; minimised."""

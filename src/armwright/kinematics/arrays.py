@@ -1,27 +1,32 @@
 """Arms stacked into arrays, as the kernels take them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Link, Vector
-from armwright.exceptions import ArmError
+from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.space import JOINT_AXES, DesignSpace
 
 MOST_JOINTS = 8
 LARGEST_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
 
-Floats = NDArray[np.float32]
+Precision = Literal["float32", "float64"]
+Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
+
+FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
+ARRAYS = (*FLOATS, "axis")  # of `ArmArrays`, with a row for each arm
 
 
 @dataclass(frozen=True)
 class ArmArrays:
     """N arms of D moving joints each. A fixed joint moves nothing: its link is part of the one before it.
 
-    joint_numbers: (D,) places of the moving joints in the arm's own list of joints.
+    All floats are of one precision. joint_numbers: (D,) places of the moving joints in the arm's own list of joints.
     """
 
     base: Floats  # (N, 3) [m]
@@ -37,13 +42,28 @@ class ArmArrays:
     def __len__(self) -> int:
         return len(self.base)
 
+    def __getitem__(self, rows: slice) -> "ArmArrays":
+        return replace(self, **{name: getattr(self, name)[rows] for name in ARRAYS})
+
+    @property
+    def precision(self) -> Precision:
+        return "float64" if self.base.dtype == np.float64 else "float32"
+
     @property
     def dof(self) -> int:
         """The number D of moving joints."""
         return self.axis.shape[1]
 
 
-def stack_arms(arms: Sequence[Arm]) -> ArmArrays:
+def checked_precision(name: str) -> Precision:
+    """The name, if it is a precision's."""
+    allowed = get_args(Precision)
+    if name not in allowed:
+        raise SettingsError(f'precision = "{name}" is not one of {", ".join(allowed)}.{did_you_mean(name, allowed)}')
+    return cast("Precision", name)
+
+
+def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArrays:
     """The arms as arrays. They must share which of their joints are fixed."""
     if not arms:
         raise ArmError("no arms were given")
@@ -58,19 +78,19 @@ def stack_arms(arms: Sequence[Arm]) -> ArmArrays:
     rigid = [_rigid_groups(arm, moving) for arm in arms]
     joints = [[arm.joints[number] for number in moving] for arm in arms]
     return ArmArrays(
-        base=np.array([base for base, _ in rigid], dtype=np.float32),
+        base=np.array([base for base, _ in rigid], dtype=precision),
         axis=np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.int32),
-        lower=-_rounded_down([[-j.lower for j in row] for row in joints]),
-        upper=_rounded_down([[j.upper for j in row] for row in joints]),
-        offset=np.array([[link.offset for link in links] for _, links in rigid], dtype=np.float32),
-        com=np.array([[link.com for link in links] for _, links in rigid], dtype=np.float32),
-        mass=np.array([[link.mass for link in links] for _, links in rigid], dtype=np.float32),
+        lower=-_never_above([[-j.lower for j in row] for row in joints], precision),
+        upper=_never_above([[j.upper for j in row] for row in joints], precision),
+        offset=np.array([[link.offset for link in links] for _, links in rigid], dtype=precision),
+        com=np.array([[link.com for link in links] for _, links in rigid], dtype=precision),
+        mass=np.array([[link.mass for link in links] for _, links in rigid], dtype=precision),
         joint_numbers=moving,
         n_joints=len(kinds),
     )
 
 
-def arrays_of(space: DesignSpace, matrix: NDArray[np.float64]) -> ArmArrays:
+def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precision = "float32") -> ArmArrays:
     """The arms that designs build, equal to the bit to `stack_arms` of their arms, without building them one by one.
 
     matrix: (N, P) designs as rows (`DesignSpace.matrix`).
@@ -79,27 +99,27 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64]) -> ArmArrays:
     axes = np.array([AXES.index(JOINT_AXES[kind]) for kind in space.joint_types], dtype=np.int32)
     links = matrix[:, 3 + dof :]
     lower, upper = space.joint_range
-    offset = np.zeros((n, dof, 3), dtype=np.float32)
+    offset = np.zeros((n, dof, 3), dtype=precision)
     offset[..., 2] = links
-    com = np.zeros((n, dof, 3), dtype=np.float32)
+    com = np.zeros((n, dof, 3), dtype=precision)
     com[..., 2] = links / 2
     return ArmArrays(
-        base=np.ascontiguousarray(matrix[:, :3], dtype=np.float32),
-        axis=np.ascontiguousarray(axes[matrix[:, 3 : 3 + dof].astype(np.int64)]),
-        lower=np.broadcast_to(-_rounded_down([[-lower]]), (n, dof)),
-        upper=np.broadcast_to(_rounded_down([[upper]]), (n, dof)),
+        base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
+        axis=axes[matrix[:, 3 : 3 + dof].astype(np.intp)],
+        lower=np.broadcast_to(-_never_above([[-lower]], precision), (n, dof)),
+        upper=np.broadcast_to(_never_above([[upper]], precision), (n, dof)),
         offset=offset,
         com=com,
-        mass=np.ascontiguousarray(space.mass.masses(links), dtype=np.float32),
+        mass=np.ascontiguousarray(space.mass.masses(links), dtype=precision),
         joint_numbers=tuple(range(dof)),
         n_joints=dof,
     )
 
 
-def _rounded_down(limits: list[list[float]]) -> Floats:
-    """In float32 and never above: float32 of 2.4 rad is 1e-7 rad more, which no kept angle may be."""
-    near = np.array(limits, dtype=np.float32)
-    return np.where(near > np.array(limits), np.nextafter(near, np.float32(-np.inf)), near)
+def _never_above(limits: list[list[float]], precision: Precision) -> Any:
+    """In this precision: float32 of 2.4 rad is 1e-7 rad more, which no kept angle may be, so it is rounded down."""
+    near = np.array(limits, dtype=precision)
+    return np.where(near > np.array(limits), np.nextafter(near, near.dtype.type(-np.inf)), near)
 
 
 def _check_alike(arm: Arm, kinds: tuple[str, ...]) -> None:

@@ -1,372 +1,399 @@
 """The kernels: forward kinematics, inverse kinematics and gravity torque, in Warp.
 
-Each thread solves one arm for 8 targets side by side, one in each lane of a vector, so that the compiler's
-vector instructions do the work of eight. What differs between lanes is arithmetic, never a branch: a condition
-is a mask of zeros and ones. The axes of an arm are the same in all lanes, so they may branch.
+One source, from which `kernels_of` makes variants: in single or in double precision, and with some lanes or one. Each
+thread solves one arm for as many targets as there are lanes, one in each lane of a vector, so that a CPU's vector
+instructions do the work of eight; a GPU has its own threads for that, and takes one lane. What differs between lanes
+is arithmetic, never a branch: a condition is a mask of zeros and ones. The axes of an arm are the same in all lanes,
+so they may branch.
 
 The equations are those of docs/method.md; the inverse kinematics is the solver of Chan & Dubey (1995) and
-Sugiura et al. (2007). Angles, positions and torques are float32. The 3 x 3 system is float64: its matrix squares
-the condition of the Jacobian, and weights near the joint limits (down to 2.5e-4 at ±2.4 rad) make it worse still.
+Sugiura et al. (2007). Angles, positions and torques are of the variant's precision. The 3 x 3 system is float64 in
+every variant: its matrix squares the condition of the Jacobian, and weights near the joint limits (down to 2.5e-4 at
+±2.4 rad) make it worse still.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
+import math
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import warp as wp
 
 from armwright.arm import GRAVITY
-from armwright.kinematics.arrays import MOST_JOINTS
-
-LANES = 8
-
-LONGEST_STEP = wp.constant(0.1)  # [m] of the error that one update tries to close
-LEAST_MANIPULABILITY = wp.constant(0.1)  # below it the update is damped
-DAMPING = wp.constant(0.001)
-LIMIT_MARGIN = wp.constant(0.017453293)  # [rad] = 1°, keeps the limit gradient finite
-CENTRING_GAIN = wp.constant(0.01)
-LARGEST = wp.constant(1.0e30)
-
-Lane: Any = wp.types.vector(length=LANES, dtype=wp.float32)
-Wide: Any = wp.types.vector(length=LANES, dtype=wp.float64)
-Joints: Any = wp.types.matrix(shape=(MOST_JOINTS, LANES), dtype=wp.float32)  # row j: joint j in all lanes
+from armwright.kinematics.arrays import MOST_JOINTS, Precision
 
 # At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
 _OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
 
-
-def _kernel(function: Any) -> Any:
-    """A Warp kernel in a module of its own: the fewer its callers, the more willingly LLVM inlines a function."""
-    return wp.kernel(function, enable_backward=False, module="unique", module_options=_OPTIONS)
+# A Warp kernel in a module of its own: the fewer its callers, the more willingly LLVM inlines a function.
+_kernel = partial(wp.kernel, enable_backward=False, module="unique", module_options=_OPTIONS)
 
 
-@wp.struct
-class Arms:
-    """`ArmArrays` on the device."""
+@dataclass(frozen=True)
+class Kernels:
+    """One variant of the kernels. Each compiles when it is first loaded, and is kept on disk."""
 
-    dof: int
-    base: wp.array(dtype=wp.vec3)  # (N,)
-    axis: wp.array2d(dtype=int)  # (N, D)
-    lower: wp.array2d(dtype=float)  # (N, D)
-    upper: wp.array2d(dtype=float)  # (N, D)
-    offset: wp.array2d(dtype=wp.vec3)  # (N, D)
-    com: wp.array2d(dtype=wp.vec3)  # (N, D)
-    mass: wp.array2d(dtype=float)  # (N, D)
+    lanes: int
+    Lane: Any  # the vector of a number for each lane
+    Arms: Any  # `ArmArrays` on the device, a Warp struct
+    descend: Any  # the inverse kinematics
+    hold: Any  # the posture kept, its tip and its torque
 
 
-@wp.func
-def roots(x: Lane):
-    """Square roots."""
-    result = Lane()
-    for i in range(LANES):
-        result[i] = wp.sqrt(x[i])
-    return result
+@cache
+def kernels_of(precision: Precision, lanes: int) -> Kernels:
+    """The kernels that solve `lanes` targets a thread in this precision.
 
-
-@wp.func
-def at_least(a: Lane, b: Lane):
-    """1 where a >= b, else 0."""
-    return 0.5 * (wp.sign(a - b) + Lane(1.0))
-
-
-@wp.func
-def chosen(mask: Lane, a: Lane, b: Lane):
-    """a where the mask is 1, b where it is 0, both to the bit."""
-    return wp.cw_mul(mask, a) + wp.cw_mul(Lane(1.0) - mask, b)
-
-
-@wp.func
-def sine_cosine(angle: Lane):
-    """Sine and cosine for |angle| <= 2π, to 1e-6: polynomials for a quarter of the angle, doubled twice.
-
-    The coefficients interpolate (sin h / h - 1) / h² and (cos h - 1 + h²/2) / h⁴ at Chebyshev's nodes of
-    |h| <= π/2; they are within 3e-8.
+    One long function on purpose: what Warp compiles takes its types and constants from the function around it.
+    T targets stand in G groups: target g x lanes + i in lane i of group g, and the last one fills up its group.
     """
-    h = 0.25 * angle
-    x = wp.cw_mul(h, h)
-    s = 2.634756392e-06 * x - Lane(1.982273949e-04)
-    s = wp.cw_mul(s, x) + Lane(8.333242135e-03)
-    s = wp.cw_mul(s, x) - Lane(1.666666596e-01)
-    s = wp.cw_mul(s, wp.cw_mul(x, h)) + h
-    c = -2.654606581e-07 * x + Lane(2.478608244e-05)
-    c = wp.cw_mul(c, x) - Lane(1.388881255e-03)
-    c = wp.cw_mul(c, x) + Lane(4.166666608e-02)
-    c = wp.cw_mul(c, x) - Lane(0.5)
-    c = wp.cw_mul(c, x) + Lane(1.0)
-    s2 = 2.0 * wp.cw_mul(s, c)
-    c2 = Lane(1.0) - 2.0 * wp.cw_mul(s, s)
-    return 2.0 * wp.cw_mul(s2, c2), Lane(1.0) - 2.0 * wp.cw_mul(s2, s2)
+    real, Vector3 = {"float32": (wp.float32, wp.vec3f), "float64": (wp.float64, wp.vec3d)}[precision]
+    Lane = wp.types.vector(length=lanes, dtype=real)
+    Wide = wp.types.vector(length=lanes, dtype=wp.float64)
+    Joints = wp.types.matrix(shape=(MOST_JOINTS, lanes), dtype=real)  # row j: joint j in all lanes
 
+    zero, one, two, gravity = real(0.0), real(1.0), real(2.0), real(GRAVITY)
+    one_wide = wp.float64(1.0)
+    longest_step = real(0.1)  # [m] of the error that one update tries to close
+    least_manipulability = real(0.1)  # below it the update is damped
+    full_damping = real(0.001)
+    limit_margin = real(math.radians(1.0))  # keeps the limit gradient finite
+    centring_gain = real(0.01)
+    largest = real(1e30)
 
-@wp.func
-def turned(axis: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
-    """One world component of the frame's axes x, y, z, turned about its own `axis`; last, that axis."""
-    if axis == 0:
-        return x, wp.cw_mul(c, y) + wp.cw_mul(s, z), wp.cw_mul(c, z) - wp.cw_mul(s, y), x
-    if axis == 1:
-        return wp.cw_mul(c, x) - wp.cw_mul(s, z), y, wp.cw_mul(c, z) + wp.cw_mul(s, x), y
-    return wp.cw_mul(c, x) + wp.cw_mul(s, y), wp.cw_mul(c, y) - wp.cw_mul(s, x), z, z
+    @wp.struct
+    class Arms:
+        dof: int
+        base: wp.array(dtype=Vector3)  # (N,)
+        axis: wp.array2d(dtype=int)  # (N, D)
+        lower: wp.array2d(dtype=real)  # (N, D)
+        upper: wp.array2d(dtype=real)  # (N, D)
+        offset: wp.array2d(dtype=Vector3)  # (N, D)
+        com: wp.array2d(dtype=Vector3)  # (N, D)
+        mass: wp.array2d(dtype=real)  # (N, D)
 
+    @wp.func
+    def put(values: wp.array3d(dtype=real), arm: int, group: int, column: int, x: Lane):
+        """Writes one column of values (N, T, C) at the targets of a group."""
+        for i in range(lanes):
+            if group * lanes + i < values.shape[1]:
+                values[arm, group * lanes + i, column] = x[i]
 
-@wp.func
-def determinant(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide):
-    """Of a symmetric 3 x 3 matrix."""
-    return (
-        wp.cw_mul(xx, wp.cw_mul(yy, zz) - wp.cw_mul(yz, yz))
-        - wp.cw_mul(xy, wp.cw_mul(xy, zz) - wp.cw_mul(yz, xz))
-        + wp.cw_mul(xz, wp.cw_mul(xy, yz) - wp.cw_mul(yy, xz))
-    )
+    @wp.func
+    def roots(x: Lane):
+        """Square roots."""
+        result = Lane()
+        for i in range(lanes):
+            result[i] = wp.sqrt(x[i])
+        return result
 
+    @wp.func
+    def at_least(a: Lane, b: Lane):
+        """1 where a >= b, else 0."""
+        return real(0.5) * (wp.sign(a - b) + Lane(one))
 
-@wp.func
-def damping(det_jjt: Lane):
-    """k: 0 where the manipulability sqrt(det J Jᵀ) is large enough."""
-    manipulability = roots(wp.max(det_jjt, Lane(0.0)))
-    lack = wp.max(Lane(0.0), Lane(1.0) - (1.0 / LEAST_MANIPULABILITY) * manipulability)
-    return DAMPING * wp.cw_mul(lack, lack)
+    @wp.func
+    def chosen(mask: Lane, a: Lane, b: Lane):
+        """a where the mask is 1, b where it is 0, both to the bit."""
+        return wp.cw_mul(mask, a) + wp.cw_mul(Lane(one) - mask, b)
 
+    @wp.func
+    def library_sine_cosine(angle: Lane):
+        """Sine and cosine, to the last bits."""
+        s, c = Lane(), Lane()
+        for i in range(lanes):
+            s[i] = wp.sin(angle[i])
+            c[i] = wp.cos(angle[i])
+        return s, c
 
-@wp.func
-def solved(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide, x: Wide, y: Wide, z: Wide):
-    """The solution of a symmetric 3 x 3 system by its adjugate."""
-    cxx = wp.cw_mul(yy, zz) - wp.cw_mul(yz, yz)
-    cxy = wp.cw_mul(xz, yz) - wp.cw_mul(xy, zz)
-    cxz = wp.cw_mul(xy, yz) - wp.cw_mul(xz, yy)
-    cyy = wp.cw_mul(xx, zz) - wp.cw_mul(xz, xz)
-    cyz = wp.cw_mul(xy, xz) - wp.cw_mul(xx, yz)
-    czz = wp.cw_mul(xx, yy) - wp.cw_mul(xy, xy)
-    scale = wp.cw_div(Wide(wp.float64(1.0)), wp.cw_mul(xx, cxx) + wp.cw_mul(xy, cxy) + wp.cw_mul(xz, cxz))
-    vx = wp.cw_mul(scale, wp.cw_mul(cxx, x) + wp.cw_mul(cxy, y) + wp.cw_mul(cxz, z))
-    vy = wp.cw_mul(scale, wp.cw_mul(cxy, x) + wp.cw_mul(cyy, y) + wp.cw_mul(cyz, z))
-    vz = wp.cw_mul(scale, wp.cw_mul(cxz, x) + wp.cw_mul(cyz, y) + wp.cw_mul(czz, z))
-    return Lane(vx), Lane(vy), Lane(vz)
+    @wp.func
+    def polynomial_sine_cosine(angle: Lane):
+        """Sine and cosine for |angle| <= 2π, to 1e-6: polynomials for a quarter of the angle, doubled twice.
 
+        The coefficients interpolate (sin h / h - 1) / h² and (cos h - 1 + h²/2) / h⁴ at Chebyshev's nodes of
+        |h| <= π/2; they are within 3e-8.
+        """
+        h = 0.25 * angle
+        x = wp.cw_mul(h, h)
+        s = 2.634756392e-06 * x - Lane(1.982273949e-04)
+        s = wp.cw_mul(s, x) + Lane(8.333242135e-03)
+        s = wp.cw_mul(s, x) - Lane(1.666666596e-01)
+        s = wp.cw_mul(s, wp.cw_mul(x, h)) + h
+        c = -2.654606581e-07 * x + Lane(2.478608244e-05)
+        c = wp.cw_mul(c, x) - Lane(1.388881255e-03)
+        c = wp.cw_mul(c, x) + Lane(4.166666608e-02)
+        c = wp.cw_mul(c, x) - Lane(0.5)
+        c = wp.cw_mul(c, x) + Lane(1.0)
+        s2 = 2.0 * wp.cw_mul(s, c)
+        c2 = Lane(1.0) - 2.0 * wp.cw_mul(s, s)
+        return 2.0 * wp.cw_mul(s2, c2), Lane(1.0) - 2.0 * wp.cw_mul(s2, s2)
 
-@wp.func
-def square_of(x: Lane, y: Lane, z: Lane):
-    """The square of a vector's length."""
-    return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
+    # Polynomials for all lanes at once are what float32 needs, and a small part of the time of the library's.
+    sine_cosine = polynomial_sine_cosine if precision == "float32" else library_sine_cosine
 
+    @wp.func
+    def turned(axis: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
+        """One world component of the frame's axes x, y, z, turned about its own `axis`; last, that axis."""
+        if axis == 0:
+            return x, wp.cw_mul(c, y) + wp.cw_mul(s, z), wp.cw_mul(c, z) - wp.cw_mul(s, y), x
+        if axis == 1:
+            return wp.cw_mul(c, x) - wp.cw_mul(s, z), y, wp.cw_mul(c, z) + wp.cw_mul(s, x), y
+        return wp.cw_mul(c, x) + wp.cw_mul(s, y), wp.cw_mul(c, y) - wp.cw_mul(s, x), z, z
 
-@wp.func
-def limit_fraction(away: Lane, half: float):
-    """H as a fraction n / d, for joints `away` from the middle of a range of half width `half` [rad]."""
-    inside = wp.min(wp.max(away, Lane(LIMIT_MARGIN - half)), Lane(half - LIMIT_MARGIN))
-    room = Lane(half * half) - wp.cw_mul(inside, inside)
-    return (2.0 * half * half) * wp.abs(inside), wp.cw_mul(room, room)
+    @wp.func
+    def determinant(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide):
+        """Of a symmetric 3 x 3 matrix."""
+        return (
+            wp.cw_mul(xx, wp.cw_mul(yy, zz) - wp.cw_mul(yz, yz))
+            - wp.cw_mul(xy, wp.cw_mul(xy, zz) - wp.cw_mul(yz, xz))
+            + wp.cw_mul(xz, wp.cw_mul(xy, yz) - wp.cw_mul(yy, xz))
+        )
 
+    @wp.func
+    def damping(det_jjt: Lane):
+        """k: 0 where the manipulability sqrt(det J Jᵀ) is large enough."""
+        manipulability = roots(wp.max(det_jjt, Lane(zero)))
+        lack = wp.max(Lane(zero), Lane(one) - (one / least_manipulability) * manipulability)
+        return full_damping * wp.cw_mul(lack, lack)
 
-@_kernel
-def descend(
-    arms: Arms,
-    targets: wp.array2d(dtype=Lane),
-    updates: int,
-    first: int,
-    q_last: wp.array3d(dtype=Lane),
-    h_last: wp.array3d(dtype=Lane),
-    q_kept: wp.array3d(dtype=Lane),
-):
-    """Inverse kinematics of arm first + i at a group of targets.
+    @wp.func
+    def solved(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide, x: Wide, y: Wide, z: Wide):
+        """The solution of a symmetric 3 x 3 system by its adjugate."""
+        cxx = wp.cw_mul(yy, zz) - wp.cw_mul(yz, yz)
+        cxy = wp.cw_mul(xz, yz) - wp.cw_mul(xy, zz)
+        cxz = wp.cw_mul(xy, yz) - wp.cw_mul(xz, yy)
+        cyy = wp.cw_mul(xx, zz) - wp.cw_mul(xz, xz)
+        cyz = wp.cw_mul(xy, xz) - wp.cw_mul(xx, yz)
+        czz = wp.cw_mul(xx, yy) - wp.cw_mul(xy, xy)
+        scale = wp.cw_div(Wide(one_wide), wp.cw_mul(xx, cxx) + wp.cw_mul(xy, cxy) + wp.cw_mul(xz, cxz))
+        vx = wp.cw_mul(scale, wp.cw_mul(cxx, x) + wp.cw_mul(cxy, y) + wp.cw_mul(cxz, z))
+        vy = wp.cw_mul(scale, wp.cw_mul(cxy, x) + wp.cw_mul(cyy, y) + wp.cw_mul(cyz, z))
+        vz = wp.cw_mul(scale, wp.cw_mul(cxz, x) + wp.cw_mul(cyz, y) + wp.cw_mul(czz, z))
+        return Lane(vx), Lane(vy), Lane(vz)
 
-    targets: (groups, 3) [m].  q_last: (N, groups, D), the start's angles, then those after the last update [rad].
-    h_last: (N, groups, D), the limit gradients H before the first, then of the last update.
-    q_kept: (N, groups, D), the angles nearest to the target of all but the last.
+    @wp.func
+    def square_of(x: Lane, y: Lane, z: Lane):
+        """The square of a vector's length."""
+        return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
 
-    One long function on purpose: the arrays over joints live in its registers and stack, and handing them to
-    functions copies them, which made a prototype three times slower.
-    """
-    i, group = wp.tid()
-    arm = first + i
-    base = arms.base[arm]
-    q, kept = Joints(), Joints()
-    limit_n, limit_d = Joints(), Joints()  # H of the update before, n / d: fractions compare without division
-    ux, uy, uz = Joints(), Joints(), Joints()  # joint axes, then the columns of the Jacobian J
-    ox, oy, oz = Joints(), Joints(), Joints()  # joint positions
-    weight, pull = Joints(), Joints()
-    for j in range(arms.dof):
-        q[j] = q_last[arm, group, j]
-        limit_n[j] = h_last[arm, group, j]
-        limit_d[j] = Lane(1.0)
-    nearest = Lane(LARGEST)
-    for _ in range(updates):
-        # Forward kinematics. xx, xy, xz: the local x axis in the world, and so on.
-        xx, xy, xz = Lane(1.0), Lane(0.0), Lane(0.0)
-        yx, yy, yz = Lane(0.0), Lane(1.0), Lane(0.0)
-        zx, zy, zz = Lane(0.0), Lane(0.0), Lane(1.0)
+    @wp.func
+    def limit_fraction(away: Lane, half: real):
+        """H as a fraction n / d, for joints `away` from the middle of a range of half width `half` [rad]."""
+        inside = wp.min(wp.max(away, Lane(limit_margin - half)), Lane(half - limit_margin))
+        room = Lane(half * half) - wp.cw_mul(inside, inside)
+        return (two * half * half) * wp.abs(inside), wp.cw_mul(room, room)
+
+    @_kernel
+    def descend(
+        arms: Arms,
+        targets: wp.array2d(dtype=Lane),
+        updates: int,
+        q_last: wp.array3d(dtype=Lane),
+        h_last: wp.array3d(dtype=Lane),
+        q_kept: wp.array3d(dtype=Lane),
+    ):
+        """Inverse kinematics of an arm at a group of targets.
+
+        targets: (G, 3) [m].  q_last: (N, G, D), the start's angles, then those after the last update [rad].
+        h_last: (N, G, D), the limit gradients H before the first, then of the last update.
+        q_kept: (N, G, D), the angles nearest to the target of all but the last.
+
+        One long function on purpose: the arrays over joints live in its registers and stack, and handing them to
+        functions copies them, which made a prototype three times slower.
+        """
+        arm, group = wp.tid()
+        base = arms.base[arm]
+        q, kept = Joints(), Joints()
+        limit_n, limit_d = Joints(), Joints()  # H of the update before, n / d: fractions compare without division
+        ux, uy, uz = Joints(), Joints(), Joints()  # joint axes, then the columns of the Jacobian J
+        ox, oy, oz = Joints(), Joints(), Joints()  # joint positions
+        weight, pull = Joints(), Joints()
+        for j in range(arms.dof):
+            q[j] = q_last[arm, group, j]
+            limit_n[j] = h_last[arm, group, j]
+            limit_d[j] = Lane(one)
+        nearest = Lane(largest)
+        for _ in range(updates):
+            # Forward kinematics. xx, xy, xz: the local x axis in the world, and so on.
+            xx, xy, xz = Lane(one), Lane(zero), Lane(zero)
+            yx, yy, yz = Lane(zero), Lane(one), Lane(zero)
+            zx, zy, zz = Lane(zero), Lane(zero), Lane(one)
+            px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
+            for j in range(arms.dof):
+                s, c = sine_cosine(q[j])
+                axis = arms.axis[arm, j]
+                xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
+                xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
+                xz, yz, zz, az = turned(axis, xz, yz, zz, s, c)
+                ux[j] = ax
+                uy[j] = ay
+                uz[j] = az
+                ox[j] = px
+                oy[j] = py
+                oz[j] = pz
+                offset = arms.offset[arm, j]
+                px += offset[0] * xx + offset[1] * yx + offset[2] * zx
+                py += offset[0] * xy + offset[1] * yy + offset[2] * zy
+                pz += offset[0] * xz + offset[1] * yz + offset[2] * zz
+
+            # The posture nearest to the target is kept, the earliest of equals.
+            ex = targets[group, 0] - px
+            ey = targets[group, 1] - py
+            ez = targets[group, 2] - pz
+            square = square_of(ex, ey, ez)
+            nearer = Lane(one) - at_least(square, nearest)
+            nearest = wp.min(nearest, square)
+            for j in range(arms.dof):
+                kept[j] = chosen(nearer, q[j], kept[j])
+
+            # dx, shortened; J Jᵀ as a.., J W Jᵀ as b..; the pull y is taken out of dx, because
+            # J# dx + (I - J# J) y = y + J# (dx - J y).
+            shorten = wp.cw_div(Lane(longest_step), wp.max(roots(square), Lane(longest_step)))
+            dx = wp.cw_mul(ex, shorten)
+            dy = wp.cw_mul(ey, shorten)
+            dz = wp.cw_mul(ez, shorten)
+            axx, axy, axz, ayy, ayz, azz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
+            bxx, bxy, bxz, byy, byz, bzz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
+            for j in range(arms.dof):
+                lower = arms.lower[arm, j]
+                upper = arms.upper[arm, j]
+                half = real(0.5) * (upper - lower)
+                away = q[j] - Lane(real(0.5) * (lower + upper))
+                n, d = limit_fraction(away, half)
+                rises = at_least(wp.cw_mul(n, limit_d[j]), wp.cw_mul(limit_n[j], d))
+                w = wp.cw_div(d, d + wp.cw_mul(rises, n))  # 1 / (1 + H) where H rises, else 1
+                limit_n[j] = n
+                limit_d[j] = d
+                share = (one / half) * away
+                y = -centring_gain * wp.cw_mul(w, wp.cw_mul(share, wp.abs(share)))
+
+                rx = px - ox[j]
+                ry = py - oy[j]
+                rz = pz - oz[j]
+                jx = wp.cw_mul(uy[j], rz) - wp.cw_mul(uz[j], ry)
+                jy = wp.cw_mul(uz[j], rx) - wp.cw_mul(ux[j], rz)
+                jz = wp.cw_mul(ux[j], ry) - wp.cw_mul(uy[j], rx)
+                dx -= wp.cw_mul(jx, y)
+                dy -= wp.cw_mul(jy, y)
+                dz -= wp.cw_mul(jz, y)
+                ux[j] = jx
+                uy[j] = jy
+                uz[j] = jz
+                weight[j] = w
+                pull[j] = y
+
+                jxw, jyw, jzw = Wide(jx), Wide(jy), Wide(jz)
+                ww = Wide(w)
+                wx = wp.cw_mul(ww, jxw)
+                wy = wp.cw_mul(ww, jyw)
+                wz = wp.cw_mul(ww, jzw)
+                axx += wp.cw_mul(jxw, jxw)
+                axy += wp.cw_mul(jxw, jyw)
+                axz += wp.cw_mul(jxw, jzw)
+                ayy += wp.cw_mul(jyw, jyw)
+                ayz += wp.cw_mul(jyw, jzw)
+                azz += wp.cw_mul(jzw, jzw)
+                bxx += wp.cw_mul(wx, jxw)
+                bxy += wp.cw_mul(wx, jyw)
+                bxz += wp.cw_mul(wx, jzw)
+                byy += wp.cw_mul(wy, jyw)
+                byz += wp.cw_mul(wy, jzw)
+                bzz += wp.cw_mul(wz, jzw)
+
+            k = Wide(damping(Lane(determinant(axx, axy, axz, ayy, ayz, azz))))
+            vx, vy, vz = solved(bxx + k, bxy, bxz, byy + k, byz, bzz + k, Wide(dx), Wide(dy), Wide(dz))
+            for j in range(arms.dof):
+                column = wp.cw_mul(ux[j], vx) + wp.cw_mul(uy[j], vy) + wp.cw_mul(uz[j], vz)
+                moved = q[j] + pull[j] + wp.cw_mul(weight[j], column)
+                q[j] = wp.min(wp.max(moved, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
+
+        for j in range(arms.dof):
+            q_last[arm, group, j] = q[j]
+            h_last[arm, group, j] = wp.cw_div(limit_n[j], limit_d[j])
+            q_kept[arm, group, j] = kept[j]
+
+    @wp.func
+    def tip(arms: Arms, arm: int, group: int, q: wp.array3d(dtype=Lane)):
+        """The tip's position at angles q (N, G, D)."""
+        base = arms.base[arm]
+        xx, xy, xz = Lane(one), Lane(zero), Lane(zero)
+        yx, yy, yz = Lane(zero), Lane(one), Lane(zero)
+        zx, zy, zz = Lane(zero), Lane(zero), Lane(one)
         px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
         for j in range(arms.dof):
-            s, c = sine_cosine(q[j])
+            s, c = sine_cosine(q[arm, group, j])
             axis = arms.axis[arm, j]
-            xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
-            xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
-            xz, yz, zz, az = turned(axis, xz, yz, zz, s, c)
-            ux[j] = ax
-            uy[j] = ay
-            uz[j] = az
-            ox[j] = px
-            oy[j] = py
-            oz[j] = pz
+            xx, yx, zx, _x = turned(axis, xx, yx, zx, s, c)
+            xy, yy, zy, _y = turned(axis, xy, yy, zy, s, c)
+            xz, yz, zz, _z = turned(axis, xz, yz, zz, s, c)
             offset = arms.offset[arm, j]
             px += offset[0] * xx + offset[1] * yx + offset[2] * zx
             py += offset[0] * xy + offset[1] * yy + offset[2] * zy
             pz += offset[0] * xz + offset[1] * yz + offset[2] * zz
+        return px, py, pz
 
-        # The posture nearest to the target is kept, the earliest of equals.
-        ex = targets[group, 0] - px
-        ey = targets[group, 1] - py
-        ez = targets[group, 2] - pz
-        square = square_of(ex, ey, ez)
-        nearer = Lane(1.0) - at_least(square, nearest)
-        nearest = wp.min(nearest, square)
+    @_kernel
+    def hold(
+        arms: Arms,
+        targets: wp.array2d(dtype=Lane),
+        q_last: wp.array3d(dtype=Lane),
+        q_kept: wp.array3d(dtype=Lane),
+        q: wp.array3d(dtype=real),
+        reached: wp.array3d(dtype=real),
+        torque: wp.array3d(dtype=real),
+    ):
+        """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
+
+        targets: (G, 3) [m].  q_last, q_kept: (N, G, D) of `descend`.  What it says is out of lanes: q (N, T, D) [rad],
+        reached (N, T, 3) [m], torque (N, T, D), +dV/dq [N m].
+        """
+        arm, group = wp.tid()
+        tx, ty, tz = targets[group, 0], targets[group, 1], targets[group, 2]
+        lx, ly, lz = tip(arms, arm, group, q_last)
+        kx, ky, kz = tip(arms, arm, group, q_kept)
+        farther = at_least(square_of(tx - lx, ty - ly, tz - lz), square_of(tx - kx, ty - ky, tz - kz))
+        put(reached, arm, group, 0, chosen(farther, kx, lx))
+        put(reached, arm, group, 1, chosen(farther, ky, ly))
+        put(reached, arm, group, 2, chosen(farther, kz, lz))
+
+        base = arms.base[arm]
+        ux, uy = Joints(), Joints()  # joint axes; only what a vertical force needs
+        ox, oy = Joints(), Joints()  # joint positions
+        mx, my = Joints(), Joints()  # mass times position of what joint j carries up to the next
+        xx, xy = Lane(one), Lane(zero)
+        yx, yy = Lane(zero), Lane(one)
+        zx, zy = Lane(zero), Lane(zero)
+        px, py = Lane(base[0]), Lane(base[1])
         for j in range(arms.dof):
-            kept[j] = chosen(nearer, q[j], kept[j])
+            angle = chosen(farther, q_kept[arm, group, j], q_last[arm, group, j])
+            put(q, arm, group, j, angle)
+            s, c = sine_cosine(angle)
+            axis = arms.axis[arm, j]
+            xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
+            xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
+            ux[j] = ax
+            uy[j] = ay
+            ox[j] = px
+            oy[j] = py
+            com = arms.com[arm, j]
+            mass = arms.mass[arm, j]
+            mx[j] = mass * (px + com[0] * xx + com[1] * yx + com[2] * zx)
+            my[j] = mass * (py + com[0] * xy + com[1] * yy + com[2] * zy)
+            offset = arms.offset[arm, j]
+            px += offset[0] * xx + offset[1] * yx + offset[2] * zx
+            py += offset[0] * xy + offset[1] * yy + offset[2] * zy
 
-        # dx, shortened; J Jᵀ as a.., J W Jᵀ as b..; the pull y is taken out of dx, because
-        # J# dx + (I - J# J) y = y + J# (dx - J y).
-        shorten = wp.cw_div(Lane(LONGEST_STEP), wp.max(roots(square), Lane(LONGEST_STEP)))
-        dx = wp.cw_mul(ex, shorten)
-        dy = wp.cw_mul(ey, shorten)
-        dz = wp.cw_mul(ez, shorten)
-        axx, axy, axz, ayy, ayz, azz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
-        bxx, bxy, bxz, byy, byz, bzz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
-        for j in range(arms.dof):
-            lower = arms.lower[arm, j]
-            upper = arms.upper[arm, j]
-            half = 0.5 * (upper - lower)
-            away = q[j] - Lane(0.5 * (lower + upper))
-            n, d = limit_fraction(away, half)
-            rises = at_least(wp.cw_mul(n, limit_d[j]), wp.cw_mul(limit_n[j], d))
-            w = wp.cw_div(d, d + wp.cw_mul(rises, n))  # 1 / (1 + H) where H rises, else 1
-            limit_n[j] = n
-            limit_d[j] = d
-            share = (1.0 / half) * away
-            y = -CENTRING_GAIN * wp.cw_mul(w, wp.cw_mul(share, wp.abs(share)))
+        mass_beyond = real(0.0)
+        beyond_x, beyond_y = Lane(), Lane()  # and its mass times position
+        for step in range(arms.dof):
+            j = arms.dof - 1 - step
+            mass_beyond += arms.mass[arm, j]
+            beyond_x += mx[j]
+            beyond_y += my[j]
+            lever_x = beyond_x - mass_beyond * ox[j]
+            lever_y = beyond_y - mass_beyond * oy[j]
+            put(torque, arm, group, j, gravity * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x)))
 
-            rx = px - ox[j]
-            ry = py - oy[j]
-            rz = pz - oz[j]
-            jx = wp.cw_mul(uy[j], rz) - wp.cw_mul(uz[j], ry)
-            jy = wp.cw_mul(uz[j], rx) - wp.cw_mul(ux[j], rz)
-            jz = wp.cw_mul(ux[j], ry) - wp.cw_mul(uy[j], rx)
-            dx -= wp.cw_mul(jx, y)
-            dy -= wp.cw_mul(jy, y)
-            dz -= wp.cw_mul(jz, y)
-            ux[j] = jx
-            uy[j] = jy
-            uz[j] = jz
-            weight[j] = w
-            pull[j] = y
-
-            jxw, jyw, jzw = Wide(jx), Wide(jy), Wide(jz)
-            ww = Wide(w)
-            wx = wp.cw_mul(ww, jxw)
-            wy = wp.cw_mul(ww, jyw)
-            wz = wp.cw_mul(ww, jzw)
-            axx += wp.cw_mul(jxw, jxw)
-            axy += wp.cw_mul(jxw, jyw)
-            axz += wp.cw_mul(jxw, jzw)
-            ayy += wp.cw_mul(jyw, jyw)
-            ayz += wp.cw_mul(jyw, jzw)
-            azz += wp.cw_mul(jzw, jzw)
-            bxx += wp.cw_mul(wx, jxw)
-            bxy += wp.cw_mul(wx, jyw)
-            bxz += wp.cw_mul(wx, jzw)
-            byy += wp.cw_mul(wy, jyw)
-            byz += wp.cw_mul(wy, jzw)
-            bzz += wp.cw_mul(wz, jzw)
-
-        k = Wide(damping(Lane(determinant(axx, axy, axz, ayy, ayz, azz))))
-        vx, vy, vz = solved(bxx + k, bxy, bxz, byy + k, byz, bzz + k, Wide(dx), Wide(dy), Wide(dz))
-        for j in range(arms.dof):
-            column = wp.cw_mul(ux[j], vx) + wp.cw_mul(uy[j], vy) + wp.cw_mul(uz[j], vz)
-            moved = q[j] + pull[j] + wp.cw_mul(weight[j], column)
-            q[j] = wp.min(wp.max(moved, Lane(arms.lower[arm, j])), Lane(arms.upper[arm, j]))
-
-    for j in range(arms.dof):
-        q_last[arm, group, j] = q[j]
-        h_last[arm, group, j] = wp.cw_div(limit_n[j], limit_d[j])
-        q_kept[arm, group, j] = kept[j]
-
-
-@wp.func
-def tip(arms: Arms, arm: int, group: int, q: wp.array3d(dtype=Lane)):
-    """The tip's position at angles q (N, groups, D)."""
-    base = arms.base[arm]
-    xx, xy, xz = Lane(1.0), Lane(0.0), Lane(0.0)
-    yx, yy, yz = Lane(0.0), Lane(1.0), Lane(0.0)
-    zx, zy, zz = Lane(0.0), Lane(0.0), Lane(1.0)
-    px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
-    for j in range(arms.dof):
-        s, c = sine_cosine(q[arm, group, j])
-        axis = arms.axis[arm, j]
-        xx, yx, zx, _x = turned(axis, xx, yx, zx, s, c)
-        xy, yy, zy, _y = turned(axis, xy, yy, zy, s, c)
-        xz, yz, zz, _z = turned(axis, xz, yz, zz, s, c)
-        offset = arms.offset[arm, j]
-        px += offset[0] * xx + offset[1] * yx + offset[2] * zx
-        py += offset[0] * xy + offset[1] * yy + offset[2] * zy
-        pz += offset[0] * xz + offset[1] * yz + offset[2] * zz
-    return px, py, pz
-
-
-@_kernel
-def hold(
-    arms: Arms,
-    targets: wp.array2d(dtype=Lane),
-    first: int,
-    q_last: wp.array3d(dtype=Lane),
-    q_kept: wp.array3d(dtype=Lane),
-    reached: wp.array3d(dtype=Lane),
-    torque: wp.array3d(dtype=Lane),
-):
-    """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
-
-    q_last, q_kept: (N, groups, D) [rad].  reached: (N, groups, 3) [m].  torque: (N, groups, D), +dV/dq [N m].
-    """
-    i, group = wp.tid()
-    arm = first + i
-    tx, ty, tz = targets[group, 0], targets[group, 1], targets[group, 2]
-    lx, ly, lz = tip(arms, arm, group, q_last)
-    kx, ky, kz = tip(arms, arm, group, q_kept)
-    farther = at_least(square_of(tx - lx, ty - ly, tz - lz), square_of(tx - kx, ty - ky, tz - kz))
-    reached[arm, group, 0] = chosen(farther, kx, lx)
-    reached[arm, group, 1] = chosen(farther, ky, ly)
-    reached[arm, group, 2] = chosen(farther, kz, lz)
-
-    base = arms.base[arm]
-    ux, uy = Joints(), Joints()  # joint axes; only what a vertical force needs
-    ox, oy = Joints(), Joints()  # joint positions
-    mx, my = Joints(), Joints()  # mass times position of what joint j carries up to the next
-    xx, xy = Lane(1.0), Lane(0.0)
-    yx, yy = Lane(0.0), Lane(1.0)
-    zx, zy = Lane(0.0), Lane(0.0)
-    px, py = Lane(base[0]), Lane(base[1])
-    for j in range(arms.dof):
-        q = chosen(farther, q_kept[arm, group, j], q_last[arm, group, j])
-        q_kept[arm, group, j] = q
-        s, c = sine_cosine(q)
-        axis = arms.axis[arm, j]
-        xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
-        xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
-        ux[j] = ax
-        uy[j] = ay
-        ox[j] = px
-        oy[j] = py
-        com = arms.com[arm, j]
-        mass = arms.mass[arm, j]
-        mx[j] = mass * (px + com[0] * xx + com[1] * yx + com[2] * zx)
-        my[j] = mass * (py + com[0] * xy + com[1] * yy + com[2] * zy)
-        offset = arms.offset[arm, j]
-        px += offset[0] * xx + offset[1] * yx + offset[2] * zx
-        py += offset[0] * xy + offset[1] * yy + offset[2] * zy
-
-    mass_beyond = float(0.0)  # noqa: UP018 (declares a variable that the loop changes)
-    beyond_x, beyond_y = Lane(), Lane()  # and its mass times position
-    for step in range(arms.dof):
-        j = arms.dof - 1 - step
-        mass_beyond += arms.mass[arm, j]
-        beyond_x += mx[j]
-        beyond_y += my[j]
-        lever_x = beyond_x - mass_beyond * ox[j]
-        lever_y = beyond_y - mass_beyond * oy[j]
-        torque[arm, group, j] = GRAVITY * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x))
+    return Kernels(lanes, Lane, Arms, descend, hold)

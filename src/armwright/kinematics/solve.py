@@ -1,23 +1,27 @@
-"""The boundary of the kernels: numpy in, numpy out. Another kernel could stand behind it."""
+"""The boundary of the kernels: numpy in, numpy out. Another kernel could stand behind it.
+
+Arms are solved in chunks, so that beside arms and results only what a few chunks need is in memory: on the CPU by
+threads, on a GPU one chunk after another.
+"""
 
 import os
-import threading
-from collections.abc import Generator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from armwright.exceptions import FailureError
-from armwright.kinematics.arrays import ArmArrays, Floats
+from armwright.exceptions import ArmError, FailureError, SettingsError
+from armwright.kinematics.arrays import ARRAYS, FLOATS, ArmArrays, Floats, Precision, checked_precision
+from armwright.kinematics.devices import Device, cores, load, resolve_device
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
-DEVICE = "cpu"
+BEFORE_THE_FIRST = 1e30  # stands for ∞, the limit gradient before the first update
 SMALLEST_CHUNK = 32  # groups of targets; below it a thread costs more than it brings
+LARGEST_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: a core's cache; any GPU's memory
 
 
 @dataclass(frozen=True)
@@ -29,92 +33,153 @@ class Postures:
     torque: Floats  # (N, T, D) that holds the posture against gravity, +dV/dq [N m]
 
 
-def solve_postures(arms: ArmArrays, targets: NDArray[np.float64], updates: int = UPDATES) -> Postures:
-    """Inverse kinematics from the straight start, and the gravity torque of the posture kept.
+def solve_postures(
+    arms: ArmArrays,
+    targets: NDArray[np.float64],
+    updates: int = UPDATES,
+    *,
+    start: ArrayLike | None = None,
+    precision: Precision = "float32",
+    device: Device = "cpu",
+) -> Postures:
+    """Inverse kinematics from a start, and the gravity torque of the posture kept.
 
-    targets: (T, 3) [m].  The same arm and target give the same bits whatever is solved beside them.
+    targets: (T, 3) [m]; how many is a question of memory alone.
+    start: angles [rad] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without it
+    all arms start straight, at 0.
+    precision: of the results. "float64" takes arms of either precision, "float32" only its own.
+    The same arm, target and start give the same bits on the same device, whatever is solved beside them.
     """
-    solved = _solve(arms, _in_lanes(targets[None])[0], updates, start=None)
-    q, reached, torque = (_from_lanes(values.numpy())[:, : len(targets)] for values in solved[:3])
-    return Postures(q, reached, torque)
+    if updates < 0:
+        raise SettingsError(f"updates = {updates} is outside 0 <= updates")
+    arms = _in_precision(arms, checked_precision(precision))
+    device = resolve_device(device, many=True)
+    wp, kernels = load(precision, device)
+    n, t, dof = len(arms), len(targets), arms.dof
+    starts = None if start is None else _broadcast(start, (n, t, dof))
+    at = wp.array(_in_lanes(targets[None], kernels)[0], dtype=kernels.Lane, device=device)
+    solved = Postures(*(np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof)))
+
+    def solve(rows: slice) -> None:
+        chunk = arms[rows]
+        q_last = wp.zeros((len(chunk), len(at), dof), dtype=kernels.Lane, device=device)
+        if starts is not None:
+            clipped = np.clip(starts[rows], chunk.lower[:, None], chunk.upper[:, None])
+            q_last = wp.array(_in_lanes(clipped, kernels), dtype=kernels.Lane, device=device)
+        h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
+        q, reached, torque = _launch(chunk, at, t, updates, q_last, h_last)
+        solved.q[rows], solved.reached[rows], solved.torque[rows] = q.numpy(), reached.numpy(), torque.numpy()
+
+    scratch = 3 * dof * len(at) * kernels.lanes  # numbers: the last and the kept angles, the limit gradients
+    size = LARGEST_CHUNK[device] // ((scratch + t * (2 * dof + 3) + 9 * dof + 3) * solved.q.itemsize)
+    if device == "cuda":
+        _one_after_another(solve, n, max(size, 1))
+    else:
+        _in_threads(solve, n, min(max(size, 1), max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // len(at)))))
+    return solved
 
 
 def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats) -> tuple[Floats, Floats]:
-    """One update of the inverse kinematics of each arm at a target of its own, from given angles.
+    """One update of the inverse kinematics of each arm at a target of its own, from given angles, on the CPU.
 
-    targets: (N, 3) [m].  q, the limit gradients h_before, and both results: (N, D).
+    targets: (N, 3) [m].  q, the limit gradients h_before, and both results: (N, D). All is of the arms' precision.
     """
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
-    moved = replace(arms, base=np.asarray(arms.base - targets, dtype=np.float32))
-    start = _in_lanes(q[:, None]), _in_lanes(h_before[:, None])
-    solved = _solve(moved, _in_lanes(np.zeros((1, 1, 3)))[0], 1, start)
-    q_last, h_last = (_from_lanes(values.numpy())[:, 0] for values in solved[3:])
-    return q_last, h_last
+    moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
+    wp, kernels = load(arms.precision, "cpu")
+    at, q_last, h_last = (
+        wp.array(_in_lanes(values, kernels), dtype=kernels.Lane, device="cpu")
+        for values in (np.zeros((1, 1, 3)), q[:, None], h_before[:, None])
+    )
+    _launch(moved, at[0], 1, 1, q_last, h_last)
+    return q_last.numpy()[:, 0, :, 0], h_last.numpy()[:, 0, :, 0]
 
 
-def _solve(arms: ArmArrays, targets: Floats, updates: int, start: tuple[Floats, Floats] | None) -> tuple[Any, ...]:
-    """Kept angles, reached points, torques, last angles and last limit gradients, on the device.
+def _launch(arms: ArmArrays, at: Any, t: int, updates: int, q_last: Any, h_last: Any) -> tuple[Any, Any, Any]:
+    """Kept angles, reached points and torques, (N, T, ...), on the device of the other arrays.
 
-    targets: (G, 3, L) in lanes.  start: angles and limit gradients, (N, G, D, L) each.
+    at: (G, 3) targets in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
     """
-    wp, kernels = _ready()
-    n, groups, dof = len(arms), len(targets), arms.dof
-
-    def array(values: Floats) -> Any:
-        return wp.array(values, dtype=kernels.Lane, device=DEVICE)
-
-    def empty(columns: int) -> Any:
-        return wp.empty((n, groups, columns), dtype=kernels.Lane, device=DEVICE)
-
-    if start is None:
-        shape = (n, groups, dof, kernels.LANES)
-        start = np.zeros(shape, np.float32), np.full(shape, kernels.LARGEST, np.float32)
-    device_arms, device_targets = _to_device(arms), array(targets)
-    q_last, h_last = array(start[0]), array(start[1])
-    q_kept, reached, torque = empty(dof), empty(3), empty(dof)
-
-    def launch(first: int, count: int) -> None:
-        inputs = [device_arms, device_targets, updates, first, q_last, h_last, q_kept]
-        wp.launch(kernels.descend, dim=(count, groups), inputs=inputs, device=DEVICE)
-        inputs = [device_arms, device_targets, first, q_last, q_kept, reached, torque]
-        wp.launch(kernels.hold, dim=(count, groups), inputs=inputs, device=DEVICE)
-
-    chunks = _chunks(n, groups)
-    if len(chunks) == 1:
-        launch(*chunks[0])
-    else:
-        for launched in [_pool().submit(launch, *chunk) for chunk in chunks]:
-            launched.result()
-    return q_kept, reached, torque, q_last, h_last
+    device = q_last.device
+    wp, kernels = load(arms.precision, "cuda" if device.is_cuda else "cpu")
+    on_device = _on_device(arms, wp, kernels, device)
+    q_kept = wp.empty(q_last.shape, dtype=kernels.Lane, device=device)
+    q, reached, torque = (
+        wp.empty((len(arms), t, columns), dtype=getattr(wp, arms.precision), device=device)
+        for columns in (arms.dof, 3, arms.dof)
+    )
+    dim = len(arms), len(at)
+    wp.launch(kernels.descend, dim, inputs=[on_device, at, updates, q_last, h_last, q_kept], device=device)
+    wp.launch(kernels.hold, dim, inputs=[on_device, at, q_last, q_kept, q, reached, torque], device=device)
+    return q, reached, torque
 
 
-def _in_lanes(values: NDArray[Any]) -> Floats:
+def _on_device(arms: ArmArrays, wp: Any, kernels: Any, device: Any) -> Any:
+    on_device = kernels.Arms()
+    on_device.dof = arms.dof
+    for name in ARRAYS:
+        dtype = kernels.Arms.vars[name].type.dtype
+        setattr(on_device, name, wp.array(getattr(arms, name), dtype=dtype, device=device))
+    return on_device
+
+
+def _in_precision(arms: ArmArrays, precision: Precision) -> ArmArrays:
+    """The arms in this precision; a rounded limit could be a wider one, so nothing is rounded here."""
+    if arms.precision == precision:
+        return arms
+    if precision == "float32":
+        raise ArmError('the arms are stacked in float64: solve them with precision="float64", or stack them in float32')
+    return replace(arms, **{name: getattr(arms, name).astype(np.float64) for name in FLOATS})
+
+
+def _broadcast(start: ArrayLike, shape: tuple[int, int, int]) -> NDArray[np.float64]:
+    angles = np.asarray(start, dtype=np.float64)
+    if not np.all(np.isfinite(angles)):
+        raise ArmError("start: an angle is not a finite number [rad]")
+    try:
+        return np.broadcast_to(angles, shape)
+    except ValueError:
+        raise ArmError(
+            f"start: angles of shape {angles.shape} do not broadcast to {shape}: arms, targets, moving joints"
+        ) from None
+
+
+def _in_lanes(values: NDArray[Any], kernels: Any) -> NDArray[Any]:
     """(N, T, C) as (N, G, C, L): targets in groups of L lanes, the last one repeated to fill its group."""
-    lanes = _ready()[1].LANES
     n, t, columns = values.shape
-    groups = -(-t // lanes)
-    filled = np.concatenate([values, np.repeat(values[:, -1:], groups * lanes - t, axis=1)], axis=1)
-    return np.ascontiguousarray(filled.reshape(n, groups, lanes, columns).swapaxes(2, 3), dtype=np.float32)
+    groups = -(-t // kernels.lanes)
+    filled = np.concatenate([values, np.repeat(values[:, -1:], groups * kernels.lanes - t, axis=1)], axis=1)
+    return np.ascontiguousarray(filled.reshape(n, groups, kernels.lanes, columns).swapaxes(2, 3))
 
 
-def _from_lanes(values: Floats) -> Floats:
-    """(N, G, C, L) as (N, G L, C)."""
-    n, groups, columns, lanes = values.shape
-    return values.swapaxes(2, 3).reshape(n, groups * lanes, columns)
+def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> None:
+    """Solves n arms in chunks of `size`; in halves of it, and halves of those, where the GPU has no memory for it."""
+    first = 0
+    while first < n:
+        size = min(size, n - first)
+        try:
+            solve(slice(first, first + size))
+        except RuntimeError as fault:
+            if "out of memory" not in str(fault) and "Failed to allocate" not in str(fault):
+                raise
+            if size == 1:
+                raise FailureError(
+                    "one arm at all its targets does not fit into the GPU's memory; "
+                    'free some of it, solve fewer targets at a time, or take device = "cpu"'
+                ) from fault
+            size //= 2
+        else:
+            first += size
 
 
-def _chunks(n: int, groups: int) -> list[tuple[int, int]]:
-    """(first, count) of the arms that each launch takes: some chunks a core, none too small."""
-    size = max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups))
-    return [(first, min(size, n - first)) for first in range(0, n, size)]
-
-
-def cores() -> int:
-    """The processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-_loading = threading.Lock()
+def _in_threads(solve: Callable[[slice], None], n: int, size: int) -> None:
+    """Solves n arms in chunks of `size`, by as many threads as there are cores."""
+    chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
+    if len(chunks) == 1:
+        solve(chunks[0])
+    else:
+        for solving in [_pool().submit(solve, chunk) for chunk in chunks]:
+            solving.result()
 
 
 @cache
@@ -124,67 +189,3 @@ def _pool() -> ThreadPoolExecutor:
 
 if hasattr(os, "register_at_fork"):  # a forked child has the pool's object, but not its threads
     os.register_at_fork(after_in_child=_pool.cache_clear)
-
-
-def _ready() -> tuple[Any, Any]:
-    """Warp and the kernels, compiled and loaded, so that threads only launch."""
-    with _loading:
-        return _load()
-
-
-@cache
-def _load() -> tuple[Any, Any]:
-    import warp as wp
-
-    wp.config.log_level = wp.LOG_ERROR
-    try:
-        with _silent_stderr():
-            wp.init()
-        from armwright.kinematics import kernels
-
-        for kernel in (kernels.descend, kernels.hold):
-            kernel.module.load(DEVICE)
-    except OSError as fault:
-        raise FailureError(
-            f"the compiled kernels cannot be kept: {fault.strerror or fault}: {fault.filename}; "
-            "set WARP_CACHE_PATH to a folder that can be written"
-        ) from fault
-    return wp, kernels
-
-
-@contextmanager
-def _silent_stderr() -> Generator[None]:
-    """Drops what is written to the process's stderr meanwhile.
-
-    Without an NVIDIA driver Warp's native code says so there, past every setting of its own.
-    """
-    try:
-        kept = os.dup(2)
-    except OSError:  # stderr is closed: nothing to silence
-        yield
-        return
-    sink = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(sink, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(sink)
-
-
-def _to_device(arms: ArmArrays) -> Any:
-    import warp as wp
-
-    from armwright.kinematics.kernels import Arms
-
-    on_device = Arms()
-    on_device.dof = arms.dof
-    on_device.base = wp.array(arms.base, dtype=wp.vec3, device=DEVICE)
-    on_device.axis = wp.array(arms.axis, dtype=int, device=DEVICE)
-    on_device.lower = wp.array(arms.lower, dtype=float, device=DEVICE)
-    on_device.upper = wp.array(arms.upper, dtype=float, device=DEVICE)
-    on_device.offset = wp.array(arms.offset, dtype=wp.vec3, device=DEVICE)
-    on_device.com = wp.array(arms.com, dtype=wp.vec3, device=DEVICE)
-    on_device.mass = wp.array(arms.mass, dtype=float, device=DEVICE)
-    return on_device
