@@ -1,0 +1,1 @@
+"""A vectorised multi-objective search for problems that evaluate a great many designs at once."""
