@@ -129,10 +129,10 @@ def update(arms: Chains, targets: Array, q: Array, h_before: Array) -> tuple[Arr
     return np.clip(q + dq, arms.lower, arms.upper), h
 
 
-def solve(arms: Chains, targets: Array, updates: int = UPDATES) -> Solution:
-    """From q = 0; of the start and all results the earliest with the smallest error is kept. targets (T, 3) [m]."""
+def solve(arms: Chains, targets: Array, updates: int = UPDATES, start: Array | None = None) -> Solution:
+    """Of the start (q = 0 if not given) and all results the earliest with the smallest error. targets (T, 3) [m]."""
     shape = (len(arms.base), len(targets), len(arms.moving))
-    q, h = np.zeros(shape), np.full(shape, np.inf)
+    q, h = np.zeros(shape) + (0.0 if start is None else start), np.full(shape, np.inf)
     kept, least = q, np.linalg.norm(targets - tip(arms, q), axis=-1)
     for _ in range(updates):
         q, h = update(arms, targets, q, h)

@@ -85,6 +85,7 @@ CASES: dict[str, Callable[[], str]] = {
     "one-target-one-joint": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
     "two-joints-two-designs": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
     "nothing-yet": lambda: rendered(fixed_history(PAPER, n=0), "minus"),
+    "robust": lambda: rendered(fixed_history(FixedProblem(load_task("target-1"), tolerance=1e-3)), "minus"),
     "small": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, SMALL), n=3), "minus"),
     "parameters": lambda: parameters_prompt(PAPER, "I think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)"),
     "parameters-several-own": lambda: parameters_prompt(

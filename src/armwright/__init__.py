@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
     from armwright.export.urdf import to_urdf
+    from armwright.front import FrontRun, find_front
     from armwright.history import FinishedTrial, FrontMember, History
     from armwright.pareto import hypervolume
+    from armwright.polish import polish_run
     from armwright.problem import Problem
     from armwright.proposers.llm import LlmProposer
     from armwright.proposers.manual import ManualProposer
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from armwright.proposers.replay import ReplayProposer
     from armwright.proposers.rules import RulesProposer
     from armwright.report.figures import write_figures
+    from armwright.results import verify_run
     from armwright.run_folder import read_run
     from armwright.space import Design, DesignSpace, load_space, paper_space
     from armwright.study import Run, optimize
@@ -43,6 +46,7 @@ _PLACES = {
     "FailureError": "exceptions",
     "FinishedTrial": "history",
     "FrontMember": "history",
+    "FrontRun": "front",
     "History": "history",
     "Joint": "arm",
     "Link": "arm",
@@ -63,15 +67,18 @@ _PLACES = {
     "UsageError": "exceptions",
     "builtin_tasks": "task",
     "evaluate": "evaluation",
+    "find_front": "front",
     "hypervolume": "pareto",
     "load_space": "space",
     "load_task": "task",
     "optimize": "study",
     "paper_space": "space",
+    "polish_run": "polish",
     "random_task": "task",
     "read_run": "run_folder",
     "to_urdf": "export.urdf",
     "uniform_link": "arm",
+    "verify_run": "results",
     "write_figures": "report.figures",
 }
 
@@ -84,6 +91,7 @@ __all__ = [
     "FailureError",
     "FinishedTrial",
     "FrontMember",
+    "FrontRun",
     "History",
     "Joint",
     "Link",
@@ -104,15 +112,18 @@ __all__ = [
     "UsageError",
     "builtin_tasks",
     "evaluate",
+    "find_front",
     "hypervolume",
     "load_space",
     "load_task",
     "optimize",
     "paper_space",
+    "polish_run",
     "random_task",
     "read_run",
     "to_urdf",
     "uniform_link",
+    "verify_run",
     "write_figures",
 ]
 

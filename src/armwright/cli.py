@@ -75,6 +75,10 @@ AnswerName = Annotated[
 ]
 ProposalCount = Annotated[int, typer.Option(help="Designs that one call asks for.")]
 ModelName = Annotated[str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.")]
+Robust = Annotated[
+    bool, typer.Option("--robust", help="Count a design by its worst case with the base or a link 1 mm off.")
+]
+DeviceName = Annotated[str, typer.Option(help="Where arms are evaluated: auto, cpu or cuda.")]
 BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")]
 
 
@@ -121,6 +125,15 @@ def optimize(
     once: Annotated[
         bool, typer.Option("--once", help="With manual:DIR: take the answers that are there, and exit at a question.")
     ] = False,
+    robust: Robust = False,
+    polish_every: Annotated[
+        int | None,
+        typer.Option(help="After so many counted trials, one refines a design of the front by 1000 evaluations."),
+    ] = None,
+    verify: Annotated[
+        bool, typer.Option("--verify/--no-verify", help="Mark each design of the front solid or fragile.")
+    ] = True,
+    device: DeviceName = "auto",
     n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.")] = 10,
     n_step: Annotated[int, typer.Option(help="Trials in a block; the first is the proposer's.")] = 10,
     n_total: Annotated[int, typer.Option(help="Counted trials.")] = 200,
@@ -135,7 +148,7 @@ def optimize(
     from armwright.study import optimize as run_study
 
     words = view.stderr_console() if json_ else view.stdout_console()
-    problem = _problem(task, space)
+    problem = _problem(task, space, robust, device)
     wishes = Wishes(
         proposer, model, base_url, Asking(prompt, memory, answer, proposals), temperature, model_seed, output, origin,
         max_calls, max_cost, replay_strict, once,
@@ -155,7 +168,9 @@ def optimize(
                 n_step=n_step,
                 n_total=n_total,
                 in_flight=(1 if in_flight is None else in_flight) if overlap else None,
+                polish_every=polish_every,
                 on_model_failure=on_model_failure,
+                verify=verify,
                 seed=seed,
                 out=folder,
                 watch=watch,
@@ -259,6 +274,102 @@ def prompt_(
 
 
 @app.command()
+def front(
+    task: TaskName,
+    budget: Annotated[
+        str, typer.Option(help="What the search may spend: a time (5s, 2min, 1h), or evaluations (100000, 1e6).")
+    ] = "5s",
+    space: SpaceFile = None,
+    from_: Annotated[
+        Path | None, typer.Option("--from", help="A run folder, all of whose designs the search begins with.")
+    ] = None,
+    proposer: Annotated[
+        str | None, typer.Option(help="Who gives the first designs: rules, or a configured model (llm).")
+    ] = None,
+    robust: Robust = False,
+    device: DeviceName = "auto",
+    stall: Annotated[
+        bool, typer.Option("--stall/--no-stall", help="End early when the hypervolume hardly grows any more.")
+    ] = True,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="Run folder; without it, runs/TASK-front-seedSEED.")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+) -> None:
+    """Find the whole front of TASK in seconds, by a search over designs in batches. A larger --budget goes on."""
+    from armwright import console as view
+    from armwright.front import find_front
+    from armwright.proposers.choice import choose_proposer
+
+    if from_ is not None and proposer is not None:
+        raise SettingsError("--from and --proposer both give the first designs; choose one")
+    words = view.stderr_console() if json_ else view.stdout_console()
+    problem = _problem(task, space, robust, device, many=True)
+    begin_with = from_
+    if proposer is not None:
+        choice = choose_proposer(proposer)
+        if choice.proposer is None:
+            raise SettingsError(f"--proposer {proposer} gives no designs to begin with; leave it out")
+        words.print(choice.reason)
+        begin_with = choice.proposer
+    folder = out or Path("runs") / f"{problem.task.name}-front-seed{seed}"
+    try:
+        with view.searching(words) as watch:
+            run = find_front(
+                problem,
+                budget=budget,
+                seed=seed,
+                begin_with=begin_with,
+                stop_at_stall=stall,
+                out=folder,
+                watch=watch,
+            )
+        figures = _figures(folder)
+    except KeyboardInterrupt:
+        words.print(f"\nstopped; the search is kept in {folder}/. Go on with:\n  {_same_command()}")
+        sys.exit(INTERRUPTED)
+    if json_:
+        _print_json({"folder": str(folder), **run.summary})
+        return
+    if run.resumed:
+        words.print(f"went on from {run.resumed:,} evaluations")
+    view.show_search(words, run, figures)
+
+
+@app.command()
+def polish(
+    run: Annotated[Path, typer.Argument(help="A finished run folder.")],
+    evaluations: Annotated[int, typer.Option(help="Evaluations for each design of the front.")] = 1000,
+    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+) -> None:
+    """Tune the lengths and the base of RUN's Pareto designs, and add what became better to the run."""
+    from armwright import console as view
+    from armwright.polish import polish_run
+
+    polished = polish_run(run, evaluations)
+    _figures(run)
+    if json_:
+        _print_json({"folder": str(run), **polished.summary})
+        return
+    view.show_polish(view.stdout_console(), polished)
+
+
+@app.command()
+def verify(
+    run: Annotated[Path, typer.Argument(help="A finished run folder.")],
+    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+) -> None:
+    """Compute RUN's Pareto designs again, exactly and a little off, and mark each solid or fragile."""
+    from armwright import console as view
+    from armwright.results import verify_run
+
+    history, summary = verify_run(run)
+    if json_:
+        _print_json({"folder": str(run), **summary})
+        return
+    view.show_front(view.stdout_console(), history, summary)
+
+
+@app.command()
 def doctor(
     model: ModelName = None,
     base_url: BaseUrl = None,
@@ -334,12 +445,19 @@ def _figures(folder: Path) -> list[Path]:
     return there or write_figures(folder)
 
 
-def _problem(task: str, space: Path | None) -> "Problem":
+def _problem(task: str, space: Path | None, robust: bool = False, device: str = "cpu", many: bool = False) -> "Problem":
+    from armwright.kinematics.devices import resolve_device
     from armwright.problem import Problem
     from armwright.space import load_space, paper_space
     from armwright.task import load_task
+    from armwright.tolerance import TOLERANCE
 
-    return Problem(load_task(task), paper_space() if space is None else load_space(space))
+    return Problem(
+        load_task(task),
+        paper_space() if space is None else load_space(space),
+        tolerance=TOLERANCE if robust else 0.0,
+        device=resolve_device(device, many),
+    )
 
 
 def _same_command() -> str:

@@ -1,7 +1,8 @@
 """What the command line shows: progress while a study runs, and its result."""
 
+import math
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,8 +13,10 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column, Table
 from rich.text import Text
 
+from armwright.front import FrontProgress, FrontRun
 from armwright.history import History
 from armwright.objectives import TORQUE_SCALE
+from armwright.polish import Polished
 from armwright.study import Progress as StudyProgress
 from armwright.study import Run
 from armwright.task import Task as DesignTask
@@ -42,7 +45,7 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     """The front and what the run came to."""
     history = run.history
     summary = run.summary
-    console.print(_front_table(history))
+    show_front(console, history, summary)
     if summary["proposer"] is not None:
         console.print(_credit_table(summary["credit"]))
     volume = summary["hypervolume"]
@@ -55,15 +58,72 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
         console.print(
             "The front lies wholly outside the reference point: no design counts yet. Give more trials or another one."
         )
-    console.print(f"{summary['n_trials']} trials: {sources}; {_seconds(summary['seconds'])}")
+    _show_standing(console, summary["best_known"])
+    more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
+    console.print(f"{summary['n_trials']} trials{more}: {sources}; {_seconds(summary['seconds'])}")
     _show_proposer(console, summary["proposer"])
     console.print(
         f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; {history.problem.space.mass_note}"
     )
-    if run.folder is not None:
-        console.print(f"results: {run.folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
-        if figures:
-            console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+    _show_places(console, run.folder, figures)
+
+
+def show_front(console: Console, history: History, summary: dict[str, Any]) -> None:
+    """The front as a table, and how much of it is solid."""
+    verified = summary["verification"]
+    console.print(_front_table(history, None if verified is None else set(verified["solid_numbers"])))
+    if verified is not None:
+        console.print(
+            f"verified in float64, and with base or links 1 mm off: {verified['solid']} solid, {verified['fragile']} "
+            f"fragile ({verified['solid_from_any_start']} hold from other start postures, too); hypervolume of the "
+            f"solid {verified['hypervolume_of_solid']:.3f}, of all as a workshop builds them "
+            f"{verified['hypervolume_as_built']:.3f}"
+        )
+
+
+def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> None:
+    """What a search for the whole front came to."""
+    summary = run.summary
+    show_front(console, run.history, summary)
+    volume, search = summary["hypervolume"], summary["search"]
+    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    console.print(f"hypervolume {volume['final']:.3f} (reference point {reference}), {len(run.history)} designs")
+    _show_standing(console, summary["best_known"])
+    why = {"budget": "the budget is spent", "stall": "the hypervolume hardly grew any more"}[search["ended_by"]]
+    console.print(f"{search['evaluations']:,} evaluations in {search['seconds']:.1f} s; {why}")
+    console.print(f"{run.history.problem.space.mass_note}")
+    _show_places(console, run.folder, figures)
+
+
+def show_polish(console: Console, polished: Polished) -> None:
+    """What polishing brought."""
+    show_front(console, polished.history, polished.summary)
+    final = polished.summary["hypervolume"]["final"]
+    before = polished.before.hypervolume
+    console.print(
+        f"polished {polished.tried} designs by {polished.evaluations:,} evaluations: {polished.added} became better "
+        f"and were added; hypervolume {before[-1]:.3f} -> {final:.3f}"
+    )
+    _show_standing(console, polished.summary["best_known"])
+
+
+def _show_standing(console: Console, standing: dict[str, Any] | None) -> None:
+    if standing is None:
+        return
+    console.print(f"{standing['share']:.1%} of the best known hypervolume ({standing['hypervolume']:.3f})")
+    if standing["beyond"]:
+        console.print(
+            f"NEW: {standing['beyond']} designs lie beyond the best known front and enlarge its hypervolume by "
+            f"{standing['gain']:.4%}"
+        )
+
+
+def _show_places(console: Console, folder: Path | None, figures: Sequence[Path]) -> None:
+    if folder is None:
+        return
+    console.print(f"results: {folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
+    if figures:
+        console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
@@ -88,9 +148,10 @@ def stderr_console() -> Console:
     return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
-def _front_table(history: History) -> Table:
+def _front_table(history: History, solid: set[int] | None) -> Table:
     table = Table(title=f"Pareto front of {history.problem.task.name}", title_justify="left", box=None, pad_edge=False)
-    for name in ("#", "source", "error [m]", "torque", "base [m]", "joints", "links [m]"):
+    verdict = () if solid is None else ("verdict",)
+    for name in ("#", "source", *verdict, "error [m]", "torque", "base [m]", "joints", "links [m]"):
         justify = "right" if name in ("#", "error [m]", "torque") else "left"
         table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
     reference = history.reference_point or (float("inf"), float("inf"))
@@ -100,6 +161,7 @@ def _front_table(history: History) -> Table:
         table.add_row(
             str(member.number),
             member.source,
+            *(() if solid is None else ("solid" if member.number in solid else "fragile",)),
             _value(member.values[0]),
             _value(member.values[1]),
             " ".join(f"{value:5.2f}" for value in member.design.origin),
@@ -185,6 +247,49 @@ def _note(progress: StudyProgress) -> str:
     if progress.fault and progress.note:
         return f"trial {progress.number}: no usable proposal ({progress.note}); a black-box trial took its place"
     return progress.note
+
+
+@contextmanager
+def searching(console: Console) -> Generator[Callable[[FrontProgress], None]]:
+    """A live line in a terminal, a plain line every so often elsewhere."""
+    if not console.is_terminal:
+        yield _plain_search(console)
+        return
+    columns = (TextColumn("{task.fields[state]}"), BarColumn(24))
+    with Progress(*columns, console=console) as bar:
+        line = bar.add_task("", total=1.0, state="starting")
+
+        def watch(progress: FrontProgress) -> None:
+            bar.update(line, completed=_spent(progress), state=_search_state(progress))
+
+        yield watch
+
+
+def _plain_search(console: Console) -> Callable[[FrontProgress], None]:
+    told = 0.0  # share of the budget
+
+    def watch(progress: FrontProgress) -> None:
+        nonlocal told
+        if _spent(progress) >= told:
+            console.print(_search_state(progress))
+            console.file.flush()
+            told = _spent(progress) + 0.1
+
+    return watch
+
+
+def _spent(progress: FrontProgress) -> float:
+    """The share of the budget, at most 1."""
+    budget = progress.budget
+    shares = [progress.evaluations / (budget.evaluations or math.inf), progress.seconds / (budget.seconds or math.inf)]
+    return min(1.0, max(shares))
+
+
+def _search_state(progress: FrontProgress) -> str:
+    return (
+        f"{progress.evaluations:9,} evaluations  {progress.seconds:6.1f} s  hypervolume {progress.hypervolume:.3f}  "
+        f"front {progress.front_size}"
+    )
 
 
 def _plain(console: Console) -> Watch:

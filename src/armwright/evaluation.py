@@ -37,12 +37,17 @@ def evaluate(arms: Sequence[Arm], targets: ArrayLike, device: Device = "cpu") ->
     return evaluate_arrays(stack_arms(arms), targets, device)
 
 
-def evaluate_arrays(arrays: ArmArrays, targets: ArrayLike, device: Device = "cpu") -> Evaluation:
-    """The same for arms that are stacked already."""
+def evaluate_arrays(
+    arrays: ArmArrays, targets: ArrayLike, device: Device = "cpu", start: ArrayLike | None = None
+) -> Evaluation:
+    """The same for arms that are stacked already, in their precision.
+
+    start: angles [rad] that broadcast to (N, T, D); None for the straight start.
+    """
     targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
-    postures = solve_postures(arrays, targets, device=device)
+    postures = solve_postures(arrays, targets, start=start, precision=arrays.precision, device=device)
     reached = postures.reached.astype(np.float64)
     moving = list(arrays.joint_numbers)
     q = np.zeros((len(arrays), len(targets), arrays.n_joints))

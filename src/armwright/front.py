@@ -1,8 +1,8 @@
 """The whole front at once: our own search over the batched kernels, kept in a run folder.
 
-    search.npz    where the search stands, written every few seconds: a killed search loses no more than these
-    trials.jsonl  the designs of the final front; those that were evaluated on the way are counted only
-    proposals/    the run in which a proposer gave the first designs, where one did
+search.npz    where the search stands, written every few seconds: a killed search loses no more than these
+trials.jsonl  the designs of the final front; those that were evaluated on the way are counted only
+proposals/    the run in which a proposer gave the first designs, where one did
 """
 
 import io
@@ -215,7 +215,7 @@ class _Search:
             "evaluations": self.search.evaluations,
             "seconds": round(self.seconds, 3),
             "ended_by": ended,
-            "hypervolume_history": self.search.history.tolist(),
+            "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
         if self.folder is None:
             return FrontRun(history, self.config, summarize_front(history, self.config, searched, None), None, resumed)

@@ -29,6 +29,7 @@ class FinishedTrial:
     fault: why a trial that was a proposer's became a black-box one.
     asked: the trial that a proposal was asked for, where it came for another (overlap, several proposals a call).
     feedback: how many finished trials the proposer knew, where not all before this one.
+    refines: the trial whose design was refined for this one.
     evaluations: designs that were evaluated to find it (a refined one: many).
     seconds: wall time by part (proposing, sampling, evaluation).
     sampler_notes: what the sampler noted on its trial and study (a genetic one: generations), needed to resume.
@@ -44,6 +45,7 @@ class FinishedTrial:
     fault: str | None = None
     asked: int | None = None
     feedback: int | None = None
+    refines: int | None = None
     evaluations: int = 1
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])

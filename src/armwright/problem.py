@@ -13,6 +13,7 @@ from armwright.kinematics.devices import Device
 from armwright.objectives import PAPER_OBJECTIVES, Objective
 from armwright.space import Design, DesignSpace, paper_space
 from armwright.task import Task
+from armwright.tolerance import moved
 
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
 
@@ -21,11 +22,14 @@ POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x ta
 class Problem:
     """Which arm of `space` serves `task` best, by position error and torque.
 
+    tolerance: [m] of a workshop; above 0, a design counts by the worst that comes of it, in each objective, when it is
+        built exactly or with its base or one link off by so much (`armwright.tolerance`).
     device: where arms are evaluated; `resolve_device` says which there are.
     """
 
     task: Task
     space: DesignSpace = field(default_factory=paper_space)
+    tolerance: float = 0.0
     device: Device = "cpu"
     objectives: ClassVar[tuple[Objective, ...]] = PAPER_OBJECTIVES
 
@@ -51,8 +55,10 @@ class Problem:
         values = np.empty((len(matrix), len(self.objectives)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
-            arrays = arrays_of(self.space, matrix[rows])
-            values[rows] = self.values(evaluate_arrays(arrays, self.task.points, self.device))
+            values[rows] = self._as_built(matrix[rows])
+            if self.tolerance > 0.0:
+                for copies in moved(self.space, matrix[rows], self.tolerance):
+                    values[rows] = np.maximum(values[rows], self._as_built(copies))
         return values
 
     def values(self, evaluation: Evaluation) -> Array:
@@ -61,4 +67,12 @@ class Problem:
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
         """(N, 2): position error [m] and torque [α-scaled] of N designs; minimised."""
-        return self.values(self.evaluation(designs))
+        values = self.values(self.evaluation(designs))
+        if self.tolerance > 0.0:
+            for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
+                values = np.maximum(values, self.values(self.evaluation(self.space.designs(copies))))
+        return values
+
+    def _as_built(self, rows: Array) -> Array:
+        """(n, 2) of designs as rows, each built exactly as it stands there."""
+        return self.values(evaluate_arrays(arrays_of(self.space, rows), self.task.points, self.device))

@@ -24,8 +24,8 @@ from armwright.export.urdf import to_urdf
 from armwright.history import FinishedTrial, FrontMember, History
 from armwright.pareto import hypervolume
 from armwright.proposers.proposer import ProposerSummary
-from armwright.run_folder import RunConfig, RunFolder
-from armwright.verification import Verification
+from armwright.run_folder import FrontMethod, RunConfig, RunFolder, read_run
+from armwright.verification import Verification, verify_front
 
 SUMMARY = "summary.json"
 DESIGNS = "designs"
@@ -51,6 +51,20 @@ def write_results(
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
+def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
+    """Verifies the front of a finished run anew, and writes its results anew; its history and its summary."""
+    path = Path(path)
+    config, history = read_run(path)
+    summary = read_summary(path)
+    if summary is None:
+        raise RunFolderError(f"{path} is not finished: give the command that began it once more")
+    with RunFolder(path) as folder:
+        verification = verify_front(history)
+        summary = resummarize(summary, history, config, verification)
+        write_results(folder, history, summary, verification)
+    return history, summary
+
+
 def results_are_there(path: Path, history: History) -> bool:
     """Whether a run folder holds all results of these trials."""
     summary = read_summary(path)
@@ -73,7 +87,7 @@ def read_summary(path: Path) -> dict[str, Any] | None:
     """summary.json of a run folder, or None where the run has not ended (or the file is damaged)."""
     try:
         summary: dict[str, Any] = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-        return summary if summary.keys() >= {"n_trials", "hypervolume"} else None
+        return summary if summary.keys() >= {"n_trials", "hypervolume", "best_known", "verification"} else None
     except (OSError, ValueError, AttributeError):
         return None
 
@@ -135,6 +149,16 @@ def summarize_front(
     }
 
 
+def resummarize(
+    summary: Mapping[str, Any], history: History, config: RunConfig, verification: Verification | None
+) -> dict[str, Any]:
+    """The summary of a finished run after trials were added or designs verified; what only its sessions knew stays."""
+    if isinstance(config.method, FrontMethod):
+        return summarize_front(history, config, summary["search"], verification)
+    known = {key: summary[key] for key in ("proposer", "diagnostics") if key in summary}
+    return summarize(history, config, None, verification) | known
+
+
 def _standing_record(history: History) -> dict[str, Any] | None:
     """How the front compares with the best known one, where there is one."""
     if history.reference_point is None:
@@ -144,7 +168,7 @@ def _standing_record(history: History) -> dict[str, Any] | None:
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
-    """How many designs of the front are solid, and what hypervolume these have, and the worst cases of all."""
+    """How many designs of the front are solid, the hypervolume of these, and that of what a workshop makes of all."""
     if verification is None:
         return None
     solid = [member.number for member, holds in zip(history.front, verification.solid, strict=True) if holds]
@@ -154,7 +178,8 @@ def _verification_record(history: History, verification: Verification | None) ->
         "fragile": len(history.front) - len(solid),
         "solid_numbers": solid,
         "hypervolume_of_solid": hypervolume(history.values[solid], reference),
-        "hypervolume_of_worst_cases": hypervolume(verification.worst, reference),
+        "solid_from_any_start": int(verification.from_any_start.sum()),
+        "hypervolume_as_built": hypervolume(verification.as_built, reference),
     }
 
 
@@ -165,6 +190,7 @@ def _verdicts(history: History, verification: Verification | None) -> dict[int, 
     return {
         member.number: {
             "solid": bool(verification.solid[i]),
+            "from_any_start": bool(verification.from_any_start[i]),
             "exact": _objectives(history, verification.exact[i].tolist()),
             "moved": _objectives(history, verification.moved[i].tolist()),
             "started": _objectives(history, verification.started[i].tolist()),
@@ -179,7 +205,8 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
         return {}
     kinds = ("exact", "moved", "started")
     columns = {f"{name}_{kind}": value for kind in kinds for name, value in verdict[kind].items()}
-    return {"solid": "solid" if verdict["solid"] else "fragile", **columns}
+    verdict_ = "solid" if verdict["solid"] else "fragile"
+    return {"verdict": verdict_, "from_any_start": "yes" if verdict["from_any_start"] else "no", **columns}
 
 
 def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:

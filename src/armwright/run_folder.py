@@ -264,6 +264,7 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     fault: str | None = None
     asked: int | None = None
     feedback: int | None = None
+    refines: int | None = None
     evaluations: int = Field(default=1, ge=1)
     params: dict[str, float | str]
     values: list[float] = Field(min_length=2, max_length=2)
@@ -281,6 +282,7 @@ def _trial_line(trial: FinishedTrial) -> bytes:
         fault=trial.fault,
         asked=trial.asked,
         feedback=trial.feedback,
+        refines=trial.refines,
         evaluations=trial.evaluations,
         params=dict(trial.design.params),
         values=list(trial.values),
@@ -326,6 +328,7 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
         fault=record.fault,
         asked=record.asked,
         feedback=record.feedback,
+        refines=record.refines,
         evaluations=record.evaluations,
         seconds=record.seconds,
         sampler_notes=record.sampler_notes,

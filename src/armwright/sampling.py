@@ -151,7 +151,7 @@ class BlackBox:
             trial.set_user_attr(name, value)
         return trial, Design(trial.params)
 
-    def inject(self, design: Design, number: int, source: str, proposal: str) -> tuple[Trial, Design]:
+    def inject(self, design: Design, number: int, source: str, proposal: str | None) -> tuple[Trial, Design]:
         """A trial for a design from elsewhere, which the sampler will learn from, and the design as the space has it.
 
         DesignError where it is not in the space.

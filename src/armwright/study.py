@@ -14,16 +14,18 @@ from pathlib import Path
 from typing import Any, Literal
 
 from armwright.exceptions import ModelError, SettingsError
-from armwright.history import BBO, RANDOM, FinishedTrial, FrontMember, History
+from armwright.history import BBO, POLISH, RANDOM, FinishedTrial, FrontMember, History
 from armwright.pareto import Array, FrontTracker, default_reference_point
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
-from armwright.results import discard_results, results_are_there, summarize, write_results
+from armwright.refining import Refinement, refine_one
+from armwright.results import discard_results, read_summary, results_are_there, summarize, write_results
 from armwright.run_folder import Method, RunConfig, RunFolder, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_factory
 from armwright.space import Design
 from armwright.turns import Alternating, Asker, Nobody, Overlapping, Recorded, Schedule, Turn, Turns
+from armwright.verification import verify_front
 
 LARGEST = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
@@ -87,7 +89,9 @@ def optimize(
     n_step: int = 10,
     n_total: int = 200,
     in_flight: int | None = None,
+    polish_every: int | None = None,
     on_model_failure: str = "stop",
+    verify: bool = True,
     seed: int = 0,
     out: str | Path | None = None,
     watch: Callable[[Progress], None] | None = None,
@@ -98,6 +102,8 @@ def optimize(
     sampler: "tpe", "tpe-multivariate", "nsga2", "gp", "random", or a factory seed -> Optuna sampler.
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
+    polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
+    verify: whether the front is verified where results are written (`verification.py`).
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials.
     """
     if on_model_failure not in ON_MODEL_FAILURE:
@@ -109,9 +115,11 @@ def optimize(
     config = RunConfig(
         task=problem.task,
         space=problem.space,
+        tolerance=problem.tolerance,
+        device=problem.device,
         reference_point=problem.reference_point,
-        method=_method(proposer, sampler, n_init, n_step, n_total, in_flight),
-        seed=_whole("seed", seed, 0),
+        method=_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every),
+        seed=whole("seed", seed, 0),
         versions=versions(),
     )
     with ExitStack() as stack:
@@ -120,7 +128,7 @@ def optimize(
             folder = stack.enter_context(RunFolder(Path(out)))
             config = folder.adopt(config)
         study = Study(problem, config, proposer, sampler, folder, watch)
-        return study.run(on_model_failure)
+        return study.run(on_model_failure, verify)
 
 
 class Study:
@@ -137,7 +145,7 @@ class Study:
     ) -> None:
         self.problem = problem
         self.config = config
-        self.method = config.method
+        self.method = config.study
         self.proposer = proposer
         self.folder = folder
         self.watch = watch
@@ -152,9 +160,9 @@ class Study:
     @property
     def n_trials(self) -> int:
         """Of the whole study, the random ones included."""
-        return self.method.n_init + self.method.n_total
+        return self.method.n_trials
 
-    def run(self, on_model_failure: str = "stop") -> Run:
+    def run(self, on_model_failure: str = "stop", verify: bool = True) -> Run:
         """All trials that are still due, then the results."""
         resumed = len(self.trials)
         if self.proposer is not None:
@@ -166,7 +174,7 @@ class Study:
             with closing(self._turns()) as turns:
                 for number in range(resumed, self.n_trials):
                     self._step(number, turns)
-        return self._finish(resumed)
+        return self._finish(resumed, verify)
 
     def _check(self, on_model_failure: str) -> None:
         """Says what the proposals will take, and makes sure that they are to be had."""
@@ -220,7 +228,8 @@ class Study:
             self._report("proposing", number, self.proposer.name, turns, note=self.proposer.announce(number))
         turn = turns.next(number)
         proposed = time.perf_counter()
-        trial, design, source = self._ask(number, turn)
+        refinement = self._refinement(number) if turn is None else None
+        trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
         values = tuple(self.problem.evaluate([design])[0].tolist())
         evaluated = time.perf_counter()
@@ -233,6 +242,8 @@ class Study:
             "proposing": round(proposed - started, 6),
         }
         finished = _finished(number, source, design, values, turn, noted, seconds)
+        if refinement is not None:
+            finished = replace(finished, refines=refinement.refines, evaluations=1 + refinement.evaluations)
         if self.folder is not None:
             self.folder.append(finished)
         self.trials.append(finished)
@@ -240,8 +251,20 @@ class Study:
         self._freeze_reference_point()
         self._report("finished", number, source, turns, finished.fault, "" if turn is None else turn.note)
 
-    def _ask(self, number: int, turn: Turn | None) -> tuple[Any, Design, str]:
+    def _refinement(self, number: int) -> Refinement | None:
+        """A design of the front refined, where one is due."""
+        every = self.method.polish_every
+        if every is None:
+            return None
+        due = (number - self.method.n_init) // every
+        if sum(trial.refines is not None for trial in self.trials) >= due:
+            return None
+        return refine_one(self._history(), self.config.seed)
+
+    def _ask(self, number: int, turn: Turn | None, refinement: Refinement | None) -> tuple[Any, Design, str]:
         """Optuna's trial with the design to evaluate, and where it comes from."""
+        if refinement is not None and refinement.design is not None:
+            return *self.black_box.inject(refinement.design, number, POLISH, None), POLISH
         if turn is not None and turn.proposal is not None:
             assert self.proposer is not None
             source = self.proposer.name
@@ -288,14 +311,17 @@ class Study:
             )
         )
 
-    def _finish(self, resumed: int) -> Run:
+    def _finish(self, resumed: int, verify: bool) -> Run:
         history = self._history()
-        summary = summarize(history, self.config, None if self.proposer is None else self.proposer.summary())
-        folder = None
-        if self.folder is not None:
-            folder = self.folder.path
-            if not results_are_there(folder, history):
-                write_results(self.folder, history, summary)
+        record = None if self.proposer is None else self.proposer.summary()
+        if self.folder is None:
+            return Run(history, self.config, summarize(history, self.config, record), None, resumed)
+        folder = self.folder.path
+        summary = read_summary(folder)
+        if summary is None or not results_are_there(folder, history):
+            verification = verify_front(history) if verify else None
+            summary = summarize(history, self.config, record, verification)
+            write_results(self.folder, history, summary, verification)
         return Run(history, self.config, summary, folder, resumed)
 
 
@@ -306,16 +332,18 @@ def _method(
     n_step: int,
     n_total: int,
     in_flight: int | None,
+    polish_every: int | None,
 ) -> Method:
     factory = sampler_factory(sampler)
     name = sampler if isinstance(sampler, str) else getattr(factory, "__qualname__", type(factory).__qualname__)
     return Method(
         proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
         sampler=name,
-        n_init=_whole("n_init", n_init, 1),
-        n_step=_whole("n_step", n_step, 1),
-        n_total=_whole("n_total", n_total, 1),
-        in_flight=None if in_flight is None else _whole("in_flight", in_flight, 1),
+        n_init=whole("n_init", n_init, 1),
+        n_step=whole("n_step", n_step, 1),
+        n_total=whole("n_total", n_total, 1),
+        in_flight=None if in_flight is None else whole("in_flight", in_flight, 1),
+        polish_every=None if polish_every is None else whole("polish_every", polish_every, 1),
     )
 
 
@@ -351,7 +379,8 @@ def _past_turn(trial: FinishedTrial) -> Turn | None:
     return Turn(asked, trial.number if trial.feedback is None else trial.feedback, fault=trial.fault)
 
 
-def _whole(name: str, value: Any, least: int) -> int:
+def whole(name: str, value: Any, least: int) -> int:
+    """The value as a whole number from `least` on; SettingsError where it is none."""
     try:
         number = operator.index(value)  # numpy's whole numbers, too
     except TypeError:

@@ -2,6 +2,9 @@
 
 Each design is computed again in float64: as it is, with its base or one link off by 1 mm, and from 20 other start
 postures. docs/method.md §10.
+
+Other starts do not make a design fragile: the posture that was found exists, and a controller that knows it can take
+it. They say whether the inverse kinematics would find one as good by itself.
 """
 
 from collections.abc import Sequence
@@ -19,7 +22,7 @@ from armwright.tolerance import moved
 
 STARTS = 20
 START_SPREAD = 0.05  # [rad] to either side of the straight start
-ALLOWED_SHARE = 0.02  # of a value, by which the worst case may be worse
+ALLOWED_SHARE = 0.05  # of a value, by which the worst case may be worse
 ALLOWED_OF_REFERENCE = 0.005  # of the reference point's value; allowed at least
 
 
@@ -30,8 +33,9 @@ class Verification:
     values: (N, M) as the search has them.
     exact: (N, M) in float64.
     moved: (N, M) the worst in float64 with the base or one link off by 1 mm.
-    started: (N, M) the worst in float64 from other start postures, of which each target has one.
-    solid: (N,) whether none of these is worse than is allowed.
+    started: (N, M) the worst in float64 from other start postures.
+    solid: (N,) whether neither `exact` nor `moved` is worse than is allowed.
+    from_any_start: (N,) whether `started` is not, either.
     """
 
     values: Array
@@ -39,16 +43,12 @@ class Verification:
     moved: Array
     started: Array
     solid: NDArray[np.bool_]
+    from_any_start: NDArray[np.bool_]
 
     @property
-    def worst(self) -> Array:
-        """(N, M) the worst of all."""
-        return np.max([self.values, self.exact, self.moved, self.started], axis=0)
-
-    @property
-    def spread(self) -> Array:
-        """(N, M) by how much the worst is worse than the search's value."""
-        return self.worst - self.values
+    def as_built(self) -> Array:
+        """(N, M) the worst of what a workshop makes of them."""
+        return np.max([self.values, self.exact, self.moved], axis=0)
 
 
 def verify_front(history: History) -> Verification | None:
@@ -68,20 +68,18 @@ def verify(
     values: (N, M) what the search found.  reference_point: (M,) sets the scale of what is allowed.
     """
     rows = problem.space.matrix(designs)
-    copies = moved(problem.space, rows)
-    n, k = copies.shape[:2]
     exact = _values(problem, rows)
-    off = _values(problem, copies.reshape(n * k, -1)).reshape(n, k, -1)
-    shape = (STARTS, len(problem.task.targets), problem.space.joints)
-    starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
-    started = _values(problem, np.repeat(rows, STARTS, axis=0), np.tile(starts, (n, 1, 1))).reshape(n, STARTS, -1)
-    allowed = np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
-    found = Verification(values, exact, off.max(axis=1), started.max(axis=1), np.zeros(n, dtype=bool))
-    solid = np.all(found.spread <= allowed, axis=1)
-    return Verification(found.values, found.exact, found.moved, found.started, solid)
+    off = np.max([_values(problem, copies) for copies in moved(problem.space, rows)], axis=0)
+    starts = np.random.default_rng(0).uniform(
+        -START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), problem.space.joints)
+    )
+    started = np.max([_values(problem, rows, start) for start in starts], axis=0)
+    worst = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
+    solid = np.all((exact <= worst) & (off <= worst), axis=1)
+    return Verification(values, exact, off, started, solid, from_any_start=solid & np.all(started <= worst, axis=1))
 
 
 def _values(problem: Problem, rows: Array, start: Array | None = None) -> Array:
-    """(N, M) in float64.  start: (N, T, D) angles [rad]; None for the straight start."""
+    """(N, M) in float64.  start: (T, D) angles [rad]; None for the straight start."""
     arrays = arrays_of(problem.space, rows, "float64")
     return problem.values(evaluate_arrays(arrays, problem.task.points, start=start))

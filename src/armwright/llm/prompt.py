@@ -48,6 +48,8 @@ VARIABLES = {
     "target_high": "the largest x, y and z of all targets",
     "updates": "updates of the inverse kinematics",
     "objectives": "what is minimised, each with symbol, label, unit, words",
+    "tolerance": "[m] by which base and links may be off, the worst case of which counts; 0 where designs count as they "
+    "stand",
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
     "n_front": "how many of them are Pareto-optimal",
@@ -220,6 +222,7 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "n_targets": len(problem.task.points),
         "updates": UPDATES,
         "objectives": problem.objectives,
+        "tolerance": problem.tolerance,
         # A task states two numbers; a problem with other objectives has no use for them.
         "reference_point": reference if reference and len(reference) == len(problem.objectives) else None,
         "n_finished": len(history),

@@ -23,8 +23,8 @@ from armwright.kinematics.chain import joint_positions
 from armwright.objectives import TORQUE
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, RC, TARGET, Look, look
-from armwright.results import FIGURES
-from armwright.run_folder import read_run
+from armwright.results import FIGURES, read_summary
+from armwright.run_folder import FrontMethod, read_run
 
 REACHED = 1e-3  # [m]; a target missed by less counts as reached
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
@@ -35,13 +35,15 @@ MOST_PANELS = 12
 def write_figures(folder: str | Path) -> list[Path]:
     """Draws the figures of a run folder and returns their .png files."""
     folder = Path(folder)
-    _, history = read_run(folder)
+    config, history = read_run(folder)
+    summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
+    drawn = _figures(history) if summary is None else _search_figures(history, summary)
     place, part = folder / FIGURES, folder / f"{FIGURES}.part"
     with matplotlib.rc_context(RC), _writing(place):
         if part.exists():
             shutil.rmtree(part)
         part.mkdir()
-        names = [_save(figure, part / f"{name}.png") for name, figure in _figures(history)]
+        names = [_save(figure, part / f"{name}.png") for name, figure in drawn]
         # In one step, so that a folder with this name always holds all figures of one state of the run.
         if place.exists():
             shutil.rmtree(place)
@@ -54,6 +56,17 @@ def _figures(history: History) -> Iterator[tuple[str, Figure]]:
     yield "samples", draw_samples(history)
     yield "credit", draw_credit(history)
     yield "front", draw_front(history)
+    yield from _arm_figures(history)
+
+
+def _search_figures(history: History, summary: Mapping[str, Any]) -> Iterator[tuple[str, Figure]]:
+    """Of a search for the whole front, whose trials are that front."""
+    yield "hypervolume", draw_search(history, summary)
+    yield "front", draw_front(history)
+    yield from _arm_figures(history)
+
+
+def _arm_figures(history: History) -> Iterator[tuple[str, Figure]]:
     chosen = chosen_members(history)
     yield "arms", draw_arms(history, chosen)
     for title, member in chosen:
@@ -110,6 +123,23 @@ def draw_hypervolume(history: History) -> Figure:
     axes.legend(loc="lower right")
     if len(curve) and curve[-1] == 0.0:
         _say(axes, "No design lies within the reference box.")
+    return figure
+
+
+def draw_search(history: History, summary: Mapping[str, Any]) -> Figure:
+    """The hypervolume of a search over its evaluations, beside the best known one."""
+    figure, axes = _figure(5.2, 3.2)
+    evaluations, volumes = np.array(summary["search"]["hypervolume_history"]).T
+    axes.step(evaluations, volumes, where="post", color=FRONT, linewidth=1.4, label="hypervolume")
+    if summary["best_known"] is not None:
+        best = summary["best_known"]["hypervolume"]
+        axes.axhline(best, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=f"best known ({best:.2f})")
+    axes.set_xscale("log")
+    axes.set_xlabel("Designs evaluated")
+    axes.set_ylabel("Hypervolume")
+    axes.set_title(f"{history.problem.task.name}, reference point {_pair(_reference(history))}")
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="lower right")
     return figure
 
 
@@ -181,7 +211,7 @@ def draw_front(history: History) -> Figure:
     axes.set_xlabel(_label(history, 0))
     axes.set_ylabel(_label(history, 1))
     axes.legend(handles=_legend(history), loc="upper right")
-    area = history.hypervolume[-1] if len(history.hypervolume) else 0.0
+    area = hypervolume(history.values, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     return figure
 

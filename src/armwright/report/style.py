@@ -18,6 +18,8 @@ class Look(NamedTuple):
 _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
     BBO: Look("black box", "#0072B2", "o", 20),
+    "polish": Look("polish", "#009E73", "D", 28, "...."),
+    "front": Look("front search", "#0072B2", "o", 14),
     "rules": Look("rules", "#D55E00", "^", 44, "////"),
     "llm": Look("language model", "#D55E00", "^", 44, "////"),
     "scripted": Look("scripted stand-in", "#D55E00", "v", 44, "////"),

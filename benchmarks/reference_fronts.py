@@ -1,0 +1,124 @@
+"""The best known fronts of the built-in tasks (src/armwright/fronts/), and how they are made.
+
+Of each task the union of: our search with several seeds; our search within each joint sequence by itself, which no
+other sequence can crowd out; pymoo's NSGA-II; and what was known before. So a run of this script never makes a front
+worse.
+
+    python benchmarks/reference_fronts.py [TASK ...]      # some 15 minutes on two idle cores for all
+"""
+
+import csv
+import io
+import itertools
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from front import pymoo_front
+
+import armwright
+from armwright.best_known import known_front
+from armwright.evaluation import Array
+from armwright.pareto import default_reference_point, hypervolume
+from armwright.problem import Problem
+from armwright.search.front import FrontSearch
+from armwright.search.survival import survivors
+from armwright.space import FloatParameter
+from armwright.task import builtin_tasks
+
+SEEDS = range(4)
+EVALUATIONS = 1_000_000  # for each seed
+PER_SEQUENCE = 20_000
+PYMOO_EVALUATIONS = 200_000
+MOST = 500  # designs of a shipped front
+PLACE = Path(armwright.__file__).parent / "fronts"
+
+
+def main() -> None:
+    for name, task in builtin_tasks().items():
+        if len(sys.argv) == 1 or name in sys.argv[1:]:
+            make(Problem(task))
+
+
+def make(problem: Problem) -> None:
+    started = time.perf_counter()
+    reference = reference_point(problem)
+    rows, values, words = [np.empty((0, len(problem.space.parameters)))], [np.empty((0, 2))], []
+
+    def take(what: str, found: tuple[Array, Array]) -> None:
+        rows.append(found[0])
+        values.append(found[1])
+        words.append(f"{what}: {hypervolume(found[1], reference):.4f}")
+        print(f"  {problem.task.name}: {words[-1]}", flush=True)
+
+    known = known_front(problem)
+    if known is not None:
+        # Values of another machine are not taken on trust.
+        take("known before", (problem.space.matrix(known.designs), problem.evaluate(known.designs)))
+    for seed in SEEDS:
+        take(f"search, seed {seed}, {EVALUATIONS:,} evaluations", searched(problem, reference, seed))
+    take(f"search within each sequence, {PER_SEQUENCE:,} evaluations each", by_sequence(problem, reference))
+    take(f"pymoo's NSGA-II, {PYMOO_EVALUATIONS:,} evaluations", pymoo_front(problem, PYMOO_EVALUATIONS, seed=0))
+
+    everything, worth = np.vstack(rows), np.vstack(values)
+    kept = survivors(worth, np.asarray(reference), MOST)
+    kept = kept[np.all(worth[kept] < reference, axis=1)]
+    kept = kept[np.argsort(worth[kept, 0])]
+    words.append(f"all together, at most {MOST} designs kept: {hypervolume(worth[kept], reference):.4f}")
+    print(f"  {problem.task.name}: {words[-1]} in {time.perf_counter() - started:.0f} s", flush=True)
+    write(problem, everything[kept], worth[kept], reference, words)
+
+
+def searched(problem: Problem, reference: tuple[float, ...], seed: int) -> tuple[Array, Array]:
+    search = FrontSearch(problem.space.parameters, problem.evaluate_matrix, reference, seed)
+    while search.evaluations < EVALUATIONS:
+        search.step()
+    return search.rows, search.values
+
+
+def by_sequence(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, Array]:
+    """The designs that our search finds within each joint sequence, all together."""
+    space = problem.space
+    real = [i for i, parameter in enumerate(space.parameters) if isinstance(parameter, FloatParameter)]
+    rows, values = [], []
+    for sequence in itertools.product(range(len(space.joint_types)), repeat=space.joints):
+
+        def whole(some: Array, sequence: tuple[int, ...] = sequence) -> Array:
+            full = np.empty((len(some), len(space.parameters)))
+            full[:, real] = some
+            full[:, 3 : 3 + space.joints] = sequence
+            return full
+
+        search = FrontSearch(
+            [space.parameters[i] for i in real], lambda some: problem.evaluate_matrix(whole(some)), reference, 0
+        )
+        while search.evaluations < PER_SEQUENCE:
+            search.step()
+        rows.append(whole(search.rows))
+        values.append(search.values)
+    return np.vstack(rows), np.vstack(values)
+
+
+def reference_point(problem: Problem) -> tuple[float, ...]:
+    """The task's, else the one of ten random designs: it only says which part of the front is worth most."""
+    return problem.reference_point or default_reference_point(problem.evaluate(problem.space.sample(10, seed=0)))
+
+
+def write(problem: Problem, rows: Array, values: Array, reference: tuple[float, ...], words: list[str]) -> None:
+    text = io.StringIO()
+    version = armwright.__version__ if hasattr(armwright, "__version__") else "0.1.0"
+    text.write(f"# The best known front of {problem.task.name} in the paper's design space, armwright {version}.\n")
+    text.write("# Made by: python benchmarks/reference_fronts.py; hypervolumes within ")
+    text.write(f"({', '.join(f'{value:.4g}' for value in reference)}):\n")
+    text.writelines(f"#   {line}\n" for line in words)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([p.name for p in problem.space.parameters] + [o.name for o in problem.objectives])
+    for design, row in zip(problem.space.designs(rows), values.tolist(), strict=True):
+        writer.writerow([*design.params.values(), *row])
+    PLACE.mkdir(exist_ok=True)
+    (PLACE / f"{problem.task.name}.csv").write_text(text.getvalue())
+
+
+if __name__ == "__main__":
+    main()

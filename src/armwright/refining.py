@@ -1,0 +1,72 @@
+"""Refining: designs of a front, their lengths and base tuned by a local search on the kernels.
+
+The paper finds that a language model writes rounded numbers and cannot tune them. Joint types stay as they are; each
+refined design is better in every objective than the one that it comes from.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moocore
+import numpy as np
+
+from armwright.history import POLISH, FrontMember, History
+from armwright.pareto import hypervolume
+from armwright.search.refinement import Refined, refine
+from armwright.seeding import derived_seed
+from armwright.space import Design
+
+EVALUATIONS = 1000  # for each design
+POLISHING = 3  # the place of its seeds under the run's seed
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Of one trial's design: the better one, or None where none was found; evaluations: spent on it."""
+
+    refines: int
+    design: Design | None
+    evaluations: int
+
+
+def refine_one(history: History, seed: int) -> Refinement:
+    """The design of the front that is worth it most, refined; seed: the run's."""
+    member = next_to_refine(history)
+    refined = refine_members(history, [member], seed, EVALUATIONS)
+    (design,) = history.problem.space.designs(refined.rows)
+    return Refinement(member.number, design if refined.improved[0] else None, refined.evaluations)
+
+
+def worth_refining(history: History) -> list[FrontMember]:
+    """The front within the reference box, or the whole one where it lies outside."""
+    reference = np.asarray(history.reference_point or np.inf)
+    return [member for member in history.front if np.all(np.array(member.values) < reference)] or history.front
+
+
+def next_to_refine(history: History) -> FrontMember:
+    """The design that adds most hypervolume, of those that were neither refined yet nor are refined ones."""
+    members = worth_refining(history)
+    tried = {trial.refines for trial in history}
+    fresh = [m for m in members if m.source != POLISH and m.number not in tried] or members
+    values = np.array([member.values for member in members])
+    if history.reference_point is None or hypervolume(values, history.reference_point) == 0.0:
+        return fresh[0]
+    contributions = moocore.hv_contributions(values, ref=list(history.reference_point))
+    adds = {member.number: float(c) for member, c in zip(members, contributions, strict=True)}
+    return max(fresh, key=lambda member: adds[member.number])
+
+
+def refine_members(history: History, members: Sequence[FrontMember], seed: int, evaluations: int) -> Refined:
+    """The designs of `members`, refined side by side; seed: the run's."""
+    problem = history.problem
+    values = np.array([member.values for member in members])
+    scale = values.max(axis=0) if history.reference_point is None else np.array(history.reference_point)
+    return refine(
+        problem.space.parameters,
+        problem.evaluate_matrix,
+        problem.space.matrix([member.design for member in members]),
+        values,
+        scale,
+        evaluations,
+        derived_seed(seed, POLISHING, len(history)),
+    )
