@@ -60,6 +60,7 @@ def test_config_repeats_the_run(run: Run) -> None:
         "n_step": 4,
         "n_total": 8,
         "in_flight": None,
+        "polish_every": None,
     }
     assert config["seed"] == 0
     assert {"armwright", "optuna", "warp-lang", "python"} <= set(config["versions"])
@@ -77,7 +78,10 @@ def test_summary(run: Run) -> None:
         "n_trials",
         "by_source",
         "hypervolume",
+        "best_known",
         "front_size",
+        "verification",
+        "evaluations",
         "credit",
         "proposer",
         "diagnostics",
