@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from front import pymoo_front
+from peers import Nsga2
 
 import armwright
 from armwright.best_known import known_front
@@ -23,7 +23,7 @@ from armwright.evaluation import Array
 from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem import Problem
 from armwright.search.front import FrontSearch
-from armwright.search.survival import survivors
+from armwright.search.survival import front
 from armwright.space import FloatParameter
 from armwright.task import builtin_tasks
 
@@ -59,11 +59,11 @@ def make(problem: Problem) -> None:
     for seed in SEEDS:
         take(f"search, seed {seed}, {EVALUATIONS:,} evaluations", searched(problem, reference, seed))
     take(f"search within each sequence, {PER_SEQUENCE:,} evaluations each", by_sequence(problem, reference))
-    take(f"pymoo's NSGA-II, {PYMOO_EVALUATIONS:,} evaluations", pymoo_front(problem, PYMOO_EVALUATIONS, seed=0))
+    theirs = Nsga2(problem, seed=0, population=200, evaluations=PYMOO_EVALUATIONS)
+    take(f"pymoo's NSGA-II, {PYMOO_EVALUATIONS:,} evaluations", (theirs.rows, theirs.values))
 
     everything, worth = np.vstack(rows), np.vstack(values)
-    kept = survivors(worth, np.asarray(reference), MOST)
-    kept = kept[np.all(worth[kept] < reference, axis=1)]
+    kept = front(worth, np.asarray(reference), MOST)
     kept = kept[np.argsort(worth[kept, 0])]
     words.append(f"all together, at most {MOST} designs kept: {hypervolume(worth[kept], reference):.4f}")
     print(f"  {problem.task.name}: {words[-1]} in {time.perf_counter() - started:.0f} s", flush=True)
@@ -107,8 +107,7 @@ def reference_point(problem: Problem) -> tuple[float, ...]:
 
 def write(problem: Problem, rows: Array, values: Array, reference: tuple[float, ...], words: list[str]) -> None:
     text = io.StringIO()
-    version = armwright.__version__ if hasattr(armwright, "__version__") else "0.1.0"
-    text.write(f"# The best known front of {problem.task.name} in the paper's design space, armwright {version}.\n")
+    text.write(f"# The best known front of {problem.task.name} in the paper's design space.\n")
     text.write("# Made by: python benchmarks/reference_fronts.py; hypervolumes within ")
     text.write(f"({', '.join(f'{value:.4g}' for value in reference)}):\n")
     text.writelines(f"#   {line}\n" for line in words)

@@ -81,7 +81,7 @@ def test_an_arm_that_needs_luck_is_fragile() -> None:
     """A target at the arm's full reach: with any shorter link it is a millimetre away; half a millimetre is allowed."""
     at_reach = Task(name="reach", targets=((0.0, 0.0, 0.4),), reference_point=(0.1, 20.0))
     lucky = Problem(at_reach).space.clipped((0.0, 0.0, 0.0), "RPRP", (0.1, 0.1, 0.1, 0.1))
-    easy = Problem(at_reach).space.clipped((0.05, 0.02, 0.1), "RPRP", (0.15, 0.15, 0.15, 0.15))
+    easy = Problem(at_reach).space.clipped((0.2, 0.0, 0.2), "YPPP", (0.15, 0.15, 0.15, 0.15))
     problem = Problem(at_reach)
     found = verify(problem, [lucky, easy], problem.evaluate([lucky, easy]), (0.1, 20.0))
     assert found.moved[0, 0] == pytest.approx(1e-3, abs=1e-6)

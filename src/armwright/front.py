@@ -28,10 +28,12 @@ from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, read_summary, results_are_there, summarize_front, write_results
 from armwright.run_folder import PROPOSALS, SEARCH, FrontMethod, RunConfig, RunFolder, read_run, versions
 from armwright.search.front import FrontSearch
+from armwright.search.survival import front
 from armwright.study import optimize, whole
 from armwright.verification import verify_front
 
 SAVE_SECONDS = 5.0
+MOST_DESIGNS = 300  # of the front that become trials: those that the hypervolume would lose most without
 N_SAMPLE = 10  # random designs that give the reference point, where the task states none
 N_PROPOSED = 20  # designs of a proposer that the search begins with
 LARGEST_BUDGET = 10**12
@@ -204,11 +206,11 @@ class _Search:
             ) from fault
 
     def _finish(self, ended: str, resumed: int) -> FrontRun:
+        kept = np.sort(front(self.search.values, np.asarray(self.config.reference_point), MOST_DESIGNS))
+        designs = self.problem.space.designs(self.search.rows[kept])
         trials = [
             FinishedTrial(number, FRONT, design, tuple(values))
-            for number, (design, values) in enumerate(
-                zip(self.problem.space.designs(self.search.rows), self.search.values.tolist(), strict=True)
-            )
+            for number, (design, values) in enumerate(zip(designs, self.search.values[kept].tolist(), strict=True))
         ]
         history = History(self.problem, trials, 0, self.config.reference_point)
         searched = {
