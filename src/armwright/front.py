@@ -110,9 +110,10 @@ def find_front(
     """
     budget = Budget.of(budget) if isinstance(budget, str) else budget
     seed = whole("seed", seed, 0)
+    known = _known(problem, begin_with)  # before a folder is made
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
-        rows, origin = _beginning(problem, begin_with, seed, None if folder is None else folder.path)
+        rows, origin = known or _proposed(problem, begin_with, seed, None if folder is None else folder.path)
         config = RunConfig(
             task=problem.task,
             space=problem.space,
@@ -200,7 +201,7 @@ class _Search:
             with np.load(path, allow_pickle=False) as state:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
-        except (OSError, ValueError, KeyError, BadZipFile) as fault:
+        except (OSError, EOFError, ValueError, KeyError, BadZipFile) as fault:
             raise RunFolderError(
                 f"{path} is damaged ({fault}); delete it, and the search begins anew from the front in {folder.path}"
             ) from fault
@@ -236,23 +237,28 @@ def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
     return default_reference_point(problem.evaluate(problem.space.sample(N_SAMPLE, seed)))
 
 
-def _beginning(
-    problem: Problem, begin_with: str | Path | Proposer | None, seed: int, out: Path | None
-) -> tuple[Array, dict[str, Any] | None]:
-    """Designs to begin with, and where they come from."""
+Beginning = tuple[Array, dict[str, Any] | None]  # designs as rows (N, P), and where they come from
+
+
+def _known(problem: Problem, begin_with: str | Path | Proposer | None) -> Beginning | None:
+    """Designs that are there already; None where a proposer is to give them."""
     if begin_with is None:
         return np.empty((0, len(problem.space.parameters))), None
-    if isinstance(begin_with, (str, Path)):
-        _, run = read_run(begin_with)
-        if run.problem.space != problem.space or run.problem.task.targets != problem.task.targets:
-            raise SettingsError(
-                f"{begin_with} holds a run of another task or design space ({run.problem.task.name}, "
-                f"{run.problem.space.name})"
-            )
-        rows = problem.space.matrix([trial.design for trial in run])
-        return rows, {"run": str(begin_with), "designs": len(rows), "sha256": sha256(rows.tobytes()).hexdigest()}
-    # A study in which every counted trial is the proposer's: what it says is kept and paid for as in any other.
+    if not isinstance(begin_with, (str, Path)):
+        return None
+    _, run = read_run(begin_with)
+    if run.problem.space != problem.space or run.problem.task.targets != problem.task.targets:
+        raise SettingsError(
+            f"{begin_with} holds a run of another task or design space ({run.problem.task.name}, "
+            f"{run.problem.space.name})"
+        )
+    rows = problem.space.matrix([trial.design for trial in run])
+    return rows, {"run": str(begin_with), "designs": len(rows), "sha256": sha256(rows.tobytes()).hexdigest()}
+
+
+def _proposed(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Beginning:
+    """A proposer's designs, from a study in which every counted trial is its own: kept and paid for as in any other."""
     folder = None if out is None else out / PROPOSALS
-    proposed = optimize(problem, proposer=begin_with, n_step=1, n_total=N_PROPOSED, seed=seed, out=folder)
-    rows = problem.space.matrix([trial.design for trial in proposed.history])
-    return rows, {"proposer": {"name": begin_with.name, **begin_with.settings()}}
+    study = optimize(problem, proposer=proposer, n_step=1, n_total=N_PROPOSED, seed=seed, out=folder)
+    rows = problem.space.matrix([trial.design for trial in study.history])
+    return rows, {"proposer": {"name": proposer.name, **proposer.settings()}}
