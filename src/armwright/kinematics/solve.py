@@ -67,11 +67,12 @@ def solve_postures(
             clipped = np.clip(starts[rows], chunk.lower[:, None], chunk.upper[:, None])
             q_last = wp.array(_in_lanes(clipped, kernels), dtype=kernels.Lane, device=device)
         h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
-        q, reached, torque = _launch(chunk, at, t, updates, q_last, h_last)
-        solved.q[rows], solved.reached[rows], solved.torque[rows] = q.numpy(), reached.numpy(), torque.numpy()
+        q, reached, torque = (_from_lanes(values)[:, :t] for values in _launch(chunk, at, updates, q_last, h_last))
+        solved.q[rows], solved.reached[rows], solved.torque[rows] = q, reached, torque
 
-    scratch = 3 * dof * len(at) * kernels.lanes  # numbers: the last and the kept angles, the limit gradients
-    size = LARGEST_CHUNK[device] // ((scratch + t * (2 * dof + 3) + 9 * dof + 3) * solved.q.itemsize)
+    # The numbers of an arm on the device: four angles or the like for each joint and lane, the tip, the arm itself.
+    numbers = (4 * dof + 3) * len(at) * kernels.lanes + 10 * dof + 3
+    size = LARGEST_CHUNK[device] // (numbers * solved.q.itemsize)
     if device == "cuda":
         _one_after_another(solve, n, max(size, 1))
     else:
@@ -91,27 +92,25 @@ def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_befo
         wp.array(_in_lanes(values, kernels), dtype=kernels.Lane, device="cpu")
         for values in (np.zeros((1, 1, 3)), q[:, None], h_before[:, None])
     )
-    _launch(moved, at[0], 1, 1, q_last, h_last)
-    return q_last.numpy()[:, 0, :, 0], h_last.numpy()[:, 0, :, 0]
+    _launch(moved, at[0], 1, q_last, h_last)
+    return _from_lanes(q_last)[:, 0], _from_lanes(h_last)[:, 0]
 
 
-def _launch(arms: ArmArrays, at: Any, t: int, updates: int, q_last: Any, h_last: Any) -> tuple[Any, Any, Any]:
-    """Kept angles, reached points and torques, (N, T, ...), on the device of the other arrays.
+def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any) -> tuple[Any, Any, Any]:
+    """Kept angles, reached points and torques, (N, G, ...) in lanes, on the device of the other arrays.
 
     at: (G, 3) targets in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
     """
     device = q_last.device
     wp, kernels = load(arms.precision, "cuda" if device.is_cuda else "cpu")
     on_device = _on_device(arms, wp, kernels, device)
-    q_kept = wp.empty(q_last.shape, dtype=kernels.Lane, device=device)
-    q, reached, torque = (
-        wp.empty((len(arms), t, columns), dtype=getattr(wp, arms.precision), device=device)
-        for columns in (arms.dof, 3, arms.dof)
-    )
     dim = len(arms), len(at)
+    q_kept, reached, torque = (
+        wp.empty((*dim, columns), dtype=kernels.Lane, device=device) for columns in (arms.dof, 3, arms.dof)
+    )
     wp.launch(kernels.descend, dim, inputs=[on_device, at, updates, q_last, h_last, q_kept], device=device)
-    wp.launch(kernels.hold, dim, inputs=[on_device, at, q_last, q_kept, q, reached, torque], device=device)
-    return q, reached, torque
+    wp.launch(kernels.hold, dim, inputs=[on_device, at, q_last, q_kept, reached, torque], device=device)
+    return q_kept, reached, torque
 
 
 def _on_device(arms: ArmArrays, wp: Any, kernels: Any, device: Any) -> Any:
@@ -150,6 +149,12 @@ def _in_lanes(values: NDArray[Any], kernels: Any) -> NDArray[Any]:
     groups = -(-t // kernels.lanes)
     filled = np.concatenate([values, np.repeat(values[:, -1:], groups * kernels.lanes - t, axis=1)], axis=1)
     return np.ascontiguousarray(filled.reshape(n, groups, kernels.lanes, columns).swapaxes(2, 3))
+
+
+def _from_lanes(values: Any) -> NDArray[Any]:
+    """(N, G, C) in lanes as (N, G L, C), in numpy."""
+    lanes = values.numpy().swapaxes(2, 3)  # (N, G, L, C)
+    return lanes.reshape(len(lanes), -1, lanes.shape[3])
 
 
 def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> None:
