@@ -43,7 +43,7 @@ def test_first_use_by_many_threads_leaves_stderr_as_it_was() -> None:
 
 @pytest.mark.parametrize("closed", ["", "import os; os.close(2)\n"])
 def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
-    done = run(closed + "from armwright.kinematics.devices import load; load('float32', 'cpu')")
+    done = run(closed + "from armwright.kinematics.devices import load; load('float32', 8, 'cpu')")
     assert (done.returncode, done.stderr) == (0, "")
 
 
