@@ -205,6 +205,7 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         weight, pull = Joints(), Joints()
         for j in range(arms.dof):
             q[j] = q_last[arm, group, j]
+            kept[j] = q[j]
             limit_n[j] = h_last[arm, group, j]
             limit_d[j] = Lane(one)
         nearest = Lane(largest)
