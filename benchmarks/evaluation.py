@@ -3,6 +3,7 @@
 Random arms of 4 joints at the 8 targets of target-1, 100 updates from the straight start each. Ours and Pinocchio's
 go on to the gravity torque of the posture; scikit-robot is asked for the posture alone. The others' time includes
 loading the URDF, once an arm. Where g++ is there, a yardstick by hand in C++ (yardstick.cpp) says what the machine has.
+Then other numbers of joints and targets, double precision, and the memory that a million designs take.
 
     python benchmarks/evaluation.py
 """
@@ -10,6 +11,7 @@ loading the URDF, once an arm. Where g++ is there, a yardstick by hand in C++ (y
 import ctypes
 import io
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -25,20 +27,27 @@ from skrobot.model import RobotModel
 
 from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import stack_arms
+from armwright.kinematics.arrays import ArmArrays, Precision, arrays_of, stack_arms
 from armwright.kinematics.solve import UPDATES, solve_postures
+from armwright.problem import Problem
 from armwright.space import MassPerMetre, paper_space
 from armwright.task import load_task
 
 TARGETS = load_task("target-1").points
+PROBLEM = Problem(load_task("target-1"))
 ARMS = [paper_space().arm(design) for design in paper_space().sample(20_000, seed=0)]
 
 
 def main() -> None:
+    if "--memory" in sys.argv:
+        print_memory_of_a_million()
+        return
     if "--one-core" not in sys.argv:
         cores = len(os.sched_getaffinity(0))
         print("Evaluation: designs/s, 8 targets, D = 4, 100 updates")
         print(f"  armwright, {cores} cores {rate(armwright, len(ARMS)):10.0f}   (kernels alone {kernels_alone():.0f})")
+        sys.stdout.flush()
+        print(f"  designs as rows, {cores} cores {evaluate_matrix_alone():5.0f}")
         sys.stdout.flush()
         # In a process of its own, which never had more threads than that.
         subprocess.run(
@@ -46,9 +55,13 @@ def main() -> None:
             check=True,
             preexec_fn=lambda: os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1]),
         )
+        # In another, whose peak is its own.
+        subprocess.run([sys.executable, __file__, "--memory"], check=True)
         return
     ours = rate(armwright, len(ARMS))
     print(f"  armwright, 1 core  {ours:10.0f}   (kernels alone {kernels_alone():.0f})")
+    print(f"  designs as rows    {evaluate_matrix_alone():10.0f}")
+    print_joints_and_targets()
     print(f"  armwright, one design at a time: {single_design_ms():.2f} ms")
     compare_with_yardstick()
     for name, work, n in (("Pinocchio loop", pinocchio_loop, 20), ("scikit-robot", skrobot, 5)):
@@ -79,6 +92,44 @@ def kernels_alone() -> float:
         solve_postures(arrays, TARGETS)
 
     return rate(work, len(ARMS))
+
+
+def evaluate_matrix_alone() -> float:
+    """Designs a second from rows to both objectives."""
+    matrix = PROBLEM.space.matrix(PROBLEM.space.sample(len(ARMS), seed=0))
+
+    def work(n: int) -> None:
+        PROBLEM.evaluate_matrix(matrix[:n])
+
+    return rate(work, len(matrix))
+
+
+def print_joints_and_targets() -> None:
+    """A row for each number of joints and of targets: designs a second, and what one target takes."""
+    points = np.random.default_rng(0).uniform(-0.6, 0.6, (64, 3))
+    for dof, t, precision in (
+        *((4, t, "float32") for t in (1, 2, 4, 7, 8, 9, 12, 16, 17, 32, 64)),
+        *((dof, 8, "float32") for dof in range(1, 9)),
+        (4, 8, "float64"),
+    ):
+        space = paper_space(dof)
+        arrays = arrays_of(space, space.matrix(space.sample(2000, seed=0)), precision)
+
+        def work(_: int, t: int = t, arrays: ArmArrays = arrays, precision: Precision = precision) -> None:
+            solve_postures(arrays, points[:t], precision=precision)
+
+        designs = rate(work, 2000)
+        print(f"  D = {dof}, T = {t:2d}, {precision}  {designs:10.0f}   {1e6 / designs / t:6.2f} µs a target")
+
+
+def print_memory_of_a_million() -> None:
+    """What the process grows by at its peak while a million designs are evaluated from rows, results included."""
+    matrix = np.tile(PROBLEM.space.matrix(PROBLEM.space.sample(1000, seed=0)), (1000, 1))
+    PROBLEM.evaluate_matrix(matrix[:10])
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    PROBLEM.evaluate_matrix(matrix)
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    print(f"  a million designs at {len(TARGETS)} targets: {grown / 1024:.0f} MiB more at the peak")
 
 
 def compare_with_yardstick() -> None:

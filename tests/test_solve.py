@@ -1,9 +1,18 @@
-"""The boundary of the kernels: threads, forks, the process's stderr."""
+"""The boundary of the kernels: threads, forks, the process's stderr, devices and their memory."""
 
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
+
+from armwright import problem
+from armwright.exceptions import FailureError, SettingsError
+from armwright.kinematics import devices, solve
+from armwright.kinematics.solve import solve_postures
+from armwright.problem import Problem
+from armwright.task import load_task
 
 THREADS = """
 import sys, threading
@@ -43,10 +52,100 @@ def test_first_use_by_many_threads_leaves_stderr_as_it_was() -> None:
 
 @pytest.mark.parametrize("closed", ["", "import os; os.close(2)\n"])
 def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
-    done = run(closed + "from armwright.kinematics.devices import load; load('float32', 'cpu')")
+    done = run(closed + "from armwright.kinematics.devices import load; load('float32', 8, 'cpu')")
     assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_forked_child_solves_too() -> None:
     """It has the parent's pool, but not its threads."""
     assert run(FORK).returncode == 0
+
+
+# Devices
+
+
+def test_auto_is_cuda_only_where_it_is_and_for_much_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    for there, many, expected in ((True, True, "cuda"), (True, False, "cpu"), (False, True, "cpu")):
+        monkeypatch.setattr(devices, "_has_cuda", lambda there=there: there)
+        assert devices.resolve_device("auto", many) == expected
+        assert devices.resolve_device("cpu", many) == "cpu"
+
+
+def test_devices_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(devices, "_has_cuda", lambda: False)
+    with pytest.raises(SettingsError, match=r'device = "cuda": no NVIDIA GPU with its driver is here; take .*"cpu"'):
+        devices.resolve_device("cuda", many=True)
+    with pytest.raises(SettingsError, match=r'device = "cud" is not one of auto, cpu, cuda. Did you mean "cuda"'):
+        devices.resolve_device("cud", many=True)
+    asking = Problem(load_task("target-1"), device="cuda")
+    for evaluate in (asking.evaluate, lambda designs: asking.evaluate_matrix(asking.space.matrix(designs))):
+        with pytest.raises(SettingsError, match="no NVIDIA GPU"):
+            evaluate(asking.space.sample(2, 0))
+
+
+COMPILE_FOR_CUDA = """
+import sys
+import warp as wp
+from armwright.kinematics.kernels import kernels_of
+for kernel in (kernels_of("float32", 1).descend, kernels_of("float32", 1).hold):
+    print(*wp.compile_aot_module(kernel.module, arch=90, module_dir=sys.argv[1], use_ptx=True))
+"""
+
+
+def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
+    """To PTX, by the compiler that Warp brings. What they compute there, only a GPU can say."""
+    command = [sys.executable, "-c", COMPILE_FOR_CUDA, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    written = [path.read_text() for path in tmp_path.glob("*.ptx")]
+    assert len(written) == 2
+    assert all(".entry" in text and "sm_90" in text for text in written)
+
+
+# Memory
+
+
+def test_chunk_is_halved_until_the_gpu_has_memory_for_it() -> None:
+    solved: list[range] = []
+
+    def solving(rows: slice) -> None:
+        if rows.stop - rows.start > 30:
+            raise RuntimeError("Failed to allocate 123 bytes on device 'cuda:0'")
+        solved.append(range(rows.start, rows.stop))
+
+    solve._one_after_another(solving, 107, 100)
+    assert [number for rows in solved for number in rows] == list(range(107))
+    assert max(len(rows) for rows in solved) == 25
+
+    def never(rows: slice) -> None:
+        raise RuntimeError("CUDA error 2: out of memory")
+
+    with pytest.raises(FailureError, match="one arm at all its targets does not fit"):
+        solve._one_after_another(never, 107, 100)
+
+    def broken(rows: slice) -> None:
+        raise RuntimeError("CUDA error 700: an illegal memory access")
+
+    with pytest.raises(RuntimeError, match="illegal"):
+        solve._one_after_another(broken, 107, 100)
+
+
+def test_chunks_do_not_change_the_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither those of the solver, bounded by bytes, nor those of designs whose postures are in memory at a time."""
+    asked = Problem(load_task("target-2"))
+    matrix = asked.space.matrix(asked.space.sample(100, 3))
+    whole = asked.evaluate_matrix(matrix)
+    assert np.array_equal(whole, asked.evaluate(asked.space.designs(matrix)))
+    monkeypatch.setitem(solve.LARGEST_CHUNK, "cpu", 1)
+    monkeypatch.setitem(problem.POSTURES_AT_ONCE, "cpu", 200)
+    assert np.array_equal(asked.evaluate_matrix(matrix), whole)
+    assert asked.evaluate_matrix(matrix[:0]).shape == (0, 2)
+
+
+def test_many_targets_are_a_question_of_memory_alone() -> None:
+    asked = Problem(load_task("target-1"))
+    arms = problem.arrays_of(asked.space, asked.space.matrix(asked.space.sample(3, 4)))
+    targets = np.random.default_rng(4).uniform(-0.7, 0.7, (2000, 3))
+    postures = solve_postures(arms, targets, updates=5)
+    assert postures.q.shape == (3, 2000, 4)
+    assert np.array_equal(postures.q[:, 1234:1235], solve_postures(arms, targets[1234:1235], updates=5).q)

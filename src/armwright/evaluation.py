@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
 from armwright.exceptions import TaskError
-from armwright.kinematics.arrays import ArmArrays, stack_arms
+from armwright.kinematics.arrays import ArmArrays, Floats, stack_arms
 from armwright.kinematics.devices import Device
 from armwright.kinematics.solve import solve_postures
 
@@ -49,15 +49,19 @@ def evaluate_arrays(
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
     postures = solve_postures(arrays, targets, start=start, precision=arrays.precision, device=device)
     reached = postures.reached.astype(np.float64)
-    moving = list(arrays.joint_numbers)
-    q = np.zeros((len(arrays), len(targets), arrays.n_joints))
-    torques = np.zeros_like(q)
-    q[..., moving] = postures.q
-    torques[..., moving] = postures.torque
     return Evaluation(
         targets=targets,
-        q=q,
+        q=_of_all_joints(postures.q, arrays),
         reached=reached,
         position_error=np.linalg.norm(reached - targets, axis=-1),
-        joint_torques=torques,
+        joint_torques=_of_all_joints(postures.torque, arrays),
     )
+
+
+def _of_all_joints(values: Floats, arrays: ArmArrays) -> Array:
+    """(N, T, D) values of the moving joints as (N, T, J), with 0 for the fixed ones."""
+    if arrays.dof == arrays.n_joints:
+        return values.astype(np.float64)
+    every = np.zeros((*values.shape[:2], arrays.n_joints))
+    every[..., list(arrays.joint_numbers)] = values
+    return every

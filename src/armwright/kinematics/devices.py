@@ -12,8 +12,6 @@ from armwright.kinematics.arrays import Precision
 
 Device = Literal["cpu", "cuda"]
 
-LANES: dict[Device, int] = {"cpu": 8, "cuda": 1}  # targets that a thread solves side by side
-
 
 def resolve_device(name: str, many: bool) -> Device:
     """The device that "cpu", "cuda" or "auto" stands for; "auto" is CUDA where it is there and the work is `many`.
@@ -38,10 +36,10 @@ def cores() -> int:
 _loading = threading.Lock()
 
 
-def load(precision: Precision, device: Device) -> tuple[Any, Any]:
-    """Warp and the kernels for a device, compiled and loaded, so that threads only launch."""
+def load(precision: Precision, lanes: int, device: Device) -> tuple[Any, Any]:
+    """Warp and one variant of the kernels, compiled and loaded on a device, so that threads only launch."""
     with _loading:
-        return _warp(), _load(precision, LANES[device], device)
+        return _warp(), _load(precision, lanes, device)
 
 
 def _has_cuda() -> bool:

@@ -75,13 +75,6 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         mass: wp.array2d(dtype=real)  # (N, D)
 
     @wp.func
-    def put(values: wp.array3d(dtype=real), arm: int, group: int, column: int, x: Lane):
-        """Writes one column of values (N, T, C) at the targets of a group."""
-        for i in range(lanes):
-            if group * lanes + i < values.shape[1]:
-                values[arm, group * lanes + i, column] = x[i]
-
-    @wp.func
     def roots(x: Lane):
         """Square roots."""
         result = Lane()
@@ -212,6 +205,7 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         weight, pull = Joints(), Joints()
         for j in range(arms.dof):
             q[j] = q_last[arm, group, j]
+            kept[j] = q[j]
             limit_n[j] = h_last[arm, group, j]
             limit_d[j] = Lane(one)
         nearest = Lane(largest)
@@ -340,23 +334,22 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         targets: wp.array2d(dtype=Lane),
         q_last: wp.array3d(dtype=Lane),
         q_kept: wp.array3d(dtype=Lane),
-        q: wp.array3d(dtype=real),
-        reached: wp.array3d(dtype=real),
-        torque: wp.array3d(dtype=real),
+        reached: wp.array3d(dtype=Lane),
+        torque: wp.array3d(dtype=Lane),
     ):
         """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
 
-        targets: (G, 3) [m].  q_last, q_kept: (N, G, D) of `descend`.  What it says is out of lanes: q (N, T, D) [rad],
-        reached (N, T, 3) [m], torque (N, T, D), +dV/dq [N m].
+        targets: (G, 3) [m].  q_last, q_kept: (N, G, D) [rad].  reached: (N, G, 3) [m].
+        torque: (N, G, D), +dV/dq [N m].
         """
         arm, group = wp.tid()
         tx, ty, tz = targets[group, 0], targets[group, 1], targets[group, 2]
         lx, ly, lz = tip(arms, arm, group, q_last)
         kx, ky, kz = tip(arms, arm, group, q_kept)
         farther = at_least(square_of(tx - lx, ty - ly, tz - lz), square_of(tx - kx, ty - ky, tz - kz))
-        put(reached, arm, group, 0, chosen(farther, kx, lx))
-        put(reached, arm, group, 1, chosen(farther, ky, ly))
-        put(reached, arm, group, 2, chosen(farther, kz, lz))
+        reached[arm, group, 0] = chosen(farther, kx, lx)
+        reached[arm, group, 1] = chosen(farther, ky, ly)
+        reached[arm, group, 2] = chosen(farther, kz, lz)
 
         base = arms.base[arm]
         ux, uy = Joints(), Joints()  # joint axes; only what a vertical force needs
@@ -367,9 +360,9 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         zx, zy = Lane(zero), Lane(zero)
         px, py = Lane(base[0]), Lane(base[1])
         for j in range(arms.dof):
-            angle = chosen(farther, q_kept[arm, group, j], q_last[arm, group, j])
-            put(q, arm, group, j, angle)
-            s, c = sine_cosine(angle)
+            q = chosen(farther, q_kept[arm, group, j], q_last[arm, group, j])
+            q_kept[arm, group, j] = q
+            s, c = sine_cosine(q)
             axis = arms.axis[arm, j]
             xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
             xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
@@ -394,6 +387,6 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
             beyond_y += my[j]
             lever_x = beyond_x - mass_beyond * ox[j]
             lever_y = beyond_y - mass_beyond * oy[j]
-            put(torque, arm, group, j, gravity * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x)))
+            torque[arm, group, j] = gravity * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x))
 
     return Kernels(lanes, Lane, Arms, descend, hold)

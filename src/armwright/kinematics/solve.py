@@ -20,6 +20,9 @@ from armwright.kinematics.devices import Device, cores, load, resolve_device
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
 BEFORE_THE_FIRST = 1e30  # stands for ∞, the limit gradient before the first update
+LANES: dict[Device, int] = {"cpu": 8, "cuda": 1}  # targets that a thread solves side by side
+FEW = 2  # lanes for as many targets or fewer at the end: half the time of 8 lanes, and the same bits,
+MANY_ARMS = 1000  # but another variant to compile, in seconds, so only for so many arms
 SMALLEST_CHUNK = 32  # groups of targets; below it a thread costs more than it brings
 LARGEST_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: a core's cache; any GPU's memory
 
@@ -54,28 +57,26 @@ def solve_postures(
         raise SettingsError(f"updates = {updates} is outside 0 <= updates")
     arms = _in_precision(arms, checked_precision(precision))
     device = resolve_device(device, many=True)
-    wp, kernels = load(precision, device)
     n, t, dof = len(arms), len(targets), arms.dof
     starts = None if start is None else _broadcast(start, (n, t, dof))
-    at = wp.array(_in_lanes(targets[None], kernels)[0], dtype=kernels.Lane, device=device)
     solved = Postures(*(np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof)))
+    parts = _parts(n, t, LANES[device])
 
     def solve(rows: slice) -> None:
         chunk = arms[rows]
-        q_last = wp.zeros((len(chunk), len(at), dof), dtype=kernels.Lane, device=device)
-        if starts is not None:
-            clipped = np.clip(starts[rows], chunk.lower[:, None], chunk.upper[:, None])
-            q_last = wp.array(_in_lanes(clipped, kernels), dtype=kernels.Lane, device=device)
-        h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
-        q, reached, torque = _launch(chunk, at, t, updates, q_last, h_last)
-        solved.q[rows], solved.reached[rows], solved.torque[rows] = q.numpy(), reached.numpy(), torque.numpy()
+        for some, lanes in parts:
+            begin = None if starts is None else starts[rows, some]
+            q, reached, torque = _solve(chunk, targets[some], updates, begin, lanes, device)
+            solved.q[rows, some], solved.reached[rows, some], solved.torque[rows, some] = q, reached, torque
 
-    scratch = 3 * dof * len(at) * kernels.lanes  # numbers: the last and the kept angles, the limit gradients
-    size = LARGEST_CHUNK[device] // ((scratch + t * (2 * dof + 3) + 9 * dof + 3) * solved.q.itemsize)
+    # The numbers of an arm on the device: four for each joint and three for the tip in each lane, and the arm itself.
+    groups = -(-t // LANES[device])
+    numbers = (4 * dof + 3) * groups * LANES[device] + 10 * dof + 3
+    size = max(1, LARGEST_CHUNK[device] // (numbers * solved.q.itemsize))
     if device == "cuda":
-        _one_after_another(solve, n, max(size, 1))
+        _one_after_another(solve, n, size)
     else:
-        _in_threads(solve, n, min(max(size, 1), max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // len(at)))))
+        _in_threads(solve, n, min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups))))
     return solved
 
 
@@ -86,32 +87,56 @@ def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_befo
     """
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
     moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
-    wp, kernels = load(arms.precision, "cpu")
+    lanes = LANES["cpu"]
+    wp, kernels = load(arms.precision, lanes, "cpu")
     at, q_last, h_last = (
-        wp.array(_in_lanes(values, kernels), dtype=kernels.Lane, device="cpu")
+        wp.array(_in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
         for values in (np.zeros((1, 1, 3)), q[:, None], h_before[:, None])
     )
-    _launch(moved, at[0], 1, 1, q_last, h_last)
-    return q_last.numpy()[:, 0, :, 0], h_last.numpy()[:, 0, :, 0]
+    _launch(moved, at[0], 1, q_last, h_last, wp, kernels)
+    return _from_lanes(q_last)[:, 0], _from_lanes(h_last)[:, 0]
 
 
-def _launch(arms: ArmArrays, at: Any, t: int, updates: int, q_last: Any, h_last: Any) -> tuple[Any, Any, Any]:
-    """Kept angles, reached points and torques, (N, T, ...), on the device of the other arrays.
+def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:
+    """Which of T targets are solved in how many lanes."""
+    rest = t % lanes
+    if n < MANY_ARMS or not 0 < rest <= FEW < lanes:
+        return [(slice(0, t), lanes)]
+    full = [(slice(0, t - rest), lanes)] if t > rest else []
+    return [*full, (slice(t - rest, t), FEW)]
+
+
+def _solve(
+    arms: ArmArrays,
+    targets: NDArray[np.float64],
+    updates: int,
+    start: NDArray[np.float64] | None,
+    lanes: int,
+    device: Device,
+) -> list[NDArray[Any]]:
+    """Kept angles, reached points and torques of a chunk of arms, (N, T, ...)."""
+    wp, kernels = load(arms.precision, lanes, device)
+    at = wp.array(_in_lanes(targets[None], lanes)[0], dtype=kernels.Lane, device=device)
+    q_last = wp.zeros((len(arms), len(at), arms.dof), dtype=kernels.Lane, device=device)
+    if start is not None:
+        clipped = np.clip(start, arms.lower[:, None], arms.upper[:, None])
+        q_last = wp.array(_in_lanes(clipped, lanes), dtype=kernels.Lane, device=device)
+    h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
+    results = _launch(arms, at, updates, q_last, h_last, wp, kernels)
+    return [_from_lanes(values)[:, : len(targets)] for values in results]
+
+
+def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, wp: Any, kernels: Any) -> list[Any]:
+    """Kept angles, reached points and torques, (N, G, ...) in lanes, on the device of the other arrays.
 
     at: (G, 3) targets in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
     """
-    device = q_last.device
-    wp, kernels = load(arms.precision, "cuda" if device.is_cuda else "cpu")
+    device, dim = q_last.device, (len(arms), len(at))
     on_device = _on_device(arms, wp, kernels, device)
-    q_kept = wp.empty(q_last.shape, dtype=kernels.Lane, device=device)
-    q, reached, torque = (
-        wp.empty((len(arms), t, columns), dtype=getattr(wp, arms.precision), device=device)
-        for columns in (arms.dof, 3, arms.dof)
-    )
-    dim = len(arms), len(at)
-    wp.launch(kernels.descend, dim, inputs=[on_device, at, updates, q_last, h_last, q_kept], device=device)
-    wp.launch(kernels.hold, dim, inputs=[on_device, at, q_last, q_kept, q, reached, torque], device=device)
-    return q, reached, torque
+    results = [wp.empty((*dim, columns), dtype=kernels.Lane, device=device) for columns in (arms.dof, 3, arms.dof)]
+    wp.launch(kernels.descend, dim, inputs=[on_device, at, updates, q_last, h_last, results[0]], device=device)
+    wp.launch(kernels.hold, dim, inputs=[on_device, at, q_last, *results], device=device)
+    return results
 
 
 def _on_device(arms: ArmArrays, wp: Any, kernels: Any, device: Any) -> Any:
@@ -144,12 +169,18 @@ def _broadcast(start: ArrayLike, shape: tuple[int, int, int]) -> NDArray[np.floa
         ) from None
 
 
-def _in_lanes(values: NDArray[Any], kernels: Any) -> NDArray[Any]:
+def _in_lanes(values: NDArray[Any], lanes: int) -> NDArray[Any]:
     """(N, T, C) as (N, G, C, L): targets in groups of L lanes, the last one repeated to fill its group."""
     n, t, columns = values.shape
-    groups = -(-t // kernels.lanes)
-    filled = np.concatenate([values, np.repeat(values[:, -1:], groups * kernels.lanes - t, axis=1)], axis=1)
-    return np.ascontiguousarray(filled.reshape(n, groups, kernels.lanes, columns).swapaxes(2, 3))
+    groups = -(-t // lanes)
+    filled = np.concatenate([values, np.repeat(values[:, -1:], groups * lanes - t, axis=1)], axis=1)
+    return np.ascontiguousarray(filled.reshape(n, groups, lanes, columns).swapaxes(2, 3))
+
+
+def _from_lanes(values: Any) -> NDArray[Any]:
+    """(N, G, C) in lanes as (N, G L, C), in numpy."""
+    lanes = values.numpy().swapaxes(2, 3)  # (N, G, L, C)
+    return lanes.reshape(len(lanes), -1, lanes.shape[3])
 
 
 def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> None:
