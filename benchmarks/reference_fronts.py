@@ -23,7 +23,7 @@ from armwright.evaluation import Array
 from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem import Problem
 from armwright.search.front import FrontSearch
-from armwright.search.survival import front
+from armwright.search.survival import front, thinned
 from armwright.space import FloatParameter
 from armwright.task import builtin_tasks
 
@@ -63,7 +63,8 @@ def make(problem: Problem) -> None:
     take(f"pymoo's NSGA-II, {PYMOO_EVALUATIONS:,} evaluations", (theirs.rows, theirs.values))
 
     everything, worth = np.vstack(rows), np.vstack(values)
-    kept = front(worth, np.asarray(reference), MOST)
+    on_front = front(worth, np.asarray(reference))
+    kept = on_front[thinned(worth[on_front], np.asarray(reference), MOST)]
     kept = kept[np.argsort(worth[kept, 0])]
     words.append(f"all together, at most {MOST} designs kept: {hypervolume(worth[kept], reference):.4f}")
     print(f"  {problem.task.name}: {words[-1]} in {time.perf_counter() - started:.0f} s", flush=True)

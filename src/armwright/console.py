@@ -149,7 +149,8 @@ def stderr_console() -> Console:
 
 
 def _front_table(history: History, solid: set[int] | None) -> Table:
-    table = Table(title=f"Pareto front of {history.problem.task.name}", title_justify="left", box=None, pad_edge=False)
+    title = f"Pareto front of {history.problem.task.name}"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
     verdict = () if solid is None else ("verdict",)
     for name in ("#", "source", *verdict, "error [m]", "torque", "base [m]", "joints", "links [m]"):
         justify = "right" if name in ("#", "error [m]", "torque") else "left"

@@ -28,7 +28,7 @@ from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, read_summary, results_are_there, summarize_front, write_results
 from armwright.run_folder import PROPOSALS, SEARCH, FrontMethod, RunConfig, RunFolder, read_run, versions
 from armwright.search.front import FrontSearch
-from armwright.search.survival import front
+from armwright.search.survival import thinned
 from armwright.study import optimize, whole
 from armwright.verification import verify_front
 
@@ -207,7 +207,7 @@ class _Search:
             ) from fault
 
     def _finish(self, ended: str, resumed: int) -> FrontRun:
-        kept = np.sort(front(self.search.values, np.asarray(self.config.reference_point), MOST_DESIGNS))
+        kept = np.sort(thinned(self.search.values, np.asarray(self.config.reference_point), MOST_DESIGNS))
         designs = self.problem.space.designs(self.search.rows[kept])
         trials = [
             FinishedTrial(number, FRONT, design, tuple(values))
