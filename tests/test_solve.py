@@ -77,10 +77,13 @@ def test_devices_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
         devices.resolve_device("cuda", many=True)
     with pytest.raises(SettingsError, match=r'device = "cud" is not one of auto, cpu, cuda. Did you mean "cuda"'):
         devices.resolve_device("cud", many=True)
-    asking = Problem(load_task("target-1"), device="cuda")
-    for evaluate in (asking.evaluate, lambda designs: asking.evaluate_matrix(asking.space.matrix(designs))):
-        with pytest.raises(SettingsError, match="no NVIDIA GPU"):
-            evaluate(asking.space.sample(2, 0))
+    for name, words in (("cuda", "no NVIDIA GPU"), ("gpu", "is not one of auto, cpu, cuda")):
+        asking = Problem(load_task("target-1"), device=name)  # type: ignore[arg-type]
+        designs = asking.space.sample(2, 0)
+        with pytest.raises(SettingsError, match=words):
+            asking.evaluate(designs)
+        with pytest.raises(SettingsError, match=words):
+            asking.evaluate_matrix(asking.space.matrix(designs))
 
 
 COMPILE_FOR_CUDA = """

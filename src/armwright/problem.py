@@ -9,7 +9,7 @@ import numpy as np
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation, evaluate, evaluate_arrays
 from armwright.kinematics.arrays import arrays_of
-from armwright.kinematics.devices import Device
+from armwright.kinematics.devices import Device, resolve_device
 from armwright.objectives import PAPER_OBJECTIVES, Objective
 from armwright.space import Design, DesignSpace, paper_space
 from armwright.task import Task
@@ -51,7 +51,7 @@ class Problem:
 
         Only the postures of a chunk of them are in memory at a time.
         """
-        size = max(1, POSTURES_AT_ONCE[self.device] // len(self.task.points))
+        size = max(1, POSTURES_AT_ONCE[resolve_device(self.device, many=True)] // len(self.task.points))
         values = np.empty((len(matrix), len(self.objectives)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
