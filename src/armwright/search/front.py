@@ -1,9 +1,12 @@
 """A search for the whole Pareto front of a problem whose evaluation takes a matrix of designs.
 
 An elitist search over one pool of designs: each generation varies its members, evaluates the children as one batch,
-and keeps those that the hypervolume needs. The pool is sorted by structure (the combination of categories, an arm's
-joint sequence) and then by the first objective, so that a member's neighbours are designs whose parameters mean the
-same and whose values are near: their differences are the steps worth trying.
+and keeps those that the hypervolume needs. The pool is small at first, to get near the front, and grows, to resolve it.
+
+The combination of categories (an arm's joint sequence) is a design's structure. The best design of each structure
+stays beside the pool, so that no structure is given up because another was good first. The pool is sorted by
+structure and then by the first objective: a member's neighbours are designs whose parameters mean the same and whose
+values are near, and their differences are the steps worth trying.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,16 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from armwright.pareto import front_mask, hypervolume
+from armwright.pareto import hypervolume
 from armwright.search.columns import Array, Columns
-from armwright.search.survival import survivors
+from armwright.search.survival import front, leaders, survivors, thinned
 from armwright.search.variation import offspring
 from armwright.seeding import derived_seed
 from armwright.space import Parameter
 
-CAPACITY = 300  # designs in the pool
-BATCH = 400  # designs a generation
-FIRST_BATCH = 2000  # random designs at the start
+FRONT_LIMITS = (800, 1000)  # designs; a front longer than the second is thinned to the first
+CAPACITIES = (100, 1000)  # designs in the pool, at first and at last
+EVALUATIONS_A_PLACE = 200  # the pool grows by one design for so many evaluations
+SMALLEST_BATCH = 200  # designs a generation; as many as the pool holds once that is more
+FIRST_BATCH = 1000  # random designs at the start
+LEADER_SHARE = 0.5  # leaders of structures beside the pool, for one design in it
 MARK_SPACING = 1.02  # the hypervolume is noted whenever the evaluations have grown by this factor
 STALL_SHARE = 0.5  # of the evaluations, the latest
 STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
@@ -56,6 +62,7 @@ class FrontSearch:
         self._rows = np.empty((0, len(self._columns)))
         self._values = np.empty((0, len(self._reference_point)))
         self._marks: list[tuple[int, float]] = []
+        self._front_rows, self._front_values = self._rows, self._values
         if values is not None:
             self._select(self._known, values)
             self._known = self._known[:0]
@@ -67,18 +74,18 @@ class FrontSearch:
 
     @property
     def rows(self) -> Array:
-        """(K, P) the designs of the front within the reference box, by rising first objective."""
-        return self._rows[self._front()]
+        """(K, P) the designs of the front within the reference box, at most 1000, by rising first objective."""
+        return self._front_rows
 
     @property
     def values(self) -> Array:
         """(K, M) the values of `rows`."""
-        return self._values[self._front()]
+        return self._front_values
 
     @property
     def hypervolume(self) -> float:
         """Of the front, bounded by the reference point."""
-        return hypervolume(self._values, self._reference_point.tolist())
+        return hypervolume(self._front_values, self._reference_point.tolist())
 
     @property
     def history(self) -> Array:
@@ -97,13 +104,13 @@ class FrontSearch:
         rng = np.random.default_rng(derived_seed(self._seed, self._generation))
         if self._generation == 0:
             return np.vstack([self._known, self._columns.random(FIRST_BATCH, rng)])
-        return offspring(self._rows, self._columns, BATCH, rng)
+        return offspring(self._rows, self._columns, max(SMALLEST_BATCH, self._capacity), rng)
 
     def tell(self, rows: Array, values: Array) -> None:
         """Takes what `ask` gave, evaluated."""
-        self._select(np.vstack([self._rows, rows]), np.vstack([self._values, values]))
         self._generation += 1
         self._evaluations += len(rows)
+        self._select(rows, values)
         if not self._marks or self._evaluations >= MARK_SPACING * self._marks[-1][0]:
             self._marks.append((self._evaluations, self.hypervolume))
 
@@ -119,6 +126,8 @@ class FrontSearch:
             "evaluations": self._evaluations,
             "rows": self._rows,
             "values": self._values,
+            "front_rows": self._front_rows,
+            "front_values": self._front_values,
             "history": self.history,
         }
 
@@ -126,17 +135,29 @@ class FrontSearch:
         """Goes on from a `state` of a search with the same arguments, to the bit."""
         self._generation = int(state["generation"])
         self._evaluations = int(state["evaluations"])
-        self._rows = np.array(state["rows"], dtype=np.float64)
-        self._values = np.array(state["values"], dtype=np.float64)
+        self._rows, self._values = np.array(state["rows"]), np.array(state["values"])
+        self._front_rows, self._front_values = np.array(state["front_rows"]), np.array(state["front_values"])
         self._marks = [(int(evaluations), float(value)) for evaluations, value in state["history"]]
 
-    def _select(self, rows: Array, values: Array) -> None:
-        kept = survivors(values, self._reference_point, CAPACITY)
-        kept = kept[np.lexsort((values[kept, 0], self._columns.structures(rows[kept])))]
-        self._rows, self._values = rows[kept], values[kept]
+    @property
+    def _capacity(self) -> int:
+        smallest, largest = CAPACITIES
+        return min(max(smallest, self._evaluations // EVALUATIONS_A_PLACE), largest)
 
-    def _front(self) -> np.ndarray:
-        """The rows of the pool that are on the front and within the reference box, by rising first objective."""
-        inside = np.all(self._values < self._reference_point, axis=1)
-        front = np.flatnonzero(front_mask(self._values) & inside)
-        return front[np.argsort(self._values[front, 0], kind="stable")]
+    def _select(self, rows: Array, values: Array) -> None:
+        """Takes new designs into the front and the pool, as far as they are good enough."""
+        front_rows, front_values = np.vstack([self._front_rows, rows]), np.vstack([self._front_values, values])
+        kept = front(front_values, self._reference_point)
+        shortened, longest = FRONT_LIMITS
+        if len(kept) > longest:
+            kept = kept[thinned(front_values[kept], self._reference_point, shortened)]
+        kept = kept[np.argsort(front_values[kept, 0], kind="stable")]
+        self._front_rows, self._front_values = front_rows[kept], front_values[kept]
+
+        rows, values = np.vstack([self._rows, rows]), np.vstack([self._values, values])
+        structures = self._columns.structures(rows)
+        best = survivors(values, self._reference_point, self._capacity)
+        leading = leaders(values, structures, self._reference_point, int(LEADER_SHARE * self._capacity))
+        kept = np.union1d(best, leading)
+        kept = kept[np.lexsort((values[kept, 0], structures[kept]))]
+        self._rows, self._values = rows[kept], values[kept]

@@ -1,4 +1,4 @@
-"""Which points of a pool stay: those that the hypervolume would lose most without, in a bounded number."""
+"""Which designs stay: those that the hypervolume would lose most without, in a bounded number."""
 
 import moocore
 import numpy as np
@@ -8,7 +8,13 @@ from armwright.pareto import Array, front_mask
 
 Rows = NDArray[np.intp]
 
-MOST_EXACT = 3  # objectives; with more, exact contributions cost milliseconds a hundred points
+MOST_EXACT = 3  # objectives; with more, exact contributions cost seconds a thousand points
+
+
+def front(values: Array, reference_point: Array) -> Rows:
+    """The rows of `values` (N, M) that are on the front and within the reference box."""
+    within = np.flatnonzero(np.all(values < reference_point, axis=1))
+    return within[front_mask(values[within])]
 
 
 def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
@@ -16,48 +22,52 @@ def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
 
     Points within the reference box come before those outside, which are the better the less they exceed it.
     """
-    inside = np.all(values < reference_point, axis=1)
-    within, beyond = np.flatnonzero(inside), np.flatnonzero(~inside)
-    on_front = front_mask(values[within])
-    if on_front.sum() > capacity:
-        front = within[on_front]
-        return front[_thinned(values[front], reference_point, capacity)]
-    # Of equal points the first is on the front, the others come right after it.
-    within = within[_by_rank(values[within], ~on_front)]
-    excess = np.maximum(values[beyond], reference_point)
-    beyond = beyond[_by_rank(excess, np.zeros(len(excess)))]
-    return np.concatenate([within, beyond])[:capacity]
+    best = front(values, reference_point)
+    if len(best) >= capacity:
+        return best[thinned(values[best], reference_point, capacity)]
+    others = np.setdiff1d(np.arange(len(values)), best)
+    excess = np.maximum(values[others] - reference_point, 0.0)
+    outside = np.any(values[others] >= reference_point, axis=1)
+    rank = np.where(outside, moocore.pareto_rank(excess), moocore.pareto_rank(values[others]))
+    return np.concatenate([best, others[np.lexsort((rank, outside))]])[:capacity]
 
 
-def _by_rank(values: Array, handicap: NDArray[np.generic]) -> Rows:
-    """The rows by rising Pareto rank."""
-    if not len(values):
-        return np.zeros(0, dtype=np.intp)
-    return np.argsort(moocore.pareto_rank(values) + handicap, kind="stable")
+def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int) -> Rows:
+    """The row of `values` (N, M) with the largest box of each structure (N,), for the `most` largest boxes.
+
+    A point's box is what it dominates alone, bounded by the reference point.
+    """
+    box = np.prod(np.maximum(reference_point - values, 0.0), axis=1)
+    order = np.lexsort((-box, structures))
+    _, first = np.unique(structures[order], return_index=True)
+    best = order[first]
+    return best[np.argsort(-box[best], kind="stable")[:most]]
 
 
-def _thinned(front: Array, reference_point: Array, capacity: int) -> Rows:
-    if front.shape[1] > MOST_EXACT:
-        return _winners(front, reference_point, capacity)
+def thinned(front: Array, reference_point: Array, capacity: int) -> Rows:
+    """The rows, at most `capacity`, that keep most of the hypervolume of a front (N, M) within the reference box."""
     kept = np.arange(len(front))
+    if len(kept) > capacity and front.shape[1] > MOST_EXACT:
+        return _winners(front, reference_point, capacity)
     while len(kept) > capacity:
         # Contributions change as neighbours go, so not all of the surplus goes at once.
         contributions = moocore.hv_contributions(front[kept], ref=reference_point)
-        surplus = min(len(kept) - capacity, max(-(-(len(kept) - capacity) // 2), capacity // 16))
-        kept = np.delete(kept, np.argsort(contributions, kind="stable")[:surplus])
+        surplus = len(kept) - capacity
+        going = min(surplus, max(-(-surplus // 2), capacity // 8))
+        kept = np.delete(kept, np.argsort(contributions, kind="stable")[:going])
     return kept
 
 
-def _winners(front: Array, reference_point: Array, capacity: int) -> Rows:
-    """The points that reach farthest from the reference point along one of `capacity` fixed directions.
+def _winners(front: Array, reference_point: Array, n: int) -> Rows:
+    """The points that reach farthest from the reference point along one of `n` fixed directions.
 
     The mean of (farthest reach) ** M over all directions is proportional to the hypervolume (Deng & Zhang,
     IEEE Trans. Evol. Comput. 23(6), 2019), so a point that wins nowhere hardly contributes.
     """
-    directions = np.abs(np.random.default_rng(0).standard_normal((capacity, front.shape[1])))
+    directions = np.abs(np.random.default_rng(0).standard_normal((n, front.shape[1])))
     gain = reference_point - front
     gain /= gain.max(axis=0)
-    reach = np.full((capacity, len(front)), np.inf)
+    reach = np.full((n, len(front)), np.inf)
     for objective, direction in zip(gain.T, directions.T, strict=True):
         np.minimum(reach, objective / direction[:, None], out=reach)
     return np.unique(np.argmax(reach, axis=1))

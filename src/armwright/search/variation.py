@@ -7,8 +7,8 @@ from armwright.search.columns import Array, Columns
 
 NEIGHBOURS = 10  # places in the pool, to either side
 DIFFERENCE_SHARE = 0.35  # of the batch: a difference of two neighbours is added
-LINE_SHARE = 0.2  # of the batch: on the line to a neighbour, and somewhat beyond; the rest is a normal step
-STEP_EXPONENTS = (-3.5, -0.7)  # of ten; normal steps are this long, as a share of a parameter's range
+LINE_SHARE = 0.3  # of the batch: on the line to a neighbour, and somewhat beyond; the rest is a normal step
+STEP_EXPONENTS = (-4.5, -1.0)  # of ten; normal steps are this long, as a share of a parameter's range
 STEP_DENSITIES = (0.15, 0.3, 1.0)  # the share of parameters that a normal step changes
 CATEGORY_SHARE = 0.15  # of the batch: categories change, too
 
