@@ -183,6 +183,7 @@ def test_version_and_help() -> None:
         (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--prompt", "x"), 'unknown prompt "x"'),
         (("target-1", "--memory", "owm"), 'Did you mean "own"?'),
         (("target-1", "--answer", "onestep"), 'Did you mean "one-step"?'),
+        (("target-1", "--answer", "text", "--model", "m", "--base-url", "http://127.0.0.1:9"), "is for people"),
         (("target-1", "--proposals", "0"), "proposals = 0: a whole number from 1"),
         (("target-1", "--in-flight", "2"), "goes with --overlap"),
         (("target-1", "--overlap", "--in-flight", "0"), "in_flight = 0"),
@@ -229,6 +230,8 @@ def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer,
     assert done.returncode == 0, done.stderr
     assert "ok openai-chat: OPENAI_API_KEY set" in done.stdout
     assert "-- anthropic: ANTHROPIC_API_KEY not set" in done.stdout
+    assert "-- google: GOOGLE_API_KEY or GEMINI_API_KEY not set" in done.stdout
+    assert "ok google: GEMINI_API_KEY set" in armwright("doctor", GEMINI_API_KEY="planted").stdout
     assert "-- model: none is configured" in done.stdout
     assert "planted" not in done.stdout + done.stderr
     assert not chat_server.requests

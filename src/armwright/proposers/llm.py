@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from armwright.exceptions import SettingsError
 from armwright.history import History
 from armwright.llm.feedback import N_PARETO, N_RANDOM
 from armwright.llm.prompt import MOST_TARGETS, MOST_TOKENS, estimated_tokens, parameters_prompt
@@ -48,6 +49,8 @@ class LlmProposer(AskingProposer):
         from armwright.llm.chat import Chat
 
         asking = Asking(prompt, memory, answer, proposals)
+        if answer == "text":
+            raise SettingsError('answer "text" is for people; a model needs "two-step" or "one-step"')
         chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
         # A stand-in's designs must never be taken for a model's: they have a source of their own.
         name = "llm" if origin == "model" else origin
