@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar, get_args
 
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
 from armwright.llm.answer import without_words_around
-from armwright.llm.secrets import WithoutKeys, redacted
+from armwright.llm.secrets import WithoutKeys, redacted, without_keys
 from armwright.llm.speaker import CHECK, CallError, Question, Reader, Reply, Speaker
 
 try:
@@ -154,7 +154,8 @@ class Chat(Speaker):
 
         def accept(answer: dict[str, Any]) -> dict[str, Any]:
             try:
-                accepted.append(read(answer))
+                # Keys are blotted out before, not after: what is kept is what was read, and can be read again.
+                accepted.append(_printable(read(without_keys(answer))))
             except DesignError as refusal:
                 raise ModelRetry(str(refusal)) from refusal
             return answer
@@ -162,7 +163,7 @@ class Chat(Speaker):
         output = self._output(StructuredDict(dict(schema)))
         agent: Agent[None, Any] = Agent(self._model, output_type=output, retries=REASKS)
         agent.output_validator(accept)
-        return replace(self._run(agent, question, CALL_SECONDS), text=_clean(accepted[-1]))
+        return replace(self._run(agent, question, CALL_SECONDS), text=accepted[-1])
 
     def cancel(self) -> None:
         """Ends all calls under way, and those that are about to begin."""
@@ -301,8 +302,13 @@ def _cost(response: ModelResponse) -> float | None:
 
 
 def _clean(text: str) -> str:
-    """Without keys, and without lone surrogates, which JSON can carry and UTF-8 cannot."""
-    return redacted(text.encode("utf-8", "replace").decode("utf-8"))
+    """Without keys, and printable."""
+    return redacted(_printable(text))
+
+
+def _printable(text: str) -> str:
+    """Without lone surrogates, which JSON can carry and UTF-8 cannot."""
+    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _one_line(text: object) -> str:
