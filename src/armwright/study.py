@@ -21,7 +21,7 @@ from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, results_are_there, summarize, write_results
 from armwright.run_folder import Method, RunConfig, RunFolder, versions
-from armwright.sampling import BlackBox, SamplerFactory, sampler_factory
+from armwright.sampling import BlackBox, SamplerFactory, sampler_name
 from armwright.space import Design
 from armwright.turns import Alternating, Asker, Nobody, Overlapping, Recorded, Schedule, Turn, Turns
 
@@ -307,11 +307,9 @@ def _method(
     n_total: int,
     in_flight: int | None,
 ) -> Method:
-    factory = sampler_factory(sampler)
-    name = sampler if isinstance(sampler, str) else getattr(factory, "__qualname__", type(factory).__qualname__)
     return Method(
         proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
-        sampler=name,
+        sampler=sampler_name(sampler),
         n_init=_whole("n_init", n_init, 1),
         n_step=_whole("n_step", n_step, 1),
         n_total=_whole("n_total", n_total, 1),
