@@ -87,7 +87,7 @@ class Prompt:
                     f"{did_you_mean(str(other), there)} Templates: {', '.join(there)}"
                 )
             known |= _exported(_sandbox().parse(builtin_template(str(other))))
-        for name in sorted(meta.find_undeclared_variables(tree) - known):
+        for name in sorted(_sandbox().names_needed(tree) - known):
             raise SettingsError(
                 f'prompt {self.name} uses "{name}", which does not exist.{did_you_mean(name, VARIABLES)} '
                 f"Names: {', '.join(VARIABLES)}"
