@@ -3,8 +3,11 @@
 from pathlib import Path
 
 import pytest
+from pydantic_ai.messages import ModelResponse
+from pydantic_ai.usage import RequestUsage
 
 from armwright.exceptions import ModelError
+from armwright.llm import chat
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.study import Progress, Run, optimize
@@ -71,6 +74,39 @@ def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPa
     assert half.startswith("20 proposals: about 6 calls, ")
     unknown = LlmProposer("openai-chat:a-model-of-tomorrow").forecast(PROBLEM, 20)
     assert unknown.endswith("price not known")
+
+
+def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatServer) -> None:
+    """Whatever it is called: forecast, summary and bound agree."""
+    seen: list[Progress] = []
+    result = run(LlmProposer("openai-chat:gpt-4o", chat_server.url), seen=seen, n_total=3)
+    assert seen[0].note.endswith("; on a server of your own")
+    assert result.summary["proposer"]["cost_usd"] is None
+    with pytest.raises(ModelError, match="price of gpt-4o is not known"):
+        run(LlmProposer("gpt-4o", chat_server.url, max_cost=1.0))
+
+
+@pytest.mark.parametrize(
+    ("model", "address", "words"),
+    [
+        ("qwen3", "http://192.168.0.7:8080/v1", "on a server of your own"),
+        ("qwen3", "http://gpu-box:8080/v1", "on a server of your own"),
+        ("qwen3", "https://models.example.com/v1", "at https://models.example.com/v1; its price is not known"),
+        ("gpt-4o", "https://models.example.com/v1", "at https://models.example.com/v1; its price is not known"),
+        ("gpt-4o", "https://api.openai.com/v1", "about 12.50 USD by public prices"),
+        ("openai-chat:gpt-4o", "https://api.openai.com/v1", "about 12.50 USD by public prices"),
+        ("ollama:qwen3:8b", None, "on a server of your own"),
+        ("openai-chat:gpt-4o", None, "about 12.50 USD by public prices"),
+        ("openai-chat:a-model-of-tomorrow", None, "price not known"),
+    ],
+)
+def test_the_price_is_that_of_the_host(model: str, address: str | None, words: str) -> None:
+    assert chat.cost_words(model, address, 10**6, 10**6) == words
+    place = chat._place(model, address)
+    if place is not None:
+        usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)
+        response = ModelResponse([], usage=usage, model_name=place.name, provider_url=address)
+        assert chat._cost(response, place) == (12.5 if "12.50" in words else None)
 
 
 def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatServer, tmp_path: Path) -> None:

@@ -183,7 +183,15 @@ def test_version_and_help() -> None:
         (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--prompt", "x"), 'unknown prompt "x"'),
         (("target-1", "--memory", "owm"), 'Did you mean "own"?'),
         (("target-1", "--answer", "onestep"), 'Did you mean "one-step"?'),
+        (("target-1", "--answer", "text", "--model", "m", "--base-url", "http://127.0.0.1:9"), "is for people"),
         (("target-1", "--proposals", "0"), "proposals = 0: a whole number from 1"),
+        (("target-1", "--max-cost", "1"), "--max-cost 1.0 goes with a language model, and none is configured"),
+        (("target-1", "--memory", "none"), "--memory none goes with a language model, and none is configured"),
+        (("target-1", "--proposer", "rules", "--max-calls", "0"), "rules does not use --max-calls 0"),
+        (("target-1", "--proposer", "none", "--temperature", "0"), "none does not use --temperature 0.0; leave it out"),
+        (("target-1", "--proposer", "replay:x", "--answer", "one-step"), "replay:x does not use --answer one-step"),
+        (("target-1", "--proposer", "manual:x", "--origin", "model"), "manual:x does not use --origin model"),
+        (("target-1", "--proposer", "manual:x", "--answer", "text"), "manual:x does not use --answer text"),
         (("target-1", "--in-flight", "2"), "goes with --overlap"),
         (("target-1", "--overlap", "--in-flight", "0"), "in_flight = 0"),
         (("target-1", "--once"), "--once goes with --proposer manual:PATH"),
@@ -229,6 +237,8 @@ def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer,
     assert done.returncode == 0, done.stderr
     assert "ok openai-chat: OPENAI_API_KEY set" in done.stdout
     assert "-- anthropic: ANTHROPIC_API_KEY not set" in done.stdout
+    assert "-- google: GOOGLE_API_KEY or GEMINI_API_KEY not set" in done.stdout
+    assert "ok google: GEMINI_API_KEY set" in armwright("doctor", GEMINI_API_KEY="planted").stdout
     assert "-- model: none is configured" in done.stdout
     assert "planted" not in done.stdout + done.stderr
     assert not chat_server.requests

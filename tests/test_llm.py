@@ -235,6 +235,11 @@ def test_a_wrong_model_name_is_refused(model: str, words: str) -> None:
         LlmProposer(model)
 
 
+def test_a_model_is_not_asked_as_people_are(chat_server: ChatServer) -> None:
+    with pytest.raises(SettingsError, match='answer "text" is for people; a model needs "two-step" or "one-step"'):
+        LlmProposer("test-model", chat_server.url, answer="text")
+
+
 def test_a_wrong_prompt_name_is_refused(chat_server: ChatServer) -> None:
     with pytest.raises(SettingsError, match='Did you mean "plus"'):
         LlmProposer("test-model", chat_server.url, "pluss")

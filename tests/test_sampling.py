@@ -1,5 +1,7 @@
 """The black box on Optuna, and each of the traps of asking, telling and injecting."""
 
+from functools import partial
+
 import optuna
 import pytest
 from optuna.samplers import BaseSampler, NSGAIISampler, RandomSampler, TPESampler
@@ -10,7 +12,15 @@ from armwright.exceptions import DesignError, MissingExtraError, SettingsError
 from armwright.history import BBO, RANDOM, FinishedTrial, History
 from armwright.problem import Problem
 from armwright.proposers.rules import RulesProposer
-from armwright.sampling import SAMPLERS, SAMPLING, BlackBox, distributions, sampler_factory
+from armwright.sampling import (
+    SAMPLERS,
+    SAMPLING,
+    BlackBox,
+    SamplerFactory,
+    distributions,
+    sampler_factory,
+    sampler_name,
+)
 from armwright.seeding import derived_seed
 from armwright.space import Design, paper_space
 from armwright.study import optimize
@@ -100,6 +110,34 @@ def test_every_named_sampler_runs_with_proposals(sampler: str) -> None:
 
 def test_every_name_is_among_those_tested() -> None:
     assert set(SAMPLERS) == {"tpe", "tpe-multivariate", "nsga2", "gp", "random"}
+
+
+def test_each_factory_has_a_name_of_its_own_and_the_same_one_keeps_it() -> None:
+    def made(cls: type[BaseSampler], **settings: int) -> SamplerFactory:
+        return lambda seed: cls(seed=seed, **settings)
+
+    class Factory:
+        def __init__(self, size: int) -> None:
+            self.size = size
+
+        def __repr__(self) -> str:
+            return f"Factory({self.size})"
+
+        def __call__(self, seed: int) -> BaseSampler:
+            return NSGAIISampler(population_size=self.size, seed=seed)
+
+    def factories() -> list[SamplerFactory]:
+        several = [lambda s: RandomSampler(s), lambda s: TPESampler(seed=s), lambda s: TPESampler(seed=s + 1)]
+        several += [made(RandomSampler), made(TPESampler), made(NSGAIISampler, population_size=4)]
+        several += [made(NSGAIISampler, population_size=6), partial(made, RandomSampler), partial(made, TPESampler)]
+        return [*several, Factory(4), Factory(6), Factory(6).__call__, RandomSampler, fill]
+
+    names = [sampler_name(factory) for factory in factories()]
+    assert len(set(names)) == len(names)
+    assert names == [sampler_name(factory) for factory in factories()]
+    assert sampler_name("tpe") == "tpe"
+    assert sampler_name(fill) == "tests.test_sampling.fill"
+    assert not any(" at 0x" in name for name in names)
 
 
 def test_gp_without_its_packages_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,9 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from armwright.llm.secrets import redacted
+from armwright.llm.secrets import redacted, without_keys
+from armwright.problem import Problem
+from armwright.study import optimize
+from armwright.task import load_task
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, wants_design
-from tests.wires import ANTHROPIC_KEY, OPENAI_KEY, SERVER_KEY, WIRES, environment
+from tests.wires import ANTHROPIC_KEY, OPENAI_KEY, SERVER_KEY, WIRES, environment, proposer
 
 SHORT = ("--n-init", "4", "--n-step", "1", "--n-total", "6")
 KEYS = (OPENAI_KEY, ANTHROPIC_KEY, SERVER_KEY)
@@ -142,6 +145,52 @@ def test_keys_are_blotted_out(monkeypatch: pytest.MonkeyPatch, text: str, shown:
     monkeypatch.setenv("MY_KEY", KEY)
     monkeypatch.setenv("SHORT_KEY", "short")
     assert redacted(text) == shown
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("SORT_KEY", "origin_x"),
+        ("PRIMARY_KEY", "universal"),
+        ("CSRF_TOKEN", "position_error"),
+        ("NEXT_TOKEN", "trial_10"),
+        ("MY_SECRET", "remember the universal shoulder"),
+    ],
+)
+def test_ordinary_words_are_no_keys(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+    monkeypatch.setenv(name, value)
+    text = "origin_x: a universal shoulder keeps the position_error small, as trial_10 shows; remember it"
+    assert redacted(text) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("VLLM_API_KEY", "placeholder"), ("MY_PASSWORD", "s3cretword"), ("MY_SECRET", "a-b-" * 5)]
+)
+def test_what_is_sent_and_what_is_no_word_is_a_key(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+    monkeypatch.setenv(name, value)
+    assert redacted(f"it is {value}.") == f"it is <{name}>."
+
+
+def test_only_texts_of_an_answer_are_blotted_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MY_API_KEY", "origin_x")
+    monkeypatch.setenv("A_TOKEN", "12345678901234567890")
+    content = {"origin_x": 12345678901234567890, "why": ["origin_x", None, True, {"origin_x": "is origin_x"}]}
+    assert without_keys(content) == {
+        "origin_x": 12345678901234567890,
+        "why": ["<MY_API_KEY>", None, True, {"origin_x": "is <MY_API_KEY>"}],
+    }
+
+
+@pytest.mark.parametrize("wire", ["own server", "openai"])
+def test_a_key_that_is_a_name_of_the_answer_breaks_nothing(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
+) -> None:
+    """Neither as a parameter's name, nor as a value: that is a text that the design space refuses."""
+    for name, value in (("MY_API_KEY", "origin_x"), ("MY_TOKEN", "reasoning")):
+        monkeypatch.setenv(name, value)
+    llm = proposer(wire, chat_server, monkeypatch, answer="one-step")
+    run = optimize(Problem(load_task("target-1")), proposer=llm, n_init=2, n_total=1)
+    assert (run.trials[2].source, run.trials[2].fault) == ("llm", None)
 
 
 def test_a_key_with_line_breaks_is_blotted_out_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -224,7 +224,21 @@ def test_any_optuna_sampler_by_a_factory(tmp_path: Path) -> None:
     run = optimize(PROBLEM, proposer="none", sampler=uniform, n_init=2, n_total=3, out=tmp_path / "run")
     named = optimize(PROBLEM, proposer="none", sampler="random", n_init=2, n_total=3)
     assert designs(run) == designs(named)
-    assert run.config.method.sampler.endswith("uniform")
+    assert run.config.method.sampler.startswith("line ")
+    assert run.config.method.sampler.endswith(
+        " of tests.test_study, test_any_optuna_sampler_by_a_factory.<locals>.uniform"
+    )
+
+
+def test_another_factory_is_another_run(tmp_path: Path) -> None:
+    def go_on(sampler: SamplerFactory, n_total: int) -> Run:
+        return optimize(PROBLEM, proposer="none", sampler=sampler, n_init=2, n_total=n_total, out=tmp_path / "run")
+
+    go_on(lambda seed: RandomSampler(seed=seed), 2)
+    with pytest.raises(RunConflictError, match=r"sampler: line \d+ \(.*\) of tests.test_study,.* there, line \d+"):
+        go_on(lambda seed: QMCSampler(seed=seed), 3)
+    with pytest.raises(RunConflictError, match="qmc asked"):
+        go_on(qmc, 3)
 
 
 def test_a_sampler_or_proposer_of_the_wrong_kind_is_refused() -> None:

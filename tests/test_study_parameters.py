@@ -202,6 +202,13 @@ def test_an_answer_without_the_object_around_the_parameters_is_read() -> None:
     assert (dict(answer.params), answer.reason, answer.expected) == ({"kernel": "rbf", "C": 2.5}, "a try", None)
 
 
+def test_no_reason_is_no_reason() -> None:
+    """Not the word None; and what is not seen is not kept."""
+    parameters = [Parameter("C", "C", FloatDistribution(0.0, 9.0))]
+    assert read_answer({"C": 1, "reason": None}, parameters, OBJECTIVES).reason == ""
+    assert read_answer({"C": 1, "reason": "so\x1b[2J\u200b it is"}, parameters, OBJECTIVES).reason == "so it is"
+
+
 def test_a_parameter_may_be_called_reason() -> None:
     parameters = [Parameter("reason", "reason", IntDistribution(0, 9))]
     answer = StudyAnswer({"reason": 4}, "four")

@@ -64,16 +64,6 @@ def options(
 # Options that several commands share.
 TaskName = Annotated[str, typer.Argument(help="A built-in task (see `armwright tasks`) or a YAML file.")]
 SpaceFile = Annotated[Path | None, typer.Option(help="Design space as a YAML file; without it, the paper's.")]
-PromptName = Annotated[
-    str, typer.Option(help="Prompt: plus (with analysis instructions), minus, or a template file of your own.")
-]
-MemoryName = Annotated[
-    str, typer.Option(help="What the model sees of its own earlier proposals: none (as the paper), or own.")
-]
-AnswerName = Annotated[
-    str, typer.Option(help="two-step (free reasoning, then a second call, as the paper) or one-step.")
-]
-ProposalCount = Annotated[int, typer.Option(help="Designs that one call asks for.")]
 ModelName = Annotated[str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.")]
 Robust = Annotated[
     bool, typer.Option("--robust", help="Count a design by its worst case with the base or a link 1 mm off.")
@@ -98,20 +88,35 @@ def optimize(
     ] = "auto",
     model: ModelName = None,
     base_url: BaseUrl = None,
-    prompt: PromptName = "plus",
-    memory: MemoryName = "none",
-    answer: AnswerName = "two-step",
-    proposals: ProposalCount = 1,
+    prompt: Annotated[
+        str | None,
+        typer.Option(
+            help="Prompt: plus (with analysis instructions), minus, or a template file of your own.  [default: plus]"
+        ),
+    ] = None,
+    memory: Annotated[
+        str | None,
+        typer.Option(help="What the model sees of its own earlier proposals: none or own.  [default: none]"),
+    ] = None,
+    answer: Annotated[
+        str | None,
+        typer.Option(help="two-step (free reasoning, then a second call) or one-step.  [default: two-step]"),
+    ] = None,
+    proposals: Annotated[int | None, typer.Option(help="Designs that one call asks for.  [default: 1]")] = None,
     temperature: Annotated[
         float | None, typer.Option(help="Sent to the model only if given; the paper's is 0.")
     ] = None,
     model_seed: Annotated[int | None, typer.Option(help="Sent to the model only if given.")] = None,
     output: Annotated[
-        str, typer.Option(help="How answers are held to the schema: tool, native, prompted; auto chooses.")
-    ] = "auto",
+        str | None,
+        typer.Option(help="How answers are held to the schema: tool, native, prompted, auto.  [default: auto]"),
+    ] = None,
     origin: Annotated[
-        str, typer.Option(help="What answers: model, or scripted for a stand-in; written with every call.")
-    ] = "model",
+        str | None,
+        typer.Option(
+            help="What answers: model, or scripted for a stand-in; written with every call.  [default: model]"
+        ),
+    ] = None,
     max_calls: Annotated[int | None, typer.Option(help="Ask no more after so many calls.")] = None,
     max_cost: Annotated[float | None, typer.Option(help="Ask no more after so many USD.")] = None,
     on_model_failure: Annotated[
@@ -143,14 +148,13 @@ def optimize(
 ) -> None:
     """Search designs for TASK. The same command again resumes or shows the run; a larger --n-total extends it."""
     from armwright import console as view
-    from armwright.proposers.asking import Asking
     from armwright.proposers.choice import Wishes, choose_proposer
     from armwright.study import optimize as run_study
 
     words = view.stderr_console() if json_ else view.stdout_console()
     problem = _problem(task, space, robust, device)
     wishes = Wishes(
-        proposer, model, base_url, Asking(prompt, memory, answer, proposals), temperature, model_seed, output, origin,
+        proposer, model, base_url, prompt, memory, answer, proposals, temperature, model_seed, output, origin,
         max_calls, max_cost, replay_strict, once,
     )  # fmt: skip
     if in_flight is not None and not overlap:

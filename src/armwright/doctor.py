@@ -12,11 +12,12 @@ from armwright.run_folder import versions
 
 OK, MISSING, WRONG = "ok", "--", "!!"
 
-# Vendor, the package that speaks to it, and the environment variables that it needs.
+# Vendor, the package that speaks to it, and the environment variables that it needs; of several names in one place
+# one is enough.
 VENDORS = (
     ("openai-chat", "openai", ("OPENAI_API_KEY",)),
     ("anthropic", "anthropic", ("ANTHROPIC_API_KEY",)),
-    ("google", "google.genai", ("GOOGLE_API_KEY",)),
+    ("google", "google.genai", ("GOOGLE_API_KEY or GEMINI_API_KEY",)),
     ("azure", "openai", ("AZURE_OPENAI_ENDPOINT", "AZURE_OPENAI_API_KEY", "OPENAI_API_VERSION")),
     ("openrouter", "openai", ("OPENROUTER_API_KEY",)),
     ("ollama", "openai", ()),
@@ -76,11 +77,12 @@ def _vendors() -> Iterator[Finding]:
         if not _installed(package):
             yield Finding(MISSING, vendor, 'not installed: pip install "armwright[llm]"')
             continue
-        unset = [name for name in variables if not os.environ.get(name)]
+        found = {names: next(filter(os.environ.get, names.split(" or ")), None) for names in variables}
+        unset = [names for names, name in found.items() if name is None]
         if unset:
             yield Finding(MISSING, vendor, f"{', '.join(unset)} not set in the environment")
         else:
-            words = f"{', '.join(variables)} set" if variables else "needs no key; its server must run"
+            words = f"{', '.join(map(str, found.values()))} set" if found else "needs no key; its server must run"
             yield Finding(OK, vendor, words)
 
 

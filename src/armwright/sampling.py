@@ -6,9 +6,12 @@ whole run would repeat its first draws, this one goes on as if it had never stop
 
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from importlib.util import find_spec
+from types import CodeType, FunctionType, MethodType
 from typing import Any
+from zlib import crc32
 
 import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution
@@ -86,6 +89,46 @@ def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
     if sampler == "gp":
         _check_gp()
     return SAMPLERS[sampler]
+
+
+def sampler_name(sampler: str | SamplerFactory) -> str:
+    """What a run's settings call a sampler, so that a run that is resumed with another one is refused.
+
+    A factory by its module and name; a lambda or a function within a function has no name of its own, and is told by
+    its line and by a sum over what it holds.
+    """
+    factory = sampler_factory(sampler)
+    return sampler if isinstance(sampler, str) else _named(factory)
+
+
+def _named(thing: Any) -> str:
+    if isinstance(thing, partial):
+        given = [_named(value) for value in thing.args]
+        given += [f"{name}={_named(value)}" for name, value in thing.keywords.items()]
+        return f"partial({', '.join([_named(thing.func), *given])})"
+    if isinstance(thing, MethodType):
+        return f"{_named(thing.__self__)}.{thing.__name__}"
+    if isinstance(thing, FunctionType) and ("<lambda>" in thing.__qualname__ or "<locals>" in thing.__qualname__):
+        held = [*(thing.__defaults__ or ()), *(cell.cell_contents for cell in thing.__closure__ or ())]
+        # A function that holds itself would never end.
+        named = [list(_constants(v.__code__)) if isinstance(v, FunctionType) else _named(v) for v in held]
+        words = repr([*_constants(thing.__code__), *named])
+        line = f"line {thing.__code__.co_firstlineno} ({crc32(words.encode()):08x})"
+        return f"{line} of {thing.__module__}, {thing.__qualname__}"  # what differs first: long settings are shown cut
+    if hasattr(thing, "__qualname__"):  # functions and classes
+        return f"{getattr(thing, '__module__', None)}.{thing.__qualname__}"
+    own_words = type(thing).__repr__ is not object.__repr__  # the others hold an address, which is new in each process
+    return repr(thing) if own_words else f"{_named(type(thing))}()"
+
+
+def _constants(code: CodeType) -> Iterator[str]:
+    """What a function's code uses by name, and the values in it."""
+    yield from code.co_names
+    for value in code.co_consts:
+        if isinstance(value, CodeType):
+            yield from _constants(value)
+        else:
+            yield repr(value)
 
 
 def _check_gp() -> None:

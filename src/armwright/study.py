@@ -22,7 +22,7 @@ from armwright.proposers.proposer import Proposer
 from armwright.refining import Refinement, refine_one
 from armwright.results import discard_results, read_summary, results_are_there, summarize, write_results
 from armwright.run_folder import Method, RunConfig, RunFolder, versions
-from armwright.sampling import BlackBox, SamplerFactory, sampler_factory
+from armwright.sampling import BlackBox, SamplerFactory, sampler_name
 from armwright.space import Design
 from armwright.turns import Alternating, Asker, Nobody, Overlapping, Recorded, Schedule, Turn, Turns
 from armwright.verification import verify_front
@@ -334,11 +334,9 @@ def _method(
     in_flight: int | None,
     polish_every: int | None,
 ) -> Method:
-    factory = sampler_factory(sampler)
-    name = sampler if isinstance(sampler, str) else getattr(factory, "__qualname__", type(factory).__qualname__)
     return Method(
         proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
-        sampler=name,
+        sampler=sampler_name(sampler),
         n_init=whole("n_init", n_init, 1),
         n_step=whole("n_step", n_step, 1),
         n_total=whole("n_total", n_total, 1),

@@ -10,6 +10,7 @@ from armwright.any_study.parameters import Parameter, read_value, unknown, value
 from armwright.any_study.prompt import Told
 from armwright.exceptions import DesignError
 from armwright.llm.answer import LONGEST_REASON
+from armwright.llm.words import one_line
 
 AROUND = ("parameters", "reasoning", "reason", "expected")  # what an answer holds beside the values
 MOST_REFUSALS = 10  # told at once
@@ -64,7 +65,7 @@ def read_answer(content: Mapping[str, Any], parameters: Sequence[Parameter], obj
         refusals = ["no parameter is given"]
     if refusals:
         raise DesignError("; ".join(refusals[:MOST_REFUSALS]))
-    reason = " ".join(str(content.get("reason", "")).split())[:LONGEST_REASON]
+    reason = one_line(str(content.get("reason") or ""), LONGEST_REASON)
     return StudyAnswer(params, reason, _expected(content.get("expected"), objectives))
 
 

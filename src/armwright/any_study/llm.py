@@ -55,7 +55,7 @@ class StudyLlmProposer(Dialogue, StudyProposer):
 
         Asking(memory=memory, answer=answer)  # refuses names that do not exist
         if answer == "text":
-            raise SettingsError('answer "text" is for people; "two-step" or "one-step" is needed')
+            raise SettingsError('answer "text" is for people; a model needs "two-step" or "one-step"')
         chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
         # A stand-in's trials must never be taken for a model's: they have a source of their own.
         super().__init__(chat, "llm" if origin == "model" else origin, max_calls=max_calls, max_cost=max_cost)
@@ -85,9 +85,13 @@ class StudyLlmProposer(Dialogue, StudyProposer):
             self._call(CHECK, lambda question: self.speaker.check(), self._over)
         except ProposalError as fault:
             raise ModelError(f"{fault}. Check the model, its key and base_url") from fault
+        if self._price_is_missing():
+            raise ModelError(self._without_price)
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """The next trial, from what the study has found."""
+        if self._price_is_missing():
+            raise ProposalError("budget", self._without_price, final=True)
         trials = study.get_trials(deepcopy=False)
         parameters = told_parameters(self.space(study), trials)
         if not parameters:
@@ -117,11 +121,22 @@ class StudyLlmProposer(Dialogue, StudyProposer):
     def _ask_for(self, question: Question, parameters: Sequence[Parameter], objectives: Sequence[Told]) -> Reply:
         def read(content: Mapping[str, Any]) -> str:
             answer: StudyAnswer = read_answer(content, parameters, objectives)
-            return written_answer(answer, parameters, objectives, str(content.get("reasoning", "")))
+            return written_answer(answer, parameters, objectives, str(content.get("reasoning") or ""))
 
         reasoning = self._form == "schema"
         schema = answer_schema(parameters, objectives, reasoning=reasoning, expected=self._expects)
         return self.speaker.ask_for(question, schema, read)
+
+    def _price_is_missing(self) -> bool:
+        """Whether calls were made whose cost is not known, though it is to be bounded."""
+        if self.max_cost is None:
+            return False
+        spent = self.summary()
+        return spent.calls > 0 and spent.cost_usd is None
+
+    @property
+    def _without_price(self) -> str:
+        return f"the price of {self.speaker.model} is not known, so max_cost cannot hold; use max_calls"
 
     @property
     def _expects(self) -> bool:

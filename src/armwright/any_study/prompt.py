@@ -11,7 +11,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from armwright.any_study.parameters import Parameter, keys, value_text
 from armwright.llm.feedback import N_PARETO, N_RANDOM
-from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, Form, estimated_tokens, rendered
+from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, Form, estimated_tokens, fenced, rendered
 from armwright.pareto import front_mask
 
 FEWEST_PROPOSED = 1
@@ -75,8 +75,8 @@ def study_prompt(
     most_shown, most_proposed = N_PARETO + N_RANDOM, MOST_PROPOSED
     while True:
         others = records[1][: most_shown // 2]
-        shown = {"best": records[0][: most_shown - len(others)], "others": others, "proposed": records[2]}
-        shown["proposed"] = records[2][-most_proposed:]
+        best_shown = records[0][: most_shown - len(others)]
+        shown = {"best": best_shown, "others": others, "proposed": records[2][-most_proposed:]}
         text = rendered("study.md.j2", {**common, **shown})
         if estimated_tokens(text) <= MOST_TOKENS or (most_shown, most_proposed) == (1, FEWEST_PROPOSED):
             return text
@@ -85,7 +85,7 @@ def study_prompt(
 
 def parameters_prompt(parameters: Sequence[Parameter], objectives: Sequence[Told], answer: str, expected: bool) -> str:
     """The prompt of the second call: the free answer turned into parameters."""
-    values = {"parameters": parameters, "objectives": objectives, "answer": answer, "expected": expected}
+    values = {"parameters": parameters, "objectives": objectives, "expected": expected, **fenced(answer)}
     return rendered("study_parameters.md.j2", values)
 
 

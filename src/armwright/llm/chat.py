@@ -8,13 +8,15 @@ import threading
 import time
 from collections.abc import Coroutine, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
+from ipaddress import ip_address
 from typing import Any, Literal, TypeVar, get_args
+from urllib.parse import urlsplit
 
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
 from armwright.llm.answer import without_words_around
-from armwright.llm.secrets import WithoutKeys, redacted
+from armwright.llm.secrets import WithoutKeys, redacted, without_keys
 from armwright.llm.speaker import CHECK, CallError, Question, Reader, Reply, Speaker
 
 try:
@@ -42,6 +44,7 @@ RETRIES = 2  # after a fault that may pass
 RETRY_SECONDS = 0.5  # before the first retry, where the server says nothing; doubled before the next
 ORIGINS = ("model", "scripted")
 SERVER_KEY = "ARMWRIGHT_API_KEY"  # for --base-url, where the server wants a key
+NEAR = (".local", ".lan", ".home", ".internal")  # endings of names in a network of one's own
 
 OutputMode = Literal["auto", "tool", "native", "prompted"]
 OUTPUT_MODES: tuple[str, ...] = get_args(OutputMode)
@@ -119,10 +122,10 @@ class Chat(Speaker):
             raise SettingsError(f'unknown origin "{origin}": {" or ".join(ORIGINS)} is needed')
         self.model = model
         self.origin = origin
-        inner, own_server = _model(model, base_url)
-        self._model = _Server(inner)
+        self._place = _place(model, base_url)
+        self._model = _Server(_model(model) if self._place is None else _own_server(self._place))
         if output == "auto":
-            output = "native" if own_server else "tool"
+            output = "tool" if self._place is None else "native"
         self._output = _OUTPUTS[output]
         self._settings = ModelSettings()
         if temperature is not None:
@@ -154,7 +157,8 @@ class Chat(Speaker):
 
         def accept(answer: dict[str, Any]) -> dict[str, Any]:
             try:
-                accepted.append(read(answer))
+                # Keys are blotted out before, not after: what is kept is what was read, and can be read again.
+                accepted.append(_printable(read(without_keys(answer))))
             except DesignError as refusal:
                 raise ModelRetry(str(refusal)) from refusal
             return answer
@@ -162,7 +166,7 @@ class Chat(Speaker):
         output = self._output(StructuredDict(dict(schema)))
         agent: Agent[None, Any] = Agent(self._model, output_type=output, retries=REASKS)
         agent.output_validator(accept)
-        return replace(self._run(agent, question, CALL_SECONDS), text=_clean(accepted[-1]))
+        return replace(self._run(agent, question, CALL_SECONDS), text=accepted[-1])
 
     def cancel(self) -> None:
         """Ends all calls under way, and those that are about to begin."""
@@ -178,12 +182,24 @@ class Chat(Speaker):
             try:
                 self._wait(agent.run(question.prompt, model_settings=settings, usage_limits=limits))
             except CancelledError as fault:
-                reply = _reply(messages, time.perf_counter() - started)
+                reply = self._reply(messages, time.perf_counter() - started)
                 raise CallError("cancelled", f"{self.model}: the call was ended", reply) from fault
             except CALL_FAULTS as fault:
-                reply = _reply(messages, time.perf_counter() - started)
+                reply = self._reply(messages, time.perf_counter() - started)
                 raise CallError(kind_of(fault), f"{self.model}: {_one_line(words_of(fault))}", reply) from fault
-        return _reply(messages, time.perf_counter() - started)
+        return self._reply(messages, time.perf_counter() - started)
+
+    def _reply(self, messages: Sequence[ModelMessage], seconds: float) -> Reply:
+        responses = [message for message in messages if isinstance(message, ModelResponse)]
+        costs = [_cost(response, self._place) for response in responses]
+        return Reply(
+            text=_text(responses[-1]) if responses else "",
+            requests=len(responses),
+            input_tokens=sum(response.usage.input_tokens for response in responses),
+            output_tokens=sum(response.usage.output_tokens for response in responses),
+            cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
+            seconds=seconds,
+        )
 
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
         """The coroutine's result, from an event loop in a thread of its own.
@@ -204,40 +220,63 @@ class Chat(Speaker):
             self._pending.discard(future)
 
 
-def estimated_cost(model: str, input_tokens: int, output_tokens: int) -> float | None:
-    """[USD] by the public price list, or None where it does not have the model."""
+def cost_words(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> str:
+    """About what so many tokens will cost, by the prices that the calls will be counted by."""
+    place = _place(model, base_url)
     vendor, _, name = model.partition(":")
+    usage = Usage(input_tokens=input_tokens, output_tokens=output_tokens)
     try:
-        usage = Usage(input_tokens=input_tokens, output_tokens=output_tokens)
-        return float(calc_price(usage, model_ref=name, provider_id=vendor.removesuffix("-chat")).total_price)
+        if place is None:
+            price = calc_price(usage, model_ref=name, provider_id=vendor.removesuffix("-chat"))
+        else:
+            price = calc_price(usage, model_ref=place.name, provider_api_url=place.address)
     except LookupError:
-        return None
+        if place is None:
+            return "price not known"
+        return "on a server of your own" if place.is_near else f"at {place.address}; its price is not known"
+    return f"about {price.total_price:.2f} USD by public prices"
 
 
-def is_local(model: str, base_url: str | None) -> bool:
-    """Whether the model runs behind a server of one's own, where nobody sends a bill that we know of."""
-    return base_url is not None or model.partition(":")[0] in _LOCAL
+@dataclass(frozen=True)
+class _Place:
+    """A server that is not found by the vendor's name: where it listens, and what it calls the model.
 
-
-def _model(name: str, base_url: str | None) -> tuple[Model, bool]:
-    """The model by its name, and whether its server is one's own.
-
-    SettingsError where the name is unknown or its key is not set.
+    key: the environment's word for its key.
     """
-    key_name = SERVER_KEY
-    vendor, _, bare = name.partition(":")
-    if base_url is None and vendor in _LOCAL:
-        default, address, vendor_key = _LOCAL[vendor]
-        base_url, name = os.environ.get(address) or default, bare
-        key_name = vendor_key if os.environ.get(vendor_key) else SERVER_KEY
+
+    address: str
+    name: str
+    key: str
+
+    @property
+    def is_near(self) -> bool:
+        """Whether it is this machine or one of the same network, where nobody sends a bill that we know of."""
+        host = urlsplit(self.address).hostname or ""
+        try:
+            return ip_address(host).is_private
+        except ValueError:
+            return "." not in host or host.endswith(NEAR)
+
+
+def _place(model: str, base_url: str | None) -> _Place | None:
+    """The server of a model; None where it is the vendor's."""
+    vendor, _, bare = model.partition(":")
     if base_url:
-        return _own_server(name.removeprefix("openai-chat:"), base_url, key_name), True
+        return _Place(base_url, model.removeprefix("openai-chat:"), SERVER_KEY)
+    if vendor in _LOCAL:
+        default, address, key = _LOCAL[vendor]
+        return _Place(os.environ.get(address) or default, bare, key if os.environ.get(key) else SERVER_KEY)
+    return None
+
+
+def _model(name: str) -> Model:
+    """A vendor's model by its name; SettingsError where that is unknown, or its key is not set."""
     if ":" not in name:
         raise SettingsError(
             f'model "{name}": a vendor is needed before it, like openai-chat:{name}; or give --base-url'
         )
     try:
-        return infer_model(name), False
+        return infer_model(name)
     except faults.UserError as fault:
         key = re.search(r"\b[A-Z_]+_(?:API_KEY|ENDPOINT)\b", str(fault))
         words = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_one_line(fault)}"
@@ -246,8 +285,9 @@ def _model(name: str, base_url: str | None) -> tuple[Model, bool]:
         raise MissingExtraError(f"model {name} needs another package: {_one_line(fault)}") from fault
 
 
-def _own_server(name: str, base_url: str, key_name: str) -> Model:
+def _own_server(at: _Place) -> Model:
     """A model behind an OpenAI-compatible server. Nothing that belongs to a vendor goes there."""
+    base_url = at.address
     if not base_url.startswith(("http://", "https://")):
         raise SettingsError(f"--base-url {base_url}: an address that begins with http:// or https:// is needed")
     place = base_url.partition("://")[2]
@@ -255,23 +295,10 @@ def _own_server(name: str, base_url: str, key_name: str) -> Model:
         raise SettingsError(f"--base-url holds more than an address; put the server's key into {SERVER_KEY}")
     client = AsyncOpenAI(
         base_url=base_url,
-        api_key=os.environ.get(key_name) or "no-key",
+        api_key=os.environ.get(at.key) or "no-key",
         default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
     )
-    return OpenAIChatModel(name, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
-
-
-def _reply(messages: Sequence[ModelMessage], seconds: float) -> Reply:
-    responses = [message for message in messages if isinstance(message, ModelResponse)]
-    costs = [_cost(response) for response in responses]
-    return Reply(
-        text=_text(responses[-1]) if responses else "",
-        requests=len(responses),
-        input_tokens=sum(response.usage.input_tokens for response in responses),
-        output_tokens=sum(response.usage.output_tokens for response in responses),
-        cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
-        seconds=seconds,
-    )
+    return OpenAIChatModel(at.name, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
 
 
 def _json_alone(response: ModelResponse) -> ModelResponse:
@@ -292,17 +319,24 @@ def _text(response: ModelResponse) -> str:
     return _clean("\n".join(written))
 
 
-def _cost(response: ModelResponse) -> float | None:
+def _cost(response: ModelResponse, place: _Place | None) -> float | None:
     """[USD], where the price of the model is known."""
     try:
+        if place is not None:  # else a model would have its price by its name alone, wherever it runs
+            calc_price(Usage(), model_ref=response.model_name or place.name, provider_api_url=place.address)
         return float(response.cost().total_price)
     except (LookupError, ValueError, AssertionError):
         return None
 
 
 def _clean(text: str) -> str:
-    """Without keys, and without lone surrogates, which JSON can carry and UTF-8 cannot."""
-    return redacted(text.encode("utf-8", "replace").decode("utf-8"))
+    """Without keys, and printable."""
+    return redacted(_printable(text))
+
+
+def _printable(text: str) -> str:
+    """Without lone surrogates, which JSON can carry and UTF-8 cannot."""
+    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _one_line(text: object) -> str:

@@ -89,7 +89,7 @@ class Prompt:
                     f"{did_you_mean(str(other), there)} Templates: {', '.join(there)}"
                 )
             known |= _exported(_sandbox().parse(builtin_template(str(other))))
-        for name in sorted(meta.find_undeclared_variables(tree) - known):
+        for name in sorted(_sandbox().names_needed(tree) - known):
             raise SettingsError(
                 f'prompt {self.name} uses "{name}", which does not exist.{did_you_mean(name, VARIABLES)} '
                 f"Names: {', '.join(VARIABLES)}"
@@ -188,16 +188,20 @@ def whole_template(name: str) -> str:
 
 def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expected: bool = False) -> str:
     """The prompt of the second call: the free answer turned into parameters."""
-    answer = end_of(without_thoughts(answer).strip() or answer, LONGEST_ANALYSIS)
     values = {
         "parameters": problem.space.parameters,
         "symbols": " and ".join(objective.symbol for objective in problem.objectives),
         "proposals": proposals,
         "expected": expected,
-        "answer": answer,
-        "fence": fence(answer),
+        **fenced(answer),
     }
     return rendered("parameters.md.j2", values)
+
+
+def fenced(answer: str) -> dict[str, str]:
+    """A free answer as material for a second call: without its thoughts, its end alone, and a fence that it lacks."""
+    material = end_of(without_thoughts(answer).strip() or answer, LONGEST_ANALYSIS)
+    return {"answer": material, "fence": fence(material)}
 
 
 def rendered(name: str, values: Mapping[str, Any]) -> str:

@@ -4,9 +4,13 @@ import logging
 import os
 import re
 from collections.abc import Iterator
+from typing import Any, cast
 
 _NAMES = re.compile(r"(^|_)(KEY|TOKEN|SECRET|PASSWORD)$")
+_SENT = re.compile(r"(^|_)API_(KEY|TOKEN)$")  # what vendors' clients read, and send
+_MIXED = re.compile(r"[A-Za-z][0-9]|[0-9][A-Za-z]")
 SHORTEST = 8  # a shorter value is no key, and would be found in ordinary words
+LONG = 20  # from so many characters on, a value is no word
 PART = 12  # so much of a key's beginning or end tells it
 _MASKED = re.compile(r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)")  # sk-abcd****wxyz, as vendors show it
 
@@ -34,13 +38,30 @@ def redacted(text: str) -> str:
     return text
 
 
+def without_keys(content: Any) -> Any:
+    """JSON with every key of the environment blotted out of its texts; names and numbers stay as they are."""
+    if isinstance(content, str):
+        return redacted(content)
+    if isinstance(content, list):
+        return [without_keys(item) for item in cast("list[Any]", content)]
+    if isinstance(content, dict):
+        return {name: without_keys(value) for name, value in cast("dict[Any, Any]", content).items()}
+    return content
+
+
 def _keys() -> Iterator[tuple[str, str]]:
     """Names and values; of a value with line breaks or blanks each piece, as errors write these in other ways."""
     for name, value in os.environ.items():
-        if _NAMES.search(name):
-            for piece in value.split():
-                if len(piece) >= SHORTEST:
+        if _NAMES.search(name) and (_SENT.search(name) or _looks_secret(value)):
+            pieces = value.split()
+            for piece in pieces:
+                if len(piece) >= SHORTEST and (len(pieces) == 1 or not piece.isalpha()):
                     yield name, piece
+
+
+def _looks_secret(value: str) -> bool:
+    """Whether a value is no word or name that an answer could hold by itself, as in SORT_KEY=position_error."""
+    return len(value) >= LONG or bool(_MIXED.search(value))
 
 
 def _is_of(key: str, masked: re.Match[str]) -> bool:

@@ -1,6 +1,7 @@
 """Which proposer a run gets."""
 
-from dataclasses import dataclass, field
+from collections.abc import Collection
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from armwright.exceptions import SettingsError, did_you_mean
@@ -16,20 +17,44 @@ WITH_PLACE = ("replay", "manual")  # written replay:RUN and manual:DIR
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a user says of the proposer; the fields are LlmProposer's, ReplayProposer's and ManualProposer's."""
+    """What a user says of the proposer; the fields are LlmProposer's, ReplayProposer's and ManualProposer's.
+
+    None: nothing is said. What is said and has no use is refused.
+    """
 
     name: str = "auto"
     model: str | None = None
     base_url: str | None = None
-    asking: Asking = field(default_factory=Asking)
+    prompt: str | None = None
+    memory: str | None = None
+    answer: str | None = None
+    proposals: int | None = None
     temperature: float | None = None
     model_seed: int | None = None
-    output: str = "auto"
-    origin: str = "model"
+    output: str | None = None
+    origin: str | None = None
     max_calls: int | None = None
     max_cost: float | None = None
     replay_strict: bool = False
     once: bool = False
+
+    @property
+    def asking(self) -> Asking:
+        """How designs are asked for."""
+        said = {name: getattr(self, name) for name in ("prompt", "memory", "answer", "proposals")}
+        return Asking(**{name: value for name, value in said.items() if value is not None})
+
+    def unused(self, used: Collection[str]) -> str:
+        """The first option that is said and not among `used`, with its value; empty where there is none."""
+        for name in _OF_MODELS:
+            value = getattr(self, name)
+            if value is not None and name not in used:
+                return f"--{name.replace('_', '-')} {value}"
+        return ""
+
+
+_OF_MODELS = tuple(f.name for f in fields(Wishes) if f.name not in ("name", "replay_strict", "once"))
+_OF_MANUAL = ("prompt", "memory", "proposals")  # people answer in text, and cost nothing
 
 
 @dataclass(frozen=True)
@@ -66,6 +91,10 @@ def choose_proposer(wishes: Wishes | str = "auto") -> Choice:
         )
     if wishes.base_url:
         raise SettingsError(f"--base-url {wishes.base_url} needs --model NAME, the name of a model on that server")
+    if unused := wishes.unused(()):
+        raise SettingsError(
+            f"{unused} goes with a language model, and none is configured: name one by --model, or leave it out"
+        )
     why = "as asked" if kind == "rules" else "no language model is configured; --model names one"
     return Choice(RulesProposer(), f"proposer: rules ({why})")
 
@@ -91,6 +120,8 @@ def _check(wishes: Wishes, kind: str, colon: str, place: str) -> None:
             raise SettingsError(
                 f"--proposer {wishes.name} uses no language model; leave out --base-url {wishes.base_url}"
             )
+        if unused := wishes.unused(_OF_MANUAL if kind == "manual" else ()):
+            raise SettingsError(f"--proposer {wishes.name} does not use {unused}; leave it out, or take --proposer llm")
     for value, option, needed in (
         (wishes.once, "--once", "manual"),
         (wishes.replay_strict, "--replay-strict", "replay"),
@@ -112,8 +143,8 @@ def _language_model(wishes: Wishes, configured: ModelName) -> Choice:
         proposals=asking.proposals,
         temperature=wishes.temperature,
         seed=wishes.model_seed,
-        output=wishes.output,
-        origin=wishes.origin,
+        output="auto" if wishes.output is None else wishes.output,
+        origin="model" if wishes.origin is None else wishes.origin,
         max_calls=wishes.max_calls,
         max_cost=wishes.max_cost,
     )

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from armwright.exceptions import SettingsError
 from armwright.history import History
 from armwright.llm.feedback import N_PARETO, N_RANDOM
 from armwright.llm.prompt import MOST_TARGETS, MOST_TOKENS, estimated_tokens, parameters_prompt
@@ -48,6 +49,8 @@ class LlmProposer(AskingProposer):
         from armwright.llm.chat import Chat
 
         asking = Asking(prompt, memory, answer, proposals)
+        if answer == "text":
+            raise SettingsError('answer "text" is for people; a model needs "two-step" or "one-step"')
         chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
         # A stand-in's designs must never be taken for a model's: they have a source of their own.
         name = "llm" if origin == "model" else origin
@@ -62,7 +65,7 @@ class LlmProposer(AskingProposer):
 
     def forecast(self, problem: Problem, n: int) -> str:
         """About what `n` proposals will take, before any is asked for."""
-        from armwright.llm.chat import estimated_cost, is_local
+        from armwright.llm.chat import cost_words
 
         calls = -(-n // self.asking.proposals)
         given, written = self._tokens_each(problem)
@@ -71,10 +74,7 @@ class LlmProposer(AskingProposer):
             f"{n} proposals: about {steps * calls + 1} calls, {_thousands(calls * given)} tokens in, "
             f"{_thousands(calls * written)} out"
         )
-        if is_local(self.model, self.base_url):
-            return f"{words}; on a server of your own"
-        cost = estimated_cost(self.model, calls * given, calls * written)
-        return f"{words}; " + ("price not known" if cost is None else f"about {cost:.2f} USD by public prices")
+        return f"{words}; {cost_words(self.model, self.base_url, calls * given, calls * written)}"
 
     def _tokens_each(self, problem: Problem) -> tuple[int, int]:
         """Tokens in and out of one proposal: as those so far in this run, else as a full prompt has."""
