@@ -63,15 +63,25 @@ class RecordedTurn:
     feedback: int
 
 
+@dataclass(frozen=True)
+class Record:
+    """A recorded run: the proposer's turns by trial number, and how many trials it has."""
+
+    turns: Mapping[int, RecordedTurn]
+    n_trials: int
+
+
 class Proposer(Protocol):
     """Proposes one design for every n_step trials; inherit from it and write `propose`.
 
     name: the `source` of its trials.
     per_call: how many designs one call of `propose` gives, at most.
+    overlaps: whether it can be asked while black-box trials go on (--overlap), from other threads.
     """
 
     name: str
     per_call: int = 1
+    overlaps: bool = True
 
     def settings(self) -> Mapping[str, Any]:
         """What must be known to repeat its proposals; kept in config.yaml. No secrets."""
@@ -95,8 +105,8 @@ class Proposer(Protocol):
         """Proposals of earlier sessions of this run that no trial has used yet; they go first."""
         return ()
 
-    def recorded_turns(self) -> Mapping[int, RecordedTurn] | None:
-        """Of a record that is played again: when its proposals entered, by trial number."""
+    def record(self) -> Record | None:
+        """Of a run that is played again: when its proposals entered."""
         return None
 
     def summary(self) -> ProposerSummary:

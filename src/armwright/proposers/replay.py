@@ -12,7 +12,7 @@ from armwright.llm.prompt import PROMPTS, Prompt
 from armwright.llm.recording import Recording
 from armwright.llm.transcript import Transcript
 from armwright.proposers.asking import TRANSCRIPTS, Asking, AskingProposer
-from armwright.proposers.proposer import Proposal, ProposerSummary, RecordedTurn
+from armwright.proposers.proposer import Proposal, ProposerSummary, Record, RecordedTurn
 from armwright.run_folder import CONFIG, TRIALS, RunConfig, read_config, read_run
 
 
@@ -50,8 +50,8 @@ class ReplayProposer(AskingProposer):
         if any(call.step == "check" and call.fault is None for call in self.recording.calls):
             super().check()
 
-    def recorded_turns(self) -> Mapping[int, RecordedTurn] | None:
-        """When the recorded proposals entered, by trial number; None where only the transcript is there."""
+    def record(self) -> Record | None:
+        """When the recorded proposals entered; None where only the transcript is there."""
         if not self._trials:
             return None
         turns: dict[int, RecordedTurn] = {}
@@ -60,7 +60,7 @@ class ReplayProposer(AskingProposer):
                 asked = trial.number if trial.asked is None else trial.asked
                 feedback = trial.number if trial.feedback is None else trial.feedback
                 turns[trial.number] = RecordedTurn(asked, feedback)
-        return turns
+        return Record(turns, len(self._trials))
 
     def summary(self) -> ProposerSummary:
         """The account of the recorded calls that were played."""
