@@ -8,9 +8,9 @@ Recorded      a recorded run is played again: its proposals enter when they did
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, groupby
 from typing import Protocol
 
 from armwright.exceptions import DesignError, ProposalError
@@ -204,22 +204,23 @@ class Recorded(Turns):
         past = past_turns(history())
         self._asked = {turn.asked for turn in past}
         self._missed = any(turn.fault == "missing" for turn in past)
-        self._ready: dict[int, deque[Turn]] = {}  # of calls that gave several designs
-        for turn in asker.unused(history()):
-            self._ready.setdefault(turn.asked, deque()).append(turn)
+        self._ready: dict[tuple[int, str | None], Turn] = {}  # by trial and proposal; None for a fault
+        self._take(asker.unused(history()))
 
     def next(self, number: int) -> Turn | None:
         """What was recorded for this trial."""
         turn = self._record.turns.get(number)
         if turn is None:
             return self._beyond(number)
-        ready = self._ready.setdefault(turn.asked, deque())
-        if not ready and turn.asked not in self._asked:
-            ready.extend(self._asker.ask(self._history().before(turn.feedback), turn.asked))
+        if (turn.asked, turn.proposal) not in self._ready and turn.asked not in self._asked:
+            self._take(self._asker.ask(self._history().before(turn.feedback), turn.asked))
         self._asked.add(turn.asked)
-        if not ready:
-            return Turn(turn.asked, turn.feedback, fault="missing", note=f"no design is left of call {turn.asked}")
-        return ready.popleft()
+        missing = Turn(turn.asked, turn.feedback, fault="missing", note=f"no design is left of call {turn.asked}")
+        return self._ready.pop((turn.asked, turn.proposal), self._ready.pop((turn.asked, None), missing))
+
+    def _take(self, turns: Iterable[Turn]) -> None:
+        for turn in turns:
+            self._ready[turn.asked, None if turn.proposal is None else turn.proposal.id] = turn
 
     def _beyond(self, number: int) -> Turn | None:
         if number < self._record.n_trials or len(past_turns(self._history())) >= self._schedule.begun(number):
@@ -247,15 +248,18 @@ class Overlapping(Turns):
         past = past_turns(history())
         self._entered = len(past)
         self._asked = {turn.asked for turn in past}
-        self._arrived: deque[Turn] = deque()  # the first of each answer
-        self._surplus: deque[Turn] = deque()  # the others
+        self._arrived: deque[list[Turn]] = deque()  # answers, each with its designs
+        self._surplus: deque[Turn] = deque()  # designs of answers whose first has entered
         self._failure: BaseException | None = None  # raised again in the study's thread
         self._threads: list[threading.Thread] = []
         self.under_way = 0
         self._change = threading.Condition()
-        for turn in asker.unused(history()):
-            (self._surplus if turn.asked in self._asked else self._arrived).append(turn)
-            self._asked.add(turn.asked)
+        for asked, turns in groupby(asker.unused(history()), lambda turn: turn.asked):
+            if asked in self._asked:
+                self._surplus.extend(turns)
+            else:
+                self._arrived.append(list(turns))
+                self._asked.add(asked)
 
     def next(self, number: int) -> Turn | None:
         """The turn of the answer that came first; None as long as the black box may go on without one."""
@@ -267,9 +271,10 @@ class Overlapping(Turns):
                 if self._failure is not None:
                     raise self._failure
                 self._ask(counted)
-                if ready := self._ready(counted):
+                turn = self._take(counted)
+                if turn is not None:
                     self._entered += 1
-                    return ready.popleft()
+                    return turn
                 if self._black_box_may_run(counted - self._entered):
                     return None
                 self._change.wait(LOOK_EVERY)
@@ -286,13 +291,17 @@ class Overlapping(Turns):
         """The trial that is asked for next when `number` trials are finished, and how many will be finished then."""
         return self._next_asked(), max(number, self._schedule.n_init + max(0, self._asks_at()))
 
-    def _ready(self, counted: int) -> deque[Turn] | None:
-        """Where the next turn is to be taken from, if one is due."""
+    def _take(self, counted: int) -> Turn | None:
+        """The next turn, if one is due."""
         if self._entered >= self._schedule.n_proposals:
             return None
         if self._surplus and counted >= self._entered * self._schedule.n_step:
-            return self._surplus
-        return self._arrived or None
+            return self._surplus.popleft()
+        if self._arrived:
+            first, *others = self._arrived.popleft()
+            self._surplus.extend(others)
+            return first
+        return None
 
     def _black_box_may_run(self, drawn: int) -> bool:
         """drawn: counted trials of the black box so far."""
@@ -316,7 +325,7 @@ class Overlapping(Turns):
 
     def _supplied(self) -> int:
         """Designs that have come, or are asked for."""
-        came = self._entered + len(self._arrived) + len(self._surplus)
+        came = self._entered + sum(map(len, self._arrived)) + len(self._surplus)
         return came + self.under_way * self._asker.per_call
 
     def _asks_at(self) -> int:
@@ -338,8 +347,8 @@ class Overlapping(Turns):
         with self._change:
             self.under_way -= 1
             self._failure = self._failure or failure
-            self._arrived.extend(answer[:1])
-            self._surplus.extend(answer[1:])
+            if answer:
+                self._arrived.append(answer)
             self._change.notify_all()
 
 

@@ -57,10 +57,15 @@ class ProposerSummary:
 
 @dataclass(frozen=True)
 class RecordedTurn:
-    """When a proposal entered a run that is played again: the trial it was asked for, and what was known then."""
+    """A proposer's turn in a run that is played again.
+
+    asked: the trial that it was asked for.  feedback: how many finished trials were known then.
+    proposal: the proposal's id; None where there was a fault instead.
+    """
 
     asked: int
     feedback: int
+    proposal: str | None
 
 
 @dataclass(frozen=True)
