@@ -7,6 +7,7 @@ pymoo's NSGA-II, and our search. Each may take LONGEST seconds; kernels are load
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from peers import Nsga2
@@ -26,7 +27,7 @@ SEEDS = range(3)
 Course = list[tuple[int, float, float]]  # evaluations, seconds, hypervolume
 
 
-class Enough(Exception):
+class EnoughError(Exception):
     pass
 
 
@@ -64,12 +65,10 @@ def study(**settings: object) -> Callable[[Problem, int], Course]:
             if progress.doing == "finished":
                 course.append((progress.number + 1, seconds, progress.hypervolume or 0.0))
             if seconds > LONGEST:
-                raise Enough
+                raise EnoughError
 
-        try:
+        with suppress(EnoughError):
             optimize(problem, n_total=100_000, seed=seed, watch=watch, **settings)  # pyright: ignore[reportArgumentType]
-        except Enough:
-            pass
         return course
 
     return run

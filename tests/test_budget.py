@@ -1,26 +1,97 @@
 """What a run may spend, and what it says about it."""
 
+import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic_ai.messages import ModelResponse
 from pydantic_ai.usage import RequestUsage
 
-from armwright.exceptions import ModelError
+from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm import chat
+from armwright.llm.speaker import CHECK, Question, Reply, Speaker
 from armwright.problem import Problem
+from armwright.proposers.dialogue import Dialogue
 from armwright.proposers.llm import LlmProposer
 from armwright.study import Progress, Run, optimize
 from armwright.task import load_task
 from tests import wires
-from tests.chat_server import ChatServer
+from tests.chat_server import Answer, ChatServer, Request, designer
 
 PROBLEM = Problem(load_task("target-1"))
 
 
-def run(proposer: LlmProposer, out: Path | None = None, n_total: int = 12, seen: list[Progress] | None = None) -> Run:
+def run(
+    proposer: LlmProposer,
+    out: Path | None = None,
+    n_total: int = 12,
+    seen: list[Progress] | None = None,
+    **settings: Any,
+) -> Run:
     watch = None if seen is None else seen.append
-    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch)
+    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch, **settings)
+
+
+def notes(seen: list[Progress]) -> list[str]:
+    return [progress.note for progress in seen if progress.note]
+
+
+class Greedy(Speaker):
+    """Takes all requests that it may, each for 0.1 USD."""
+
+    model = "greedy"
+    origin = "scripted"
+
+    def __init__(self, most: int = 3) -> None:
+        self.most = most
+        self.requests = 0
+        self.asking = threading.Event()
+        self.go_on = threading.Event()
+        self._lock = threading.Lock()
+
+    def begin(self) -> None: ...
+
+    def check(self, question: Question = CHECK) -> Reply:
+        return self.ask(question)
+
+    def ask(self, question: Question) -> Reply:
+        taken = min(self.most, question.most_requests or self.most)
+        with self._lock:
+            self.requests += taken
+        self.asking.set()
+        self.go_on.wait()
+        return Reply("so be it", taken, cost_usd=0.1 * taken)
+
+    def ask_for(self, question: Question, schema: object, read: object) -> Reply:
+        return self.ask(question)
+
+    def cancel(self) -> None: ...
+
+
+class Asking(Dialogue):
+    """Asks from many threads at a time."""
+
+    def ask_together(self, threads: int, before_answers: Callable[[], None]) -> list[ProposalError | str]:
+        came: list[ProposalError | str] = []
+
+        def ask() -> None:
+            try:
+                came.append(self._call(Question("p-0001", "answer", "Which?"), self.speaker.ask, self._over))
+            except ProposalError as fault:
+                came.append(fault)
+
+        asked = [threading.Thread(target=ask) for _ in range(threads)]
+        for thread in asked:
+            thread.start()
+        assert isinstance(self.speaker, Greedy)
+        self.speaker.asking.wait()
+        before_answers()
+        self.speaker.go_on.set()
+        for thread in asked:
+            thread.join()
+        return came
 
 
 @pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (4, 1), (5, 2), (9, 4), (50, 4)])
@@ -30,8 +101,7 @@ def test_after_so_many_calls_it_asks_no_more(chat_server: ChatServer, most: int,
     assert len(chat_server.requests) <= most
     assert sum(trial.source == "llm" for trial in result.trials) == proposals
     assert result.summary["proposer"]["failures"] == ({"budget": 4 - proposals} if proposals < 4 else {})
-    notes = [progress.note for progress in seen if "--max-calls" in progress.note]
-    assert len(notes) == (proposals < 4)  # said once
+    assert sum("--max-calls" in note for note in notes(seen)) == (proposals < 4)  # said once
 
 
 def test_a_refused_answers_calls_count(chat_server: ChatServer) -> None:
@@ -133,3 +203,89 @@ def test_after_so_many_dollars_it_asks_no_more(
     assert proposer["cost_usd"] == pytest.approx(5 * each)
     assert proposer["failures"] == {"budget": 2}
     assert sum("--max-cost" in progress.note for progress in seen) == 1
+
+
+@pytest.mark.parametrize("wrong", [{"max_calls": 0}, {"max_calls": -1}, {"max_cost": -1.0}, {"max_cost": float("nan")}])
+def test_a_budget_that_makes_no_sense_is_refused(chat_server: ChatServer, wrong: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError, match=f"{next(iter(wrong))} = .* is needed"):
+        LlmProposer("m", chat_server.url, **wrong)
+
+
+def test_a_bound_on_cost_holds_without_a_price_too(chat_server: ChatServer) -> None:
+    """However the run was told to go on."""
+    seen: list[Progress] = []
+    result = run(LlmProposer("m", chat_server.url, max_cost=1.0), seen=seen, on_model_failure="continue")
+    assert len(chat_server.requests) == 1  # the check, which showed that there is no price
+    assert result.summary["proposer"]["failures"] == {"budget": 4}
+    assert sum("--max-cost cannot hold" in note for note in notes(seen)) == 1
+
+
+def test_a_bound_on_cost_holds_for_a_run_whose_calls_had_no_price(chat_server: ChatServer, tmp_path: Path) -> None:
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=3)
+    chat_server.requests.clear()
+    seen: list[Progress] = []
+    again = run(LlmProposer("m", chat_server.url, max_cost=1.0), tmp_path / "run", seen=seen)
+    assert not chat_server.requests
+    assert again.summary["proposer"]["failures"] == {"budget": 3}
+    assert sum("--max-cost 1 cannot hold; use --max-calls" in note for note in notes(seen)) == 1
+
+
+@pytest.mark.parametrize("in_flight", [None, 2])
+def test_a_run_whose_budget_is_used_up_goes_on(chat_server: ChatServer, tmp_path: Path, in_flight: int | None) -> None:
+    run(LlmProposer("m", chat_server.url, max_calls=3), tmp_path / "run", n_total=3, in_flight=in_flight)
+    seen: list[Progress] = []
+    proposer = LlmProposer("m", chat_server.url, max_calls=3)
+    again = run(proposer, tmp_path / "run", seen=seen, in_flight=in_flight)
+    assert len(chat_server.requests) == 3
+    assert again.summary["proposer"]["failures"] == {"budget": 3}
+    assert sum("--max-calls 3 is used up" in note for note in notes(seen)) == 1
+
+
+@pytest.mark.parametrize(("status", "kind", "asked"), [(401, "key", 1), (400, "rejected", 4)])
+def test_a_run_that_has_begun_goes_on_without_its_model(
+    chat_server: ChatServer, tmp_path: Path, status: int, kind: str, asked: int
+) -> None:
+    """Said once; where asking again is of no use, nothing more is asked."""
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=3)
+    chat_server.requests.clear()
+    chat_server.answer = lambda request: (status, '{"error": {"message": "not today"}}')
+    seen: list[Progress] = []
+    again = run(LlmProposer("m", chat_server.url), tmp_path / "run", seen=seen)
+    assert again.summary["proposer"]["failures"] == {kind: 3}
+    assert len(chat_server.requests) == asked
+    assert [p.note for p in seen if p.doing == "beginning" and "not today" in p.note]
+    assert sum("not today" in note for note in notes(seen)) == asked
+
+
+@pytest.mark.parametrize("most", [4, 9, 10])
+def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_server: ChatServer, most: int) -> None:
+    def answer(request: Request) -> Answer:
+        return "no design" if "response_format" in request else designer(request)
+
+    chat_server.answer = answer
+    run(LlmProposer("m", chat_server.url, answer="one-step", max_calls=most), n_total=24, in_flight=4)
+    assert len(chat_server.requests) == most
+
+
+@pytest.mark.parametrize("budget", [{"max_calls": 10}, {"max_cost": 1.05}])
+@pytest.mark.parametrize("threads", [3, 4, 8])
+def test_questions_beside_each_other_share_one_budget(budget: dict[str, Any], threads: int) -> None:
+    speaker = Greedy()
+    came = Asking(speaker, "asking", **budget).ask_together(threads, lambda: None)
+    assert speaker.requests == min(10, 3 * threads)
+    assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["budget"] * max(0, threads - 4)
+
+
+def test_what_was_set_aside_and_not_taken_is_there_for_others() -> None:
+    speaker = Greedy(most=1)
+    came = Asking(speaker, "asking", max_calls=7).ask_together(9, lambda: None)
+    assert speaker.requests == 7
+    assert came.count("so be it") == 7
+
+
+def test_who_waits_for_the_budget_of_others_is_let_go_at_the_end() -> None:
+    speaker = Greedy()
+    dialogue = Asking(speaker, "asking", max_calls=3)
+    came = dialogue.ask_together(4, dialogue.cancel)
+    assert speaker.requests == 3
+    assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["cancelled"] * 3

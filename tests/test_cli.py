@@ -338,19 +338,26 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
     assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
 
 
-def test_ctrl_c_ends_the_calls_under_way(chat_server: ChatServer, in_folder: Path) -> None:
-    """While the server holds its answers back, the process ends and says how to go on."""
+@pytest.mark.parametrize("overlap", [[], ["--overlap"]], ids=["waiting", "overlap"])
+@pytest.mark.parametrize("refused", [0, 1])
+def test_ctrl_c_ends_the_calls_under_way(
+    chat_server: ChatServer, in_folder: Path, overlap: list[str], refused: int
+) -> None:
+    """While the server holds its answers back, the process ends, keeps what was paid for, and says how to go on."""
     released, asked = threading.Event(), threading.Event()
 
     def answer(request: Request) -> Answer:
-        if len(chat_server.requests) > 1:
+        n = len(chat_server.requests)  # a check, the thoughts, and perhaps a design that is refused
+        if n == 3 and refused:
+            return "no design"
+        if n > 2:
             asked.set()
             released.wait(60)
         return designer(request)
 
     chat_server.answer = answer
     command = [sys.executable, "-m", "armwright", "optimize", "target-1", "--model", "m", "--base-url", chat_server.url]
-    process = subprocess.Popen([*command, "--overlap"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen([*command, *overlap], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert asked.wait(60)
     process.send_signal(signal.SIGINT)
     output, errors = process.communicate(timeout=60)
@@ -359,7 +366,8 @@ def test_ctrl_c_ends_the_calls_under_way(chat_server: ChatServer, in_folder: Pat
     assert (process.returncode, errors) == (130, "")
     assert "Go on with:" in output
     transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
-    assert len(transcript) == 1  # the check; a call that was ended is no call
+    kept = [(call["step"], call["requests"], call["fault"]) for call in map(json.loads, transcript)]
+    assert kept == [("check", 1, None), ("reasoning", 1, None), ("parameters", 1, "cancelled")][: 2 + refused]
 
 
 @pytest.mark.parametrize("width", [60, 120])

@@ -93,14 +93,14 @@ def test_a_search_beats_a_study_of_as_many_seconds(done: FrontRun) -> None:
 
 
 def test_same_seed_same_front_and_resumed_equals_uninterrupted(done: FrontRun, tmp_path: Path) -> None:
-    class Stop(Exception):
+    class StopError(Exception):
         pass
 
     def stop(progress: FrontProgress) -> None:
         if progress.evaluations >= 3000:
-            raise Stop
+            raise StopError
 
-    with pytest.raises(Stop):
+    with pytest.raises(StopError):
         find_front(PROBLEM, budget="6000", seed=1, out=tmp_path / "run", watch=stop)
     assert read_summary(tmp_path / "run") is None
     run = find_front(PROBLEM, budget="6000", seed=1, out=tmp_path / "run")

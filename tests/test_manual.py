@@ -8,10 +8,11 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from armwright.exceptions import AnswerPendingError, FailureError
+from armwright.exceptions import AnswerPendingError, FailureError, SettingsError
 from armwright.llm import people
 from armwright.llm.transcript import Transcript
 from armwright.preview import preview_after
@@ -35,8 +36,8 @@ JSON = json.dumps({**GOOD_DESIGN, "link_1": 0.25})
 Answering = Callable[[dict[str, tuple[str, str]]], None]
 
 
-def run(proposer: ManualProposer | ReplayProposer, out: Path | None, n_total: int = 6) -> Run:
-    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=2, out=out)
+def run(proposer: ManualProposer | ReplayProposer, out: Path | None, n_total: int = 6, **settings: Any) -> Run:
+    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=2, out=out, **settings)
 
 
 def pending(folder: Path, out: Path, **how: str) -> AnswerPendingError:
@@ -168,6 +169,23 @@ def test_several_designs_and_what_is_expected_of_them(tmp_path: Path) -> None:
     told = waits.question.read_text(encoding="utf-8")
     assert "EXPECTED: (1.250, 3.500)" in told
     assert "REASON: a shoulder in the middle" in told
+
+
+def test_only_files_that_wait_are_announced(tmp_path: Path) -> None:
+    """Neither questions that lie answered, nor trials for which a design lies ready."""
+    proposer = ManualProposer(tmp_path / "ask", proposals=2, wait=False)
+    notes: list[str] = []
+    for text in (LINES + LINES.replace("0.01", "0.02"), ""):
+        with pytest.raises(AnswerPendingError) as waits:
+            run(proposer, tmp_path / "run", n_total=12, watch=lambda progress: notes.append(progress.note))
+        waits.value.answer.write_text(text, encoding="utf-8")
+    files = [(tmp_path / "ask" / f"{n}-prompt.md", tmp_path / "ask" / f"{n}-answer.md") for n in ("004", "010")]
+    assert [note for note in notes if note] == [f"{asked} waits for your answer in {answer}" for asked, answer in files]
+
+
+def test_people_are_not_asked_while_trials_go_on(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="--overlap does not go with the proposer manual"):
+        run(ManualProposer(tmp_path / "ask"), None, in_flight=1)
 
 
 def test_a_folder_with_what_is_left_of_another_run_is_refused(tmp_path: Path) -> None:

@@ -105,6 +105,7 @@ def test_an_answer_enters_as_the_next_trial_after_it_came() -> None:
         "in_flight": 1,
         "ratio_planned": 0.2,
         "ratio": 0.2,
+        "ratio_with_failures": 0.2,
         "feedback_age": {"mean": 2.5, "max": 3},
     }
 
@@ -161,6 +162,75 @@ def test_a_failed_question_is_a_black_box_trial_in_its_turn() -> None:
     assert [trial.asked or trial.number for trial in run.trials if trial.fault] == [9]
     assert Counter(trial.source for trial in run.trials[N_INIT:]) == {"bbo": 17, "held": 3}
     assert run.summary["proposer"]["failures"] == {"timeout": 1}
+    overlap = run.summary["proposer"]["overlap"]  # a failure is a turn, and no proposal
+    assert (overlap["ratio_planned"], overlap["ratio"], overlap["ratio_with_failures"]) == (0.2, 0.15, 0.2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("in_flight", "per_call"), [(1, 3), (2, 3), (4, 2)])
+def test_of_several_designs_all_but_the_first_wait_for_their_blocks(seed: int, in_flight: int, per_call: int) -> None:
+    proposer = Held(per_call)
+    releasing = Releasing(proposer, seed)
+    releasing.start()
+    run = search(proposer, 4, 36, in_flight)
+    releasing.over.set()
+    entered = [trial for trial in run.trials if trial.proposal]
+    assert len(entered) == 9
+    asked: list[int] = []
+    for place, trial in enumerate(entered):
+        call, _, design = str(trial.proposal).partition(".")
+        assert int(design) == asked.count(int(call[5:]))  # in their order
+        asked.append(int(call[5:]))
+        assert design == "0" or trial.number >= N_INIT + 4 * place
+
+
+def test_a_fault_that_ends_the_asking_is_told_once() -> None:
+    """However many questions under way meet it."""
+
+    class Keyless(Proposer):
+        name = "keyless"
+        together = threading.Barrier(3)
+
+        def propose(self, history: History, seed: int, number: int) -> Proposal:
+            self.together.wait(60)
+            raise ProposalError("key", "the key is wrong", final=True)
+
+    notes: list[str] = []
+    run = search(Keyless(), in_flight=3, watch=lambda progress: notes.append(progress.note))
+    assert run.summary["proposer"]["failures"] == {"key": 4}
+    told = "the key is wrong; no more questions are asked in this session"
+    assert [note for note in notes if note] == [told]
+
+
+def test_what_came_before_an_interrupt_is_kept() -> None:
+    """The study waits a moment for the threads that keep it."""
+
+    class Keeping(Proposer):
+        name = "keeping"
+
+        def __init__(self) -> None:
+            self.asked, self.cancelled, self.kept = threading.Event(), threading.Event(), threading.Event()
+
+        def propose(self, history: History, seed: int, number: int) -> Proposal:
+            self.asked.set()
+            self.cancelled.wait(60)
+            self.kept.wait(0.1)  # to keep it takes a moment
+            self.kept.set()
+            raise ProposalError("cancelled", "the study is over")
+
+        def cancel(self) -> None:
+            self.cancelled.set()
+
+    proposer = Keeping()
+
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == N_INIT:
+            proposer.asked.wait(60)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        search(proposer, watch=interrupt)
+    assert proposer.kept.is_set()
 
 
 def test_an_error_in_a_question_is_the_studys() -> None:

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,9 @@ from armwright.llm.transcript import Call, Transcript
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposer
-from armwright.study import Run, optimize
+from armwright.study import Progress, Run, optimize
 from armwright.task import load_task
-from tests.chat_server import ChatServer
+from tests.chat_server import Answer, ChatServer, Request, designer
 from tests.fixed import SIX_AXIS
 
 PROBLEM = Problem(load_task("target-1"))
@@ -125,6 +126,51 @@ def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: P
     for call in calls:
         number = call.proposal.rpartition("-")[2]
         assert shown("--after", "run", "--number", number)[0] == call.prompt
+
+
+def interrupted(out: Path, stop: int, server: ChatServer, in_flight: int | None) -> None:
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == stop:
+            raise KeyboardInterrupt
+
+    proposer = LlmProposer("test-model", server.url)
+    with pytest.raises(KeyboardInterrupt):
+        optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=9, seed=5, out=out, in_flight=in_flight,
+                 watch=interrupt)  # fmt: skip
+
+
+def test_after_an_interrupt_what_is_printed_is_what_is_sent_next(chat_server: ChatServer, in_folder: Path) -> None:
+    """Two questions were under way, for trials 4 and 7; none was answered."""
+    answered = threading.Event()
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:
+            answered.wait(60)
+        return designer(request)
+
+    chat_server.answer = answer
+    interrupted(in_folder / "run", 5, chat_server, 2)
+    answered.set()
+    told, words = shown("--after", "run")
+    assert words.endswith("tokens; for trial 4\n")
+    run(in_folder / "run", 9, LlmProposer("test-model", chat_server.url), in_flight=2)
+    assert told == next(call.prompt for call in asked(in_folder / "run") if call.proposal == "llm-0004")
+
+
+@pytest.mark.parametrize("in_flight", [None, 1])
+def test_where_only_the_thoughts_have_come_their_parameters_are_asked_for_next(
+    chat_server: ChatServer, in_folder: Path, in_flight: int | None
+) -> None:
+    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url), in_flight=in_flight)
+    for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 2)):  # as a kill after the first answer leaves it
+        file = in_folder / "run" / name
+        file.write_text("".join(file.read_text().splitlines(keepends=True)[:lines]))
+    told, words = shown("--after", "run")
+    assert words.endswith("tokens; for trial 4\n")
+    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url), in_flight=in_flight)
+    calls = Transcript(in_folder / "run" / "transcripts.jsonl").calls
+    assert told == next(call.prompt for call in calls if (call.proposal, call.step) == ("llm-0004", "parameters"))
+    assert shown("--after", "run", "--number", "4")[0] == asked(in_folder / "run")[0].prompt
 
 
 def test_variables() -> None:

@@ -2,6 +2,9 @@
 
 import json
 import shutil
+import threading
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,7 @@ import pytest
 from armwright.exceptions import ReplayError, SettingsError
 from armwright.llm.transcript import Transcript
 from armwright.problem import Problem
+from armwright.proposers.asking import Asking
 from armwright.proposers.choice import Wishes, choose_proposer
 from armwright.proposers.llm import LlmProposer
 from armwright.proposers.replay import ReplayProposer
@@ -78,6 +82,41 @@ def test_an_overlapped_run_is_replayed_with_its_arrivals(varied: ChatServer, tmp
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
 
+def test_late_answers_with_several_designs_are_replayed_when_they_came(chat_server: ChatServer, tmp_path: Path) -> None:
+    """The first two calls are answered only when five black-box trials have gone by."""
+    late = threading.Event()
+    designs = iter(PROBLEM.space.sample(50, 3))
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:
+            late.wait(60)
+        answered = [{**next(designs).params, "expected_position_error": 1, "expected_torque": 2} for _ in range(2)]
+        return json.dumps({"designs": answered}) if "response_format" in request else "ready"
+
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == 8:
+            late.set()
+
+    chat_server.answer = answer
+    asking = {"answer": "one-step", "proposals": 2, "memory": "own"}
+    settings = {"n_total": 24, "in_flight": 2}
+    run = recorded(chat_server, tmp_path / "first", asking, watch=watch, **settings)
+    proposals = [trial for trial in run.trials if trial.proposal]
+    assert len(proposals) == 8
+    assert proposals[0].number - (proposals[0].feedback or 0) >= 5
+    assert len({trial.asked or trial.number for trial in proposals}) == 4
+    chat_server.requests.clear()
+    again = optimize(
+        PROBLEM,
+        proposer=ReplayProposer(tmp_path / "first", strict=True),
+        out=tmp_path / "again",
+        **{**SETTINGS, **settings},
+    )
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+    assert again.summary["proposer"]["overlap"] == run.summary["proposer"]["overlap"]
+    assert not chat_server.requests
+
+
 def test_failures_are_replayed_too(varied: ChatServer, tmp_path: Path) -> None:
     good = varied.answer
     varied.answer = lambda request: good(request) if len(varied.requests) not in (4, 5) else (400, "{}")
@@ -94,30 +133,123 @@ def test_a_spent_budget_is_replayed_too(varied: ChatServer, tmp_path: Path) -> N
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
 
-@pytest.mark.parametrize("stop", [4, 6, 10])
-def test_a_replay_that_was_stopped_goes_on(varied: ChatServer, tmp_path: Path, stop: int) -> None:
-    recorded(varied, tmp_path / "first")
+@pytest.fixture
+def in_pairs(chat_server: ChatServer) -> ChatServer:
+    """Every answer has two designs."""
+    designs = iter(PROBLEM.space.sample(50, 3))
 
-    def interrupt(progress: Progress) -> None:
+    def answer(request: Request) -> Answer:
+        if "response_format" not in request:
+            return designer(request)
+        return json.dumps({"designs": [dict(next(designs).params) for _ in range(2)]})
+
+    chat_server.answer = answer
+    return chat_server
+
+
+def interrupted_at(stop: int) -> Callable[[Progress], None]:
+    def watch(progress: Progress) -> None:
         if progress.doing == "finished" and progress.number == stop:
             raise KeyboardInterrupt
 
-    for watch in (interrupt, None):
-        try:
+    return watch
+
+
+@pytest.mark.parametrize("stop", [4, 6, 10])
+def test_a_replay_that_was_stopped_goes_on(in_pairs: ChatServer, tmp_path: Path, stop: int) -> None:
+    """Within a call that gave two designs, too: no recorded call is played twice."""
+    first = recorded(in_pairs, tmp_path / "first", {"proposals": 2})
+    for watch in (interrupted_at(stop), None):
+        with suppress(KeyboardInterrupt):
             optimize(
                 PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", watch=watch, **SETTINGS
             )
-        except KeyboardInterrupt:
-            continue
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
+    played = [call for call in Transcript(tmp_path / "again" / "transcripts.jsonl").calls if call.proposal]
+    assert len(played) == first.summary["proposer"]["calls"] - 1  # the check
 
 
-def test_a_transcript_alone_is_enough(varied: ChatServer, tmp_path: Path) -> None:
+def test_beyond_the_end_of_its_record_proposals_are_missing(varied: ChatServer, tmp_path: Path) -> None:
+    """Counted, told once, and the run does not pass for the model's."""
     recorded(varied, tmp_path / "first")
+    notes: list[str] = []
+    longer = {**SETTINGS, "n_total": 20}
+    for settings in (SETTINGS, longer):
+        again = optimize(
+            PROBLEM,
+            proposer=ReplayProposer(tmp_path / "first"),
+            out=tmp_path / "again",
+            watch=lambda progress: notes.append(progress.note),
+            **settings,
+        )
+    assert lines(tmp_path / "again")[:16] == lines(tmp_path / "first")
+    assert [trial.number for trial in again.trials if trial.fault == "missing"] == [16, 19, 22]
+    assert [note for note in notes if note] == ["the record ends with trial 15"]
+    assert again.summary["proposer"]["failures"] == {"missing": 3}
+    assert again.summary["proposer"]["flagged"]
+
+
+@pytest.mark.parametrize("in_flight", [None, 2])
+def test_what_a_record_that_was_cut_short_still_owes_is_missing(
+    varied: ChatServer, tmp_path: Path, in_flight: int | None
+) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        recorded(varied, tmp_path / "first", watch=interrupted_at(8), in_flight=in_flight)
+    there = len(lines(tmp_path / "first"))
+    again = optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
+    assert lines(tmp_path / "again")[:there] == lines(tmp_path / "first")
+    turns = [trial for trial in again.trials if trial.proposal or trial.fault]
+    assert len(turns) == 4
+    assert all(trial.fault == "missing" for trial in turns if trial.number >= there)
+
+
+@pytest.mark.parametrize(
+    "asking",
+    [{}, {"answer": "one-step"}, {"proposals": 2}, {"answer": "one-step", "proposals": 2}],
+)
+def test_a_transcript_alone_is_enough(in_pairs: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
+    """The form of the answer and the number of designs are seen in its calls."""
+    if "proposals" not in asking:
+        in_pairs.answer = designer
+    recorded(in_pairs, tmp_path / "first", asking)
     alone = tmp_path / "alone.jsonl"
     shutil.copy(tmp_path / "first" / "transcripts.jsonl", alone)
     optimize(PROBLEM, proposer=ReplayProposer(alone, strict=True), out=tmp_path / "again", **SETTINGS)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
+
+
+def test_what_a_transcript_cannot_say_is_taken_from_the_wishes(varied: ChatServer, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.md"
+    mine.write_text('{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}')
+    recorded(varied, tmp_path / "first", {"prompt": str(mine), "memory": "own"})
+    shutil.copy(tmp_path / "first" / "transcripts.jsonl", tmp_path / "alone.jsonl")
+    for record in ("first", "alone.jsonl"):
+        wishes = Wishes(f"replay:{tmp_path / record}", asking=Asking(str(mine), "own"), replay_strict=True)
+        again = optimize(PROBLEM, proposer=choose_proposer(wishes).proposer, **SETTINGS)
+        assert again.summary["proposer"]["failures"] == {}
+
+
+@pytest.mark.parametrize("alone", [False, True])
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        (Asking(memory="own"), "recorded with memory none; leave out --memory own"),
+        (Asking(answer="one-step"), "recorded with answer two-step; leave out --answer one-step"),
+        (Asking(proposals=4), "recorded with proposals 1; leave out --proposals 4"),
+        (Asking("minus"), "recorded with prompt plus; leave out --prompt minus"),
+    ],
+)
+def test_wishes_that_contradict_the_record_are_refused(
+    chat_server: ChatServer, tmp_path: Path, wish: Asking, words: str, alone: bool
+) -> None:
+    recorded(chat_server, tmp_path / "first", n_total=1)
+    if alone:
+        (tmp_path / "first" / "config.yaml").unlink()
+    if alone and (wish.prompt, wish.memory) != ("plus", "none"):  # which nothing in the transcript says
+        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", asking=wish))
+        return
+    with pytest.raises(SettingsError, match=words):
+        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", asking=wish))
 
 
 def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatServer, tmp_path: Path) -> None:

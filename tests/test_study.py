@@ -115,6 +115,49 @@ def test_a_proposer_that_fails_from_the_first_is_marked_counted_and_flagged() ->
     assert (proposer["failures"], proposer["fallback_share"], proposer["flagged"]) == ({"timeout": 2}, 1.0, True)
 
 
+class Odd(Proposer):
+    """Gives no design at all, or one that no design space takes."""
+
+    name = "odd"
+
+    def __init__(self, *values: float) -> None:
+        self.values = values
+
+    def propose(self, history: History, seed: int, number: int) -> list[Proposal]:
+        design = history.problem.space.sample(1, seed)[0]
+        return [
+            Proposal(Design({**design.params, "link_1": value}), f"odd-{number}.{i}")
+            for i, value in enumerate(self.values)
+        ]
+
+
+@pytest.mark.parametrize("in_flight", [None, 2])
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [((), "the proposer gave no design"), ((9.0,), "link_1 = 9 m is outside 0.03 <= link_1 <= 0.3 m")],
+)
+def test_an_answer_without_a_usable_design_becomes_a_black_box_trial(
+    values: tuple[float, ...], words: str, in_flight: int | None
+) -> None:
+    notes: list[str] = []
+    run = optimize(
+        PROBLEM,
+        proposer=Odd(*values),
+        n_init=5,
+        n_step=4,
+        n_total=8,
+        in_flight=in_flight,
+        watch=lambda progress: notes.append(progress.note),
+    )
+    assert run.summary["proposer"]["failures"] == {"answer": 2}
+    assert [note for note in notes if note] == [words] * 2
+
+
+def test_of_several_designs_the_usable_ones_count() -> None:
+    run = optimize(PROBLEM, proposer=Odd(0.2, 9.0, 0.1), n_init=5, n_step=4, n_total=12)
+    assert [trial.fault or trial.proposal for trial in run.trials[5::4]] == ["odd-5.0", "answer", "odd-5.2"]
+
+
 def nsga2(seed: int) -> BaseSampler:
     return NSGAIISampler(population_size=5, seed=seed)
 

@@ -214,12 +214,12 @@ def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
             "--replay-strict makes that an error"
         )
     overlap = proposer["overlap"]
-    if overlap is not None and overlap["feedback_age"] is not None:
+    if overlap is not None:
         age = overlap["feedback_age"]
+        feedback = "" if age is None else f"; feedback {age['mean']:.1f} trials old on average, {age['max']} at most"
         console.print(
-            f"overlap: {overlap['ratio']:.3f} of the trials were the proposer's (planned: "
-            f"{overlap['ratio_planned']:.3f}); its feedback was {age['mean']:.1f} trials old on average, "
-            f"{age['max']} at most"
+            f"overlap: {overlap['ratio']:.1%} of the trials were proposals (planned: "
+            f"{overlap['ratio_planned']:.1%}){feedback}"
         )
 
 

@@ -70,7 +70,14 @@ class RunFolderError(FailureError):
 
 
 class ModelError(FailureError):
-    """A language model that cannot be used."""
+    """A language model that cannot be used.
+
+    final: the kind of fault, where asking again in this session is of no use (a wrong key, a spent quota).
+    """
+
+    def __init__(self, message: str, *, final: str | None = None) -> None:
+        super().__init__(message)
+        self.final = final
 
 
 class ReplayError(FailureError):

@@ -113,7 +113,10 @@ def find_front(
     known = _known(problem, begin_with)  # before a folder is made
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
-        rows, origin = known or _proposed(problem, begin_with, seed, None if folder is None else folder.path)
+        if known is None:
+            assert isinstance(begin_with, Proposer)
+            known = _proposed(problem, begin_with, seed, None if folder is None else folder.path)
+        rows, origin = known
         config = RunConfig(
             task=problem.task,
             space=problem.space,
@@ -232,7 +235,7 @@ class _Search:
         return FrontRun(history, self.config, there, path, resumed)
 
 
-def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
+def _reference_point(problem: Problem, seed: int) -> tuple[float, float]:
     """For a task that states none: from a few random designs."""
     return default_reference_point(problem.evaluate(problem.space.sample(N_SAMPLE, seed)))
 

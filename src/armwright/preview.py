@@ -1,26 +1,22 @@
 """What would be sent to a model, without sending it."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import DesignError, SettingsError
+from armwright.exceptions import SettingsError
 from armwright.history import History
-from armwright.llm.answer import answer_schema, read_text
-from armwright.llm.prompt import Prompt, estimated_tokens, load_prompt
-from armwright.llm.transcript import Transcript
+from armwright.llm.prompt import estimated_tokens, load_prompt
+from armwright.llm.recording import Recording
 from armwright.problem import Problem
-from armwright.proposers.asking import ANSWERS, LAST_STEPS, TRANSCRIPTS, Asking
+from armwright.proposers.asking import Asking, AskingProposer
 from armwright.proposers.replay import recorded_asking
 from armwright.run_folder import RunConfig, read_run
-from armwright.seeding import derived_seed
 from armwright.space import DesignSpace
 from armwright.study import optimize
 from armwright.task import Task
-from armwright.turns import PROPOSING, Schedule
+from armwright.turns import Asker, Schedule, asking_turns
 
 
 @dataclass(frozen=True)
@@ -39,8 +35,9 @@ class Preview:
 
 def preview(problem: Problem, asking: Asking, *, n_init: int = 10, seed: int = 0) -> Preview:
     """The first prompt of a new run."""
-    run = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed)
-    return _rendered(run.history.before(n_init), n_init, seed, load_prompt(asking.prompt), asking, "llm")
+    history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
+    proposer = AskingProposer(Recording((), Path()), asking, "llm")
+    return _preview(proposer, problem, n_init, proposer.prompt_for(history, Asker(proposer, seed).seed(n_init)))
 
 
 def preview_after(
@@ -65,46 +62,28 @@ def preview_after(
     own, asking = recorded_asking(config)
     asking = replace(asking, **wishes)
     prompt = load_prompt(asking.prompt) if own is None or "prompt" in wishes else own
-    name = (config.method.proposer or {}).get("name", "llm") if "prompt" in (config.method.proposer or {}) else "llm"
-    asked = _asked(run)
+    settings = config.study.proposer or {}
+    proposer = AskingProposer(
+        Recording((), run), asking, settings["name"] if "prompt" in settings else "llm", prompt=prompt
+    )
+    proposer.look(run)
+    asker = Asker(proposer, config.seed)
     if number is not None:
-        return _rendered(_then(run, config, history, asked, number), number, config.seed, prompt, asking, name)
-    number, note = _next(config, history, asked, _unused(run, history, asking.proposals))
-    return replace(_rendered(history, number, config.seed, prompt, asking, name), note=note)
+        then = _then(run, config, history, proposer.asked(), number)
+        return _preview(proposer, history.problem, number, proposer.prompt_for(then, asker.seed(number)))
+    turns = asking_turns(asker, _schedule(config), lambda: history, config.study.in_flight)
+    number, finished = turns.upcoming(len(history))
+    # What is to be otherwise than in the run is to be seen, even where the run's own answer waits for its second call.
+    if wishes:
+        text = proposer.prompt_for(history, asker.seed(number))
+    else:
+        text = proposer.question(history, asker.seed(number), number).prompt
+    note = _note(finished - len(history), len(proposer.unused(history)))
+    return replace(_preview(proposer, history.problem, number, text), note=note)
 
 
-def _rendered(history: History, number: int, seed: int, prompt: Prompt, asking: Asking, name: str) -> Preview:
-    form = ANSWERS[asking.answer]
-    text = prompt.render(
-        history,
-        derived_seed(seed, PROPOSING, number),
-        memory=asking.memory,
-        name=name,
-        proposals=asking.proposals,
-        form=form,
-    )
-    schema = answer_schema(
-        history.problem, reasoning=form == "schema", expected=asking.memory == "own", proposals=asking.proposals
-    )
-    return Preview(number, text, estimated_tokens(text), schema)
-
-
-def _asked(run: Path) -> dict[int, int]:
-    """The trials that proposals were asked for, and how many finished trials were known then."""
-    calls = Transcript(run / TRANSCRIPTS, read_only=True).calls
-    return {int(call.proposal.rpartition("-")[2]): call.known for call in calls if call.proposal}
-
-
-def _unused(run: Path, history: History, proposals: int) -> int:
-    """Designs of earlier calls that are still to be evaluated."""
-    used = {trial.proposal for trial in history}
-    found: set[str] = set()
-    for call in Transcript(run / TRANSCRIPTS, read_only=True).calls:
-        if call.step in LAST_STEPS and call.fault is None:
-            with suppress(DesignError):
-                n = len(read_text(call.answer, history.problem, proposals))
-                found |= {call.proposal} if n == 1 else {f"{call.proposal}.{i}" for i in range(1, n + 1)}
-    return len(found - used)
+def _preview(proposer: AskingProposer, problem: Problem, number: int, text: str) -> Preview:
+    return Preview(number, text, estimated_tokens(text), proposer.schema(problem))
 
 
 def _then(run: Path, config: RunConfig, history: History, asked: Mapping[int, int], number: int) -> History:
@@ -122,20 +101,14 @@ def _then(run: Path, config: RunConfig, history: History, asked: Mapping[int, in
     raise SettingsError(f"--number {number}: the proposals of {run} were asked for trials {numbers}")
 
 
-def _next(config: RunConfig, history: History, asked: Mapping[int, int], unused: int) -> tuple[int, str]:
-    """The trial that will be asked for next, and what comes before it."""
-    schedule = _schedule(config)
-    number = next(n for n in count(max(len(history), schedule.n_init)) if schedule.begins_block(n))
-    if config.method.in_flight is not None:  # asked ahead of its trial
-        number = next(n for n in count(number, schedule.n_step) if n not in asked)
-    number += unused * schedule.n_step
-    before = number - len(history)
+def _note(before: int, unused: int) -> str:
+    """What comes before the next question."""
     if not before:
-        return number, ""
+        return ""
     trials = "1 trial comes" if before == 1 else f"{before} trials come"
     designs = f", {unused} of them of the calls so far" if unused else ""
-    return number, f"{trials} before it{designs}, and will be in it"
+    return f"{trials} before it{designs}, and will be in it"
 
 
 def _schedule(config: RunConfig) -> Schedule:
-    return Schedule(config.method.n_init, config.method.n_step, config.method.n_total)
+    return Schedule(config.study.n_init, config.study.n_step, config.study.n_total)

@@ -60,7 +60,7 @@ def refine_members(history: History, members: Sequence[FrontMember], seed: int, 
     """The designs of `members`, refined side by side; seed: the run's."""
     problem = history.problem
     values = np.array([member.values for member in members])
-    scale = values.max(axis=0) if history.reference_point is None else np.array(history.reference_point)
+    scale = history.reference_point or values.max(axis=0).tolist()
     return refine(
         problem.space.parameters,
         problem.evaluate_matrix,

@@ -232,14 +232,20 @@ def _proposer_record(history: History, config: RunConfig, proposer: ProposerSumm
 
 
 def _overlap_record(history: History, config: RunConfig, turns: Sequence[FinishedTrial]) -> dict[str, Any] | None:
-    """With --overlap: the proposals' share of the counted trials, and how old [trials] what they knew was."""
-    if config.study.in_flight is None:
+    """With --overlap: which share of the counted trials proposals were, and how old [trials] what they knew was.
+
+    ratio_with_failures: the share of the proposer's turns, those included that became black-box trials.
+    """
+    method = config.study
+    if method.in_flight is None:
         return None
     ages = [trial.number - trial.feedback if trial.feedback is not None else 0 for trial in turns if trial.proposal]
+    counted = max(1, len(history) - history.n_init)
     return {
-        "in_flight": config.study.in_flight,
-        "ratio_planned": 1.0 / config.study.n_step,
-        "ratio": round(len(turns) / max(1, len(history) - history.n_init), 4),
+        "in_flight": method.in_flight,
+        "ratio_planned": round(-(-method.n_total // method.n_step) / method.n_total, 4),
+        "ratio": round(len(ages) / counted, 4),
+        "ratio_with_failures": round(len(turns) / counted, 4),
         "feedback_age": {"mean": round(sum(ages) / len(ages), 2), "max": max(ages)} if ages else None,
     }
 

@@ -24,7 +24,7 @@ from armwright.results import discard_results, read_summary, results_are_there, 
 from armwright.run_folder import Method, RunConfig, RunFolder, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_name
 from armwright.space import Design
-from armwright.turns import Alternating, Asker, Nobody, Overlapping, Recorded, Schedule, Turn, Turns
+from armwright.turns import Asker, Nobody, Recorded, Schedule, Turn, Turns, asking_turns, past_turns
 from armwright.verification import verify_front
 
 LARGEST = 2**31 - 1
@@ -104,7 +104,8 @@ def optimize(
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
     verify: whether the front is verified where results are written (`verification.py`).
-    on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials.
+    on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials; a run
+        that has begun always goes on.
     """
     if on_model_failure not in ON_MODEL_FAILURE:
         raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
@@ -112,6 +113,8 @@ def optimize(
         proposer = choose_proposer(proposer).proposer
     elif isinstance(proposer, type):
         raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
+    if in_flight is not None and proposer is not None and not proposer.overlaps:
+        raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
     config = RunConfig(
         task=problem.task,
         space=problem.space,
@@ -149,6 +152,8 @@ class Study:
         self.proposer = proposer
         self.folder = folder
         self.watch = watch
+        overlap = self.method.in_flight is not None
+        self._asker = None if proposer is None else Asker(proposer, config.seed, None if overlap else self._asking)
         self.black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives))
         self.trials = folder.open_trials(problem.space) if folder is not None else []
         self.black_box.restore(self.trials)
@@ -179,7 +184,8 @@ class Study:
     def _check(self, on_model_failure: str) -> None:
         """Says what the proposals will take, and makes sure that they are to be had."""
         assert self.proposer is not None
-        due = self._schedule.n_proposals - sum(turn is not None for turn in map(_past_turn, self.trials))
+        assert self._asker is not None
+        due = self._schedule.n_proposals - len(past_turns(self._history()))
         if due <= 0:
             return
         forecast = self.proposer.forecast(self.problem, due)
@@ -188,28 +194,29 @@ class Study:
         try:
             self.proposer.check()
         except ModelError as fault:
-            if on_model_failure == "stop":
+            if on_model_failure == "stop" and not self.trials:
                 raise
-            self._report("beginning", len(self.trials), self.proposer.name, note=str(fault))
+            words = "the run goes on"
+            if fault.final is not None:
+                self._asker.give_up(fault.final)
+                words = "no questions are asked in this session"
+            self._report("beginning", len(self.trials), self.proposer.name, note=f"{fault}; {words}")
+
+    def _asking(self, number: int) -> None:
+        assert self.proposer is not None
+        self._report("proposing", number, self.proposer.name, note=self.proposer.announce(number))
 
     @property
     def _schedule(self) -> Schedule:
         return Schedule(self.method.n_init, self.method.n_step, self.method.n_total)
 
     def _turns(self) -> Turns:
-        if self.proposer is None:
+        if self._asker is None or self.proposer is None:
             return Nobody()
-        asker = Asker(self.proposer, self.config.seed)
-        recorded = self.proposer.recorded_turns()
-        if recorded is not None:
-            return Recorded(asker, recorded, self._history)
-        unused = [Turn(p.asked, p.known or 0, p, note=p.note) for p in self.proposer.unused(self._history())]
-        if self.method.in_flight is None:
-            return Alternating(asker, self._schedule, self._history, unused)
-        past = [turn for turn in map(_past_turn, self.trials) if turn is not None]
-        return Overlapping(
-            asker, self._schedule, self._history, unused, past, self.method.in_flight, self.proposer.per_call
-        )
+        record = self.proposer.record()
+        if record is not None:
+            return Recorded(self._asker, record, self._schedule, self._history)
+        return asking_turns(self._asker, self._schedule, self._history, self.method.in_flight)
 
     def _begin(self) -> None:
         """Before the first new trial: results of fewer trials are taken away, other versions are noted."""
@@ -224,8 +231,6 @@ class Study:
 
     def _step(self, number: int, turns: Turns) -> None:
         started = time.perf_counter()
-        if self.proposer is not None and self._schedule.begins_block(number):
-            self._report("proposing", number, self.proposer.name, turns, note=self.proposer.announce(number))
         turn = turns.next(number)
         proposed = time.perf_counter()
         refinement = self._refinement(number) if turn is None else None
@@ -367,14 +372,6 @@ def _finished(
         asked=None if turn.asked == number else turn.asked,
         feedback=None if turn.feedback == number else turn.feedback,
     )
-
-
-def _past_turn(trial: FinishedTrial) -> Turn | None:
-    """The proposer's turn that a finished trial was."""
-    if trial.proposal is None and trial.fault is None:
-        return None
-    asked = trial.number if trial.asked is None else trial.asked
-    return Turn(asked, trial.number if trial.feedback is None else trial.feedback, fault=trial.fault)
 
 
 def whole(name: str, value: Any, least: int) -> int:

@@ -6,18 +6,21 @@ Recorded      a recorded run is played again: its proposals enter when they did
 """
 
 import threading
+import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import count, groupby
 from typing import Protocol
 
-from armwright.exceptions import ProposalError
-from armwright.history import History
-from armwright.proposers.proposer import Proposal, Proposer, RecordedTurn
+from armwright.exceptions import DesignError, ProposalError
+from armwright.history import FinishedTrial, History
+from armwright.proposers.proposer import Proposal, Proposer, Record
 from armwright.seeding import derived_seed
 
 PROPOSING = 2  # the place of the proposals' seeds under the run's seed
 LOOK_EVERY = 0.2  # [s] between two looks for Ctrl-C, where a wait cannot be interrupted
+LAST_WORDS = 0.5  # [s] that questions have, when a study ends, to keep what has come
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,10 @@ class Schedule:
         """The first trial of a block."""
         return self.n_init + block * self.n_step
 
+    def begun(self, number: int) -> int:
+        """How many blocks have begun when trial `number` is due, its own included."""
+        return max(0, (number - self.n_init) // self.n_step + 1)
+
     def begins_block(self, number: int) -> bool:
         """Whether the trial is the first of a block."""
         return number >= self.n_init and (number - self.n_init) % self.n_step == 0
@@ -71,36 +78,84 @@ class Turns(Protocol):
 
     def close(self) -> None:
         """Nothing more is wanted."""
-        ...
 
 
 class Asker:
-    """Asks the proposer, until a fault that asking again does not mend."""
+    """Asks the proposer, until a fault that asking again does not mend.
 
-    def __init__(self, proposer: Proposer, seed: int) -> None:
+    tell: called with the trial's number before a question.
+    """
+
+    def __init__(self, proposer: Proposer, seed: int, tell: Callable[[int], None] | None = None) -> None:
+        self.per_call = proposer.per_call
         self._proposer = proposer
         self._seed = seed
+        self._tell = tell
         self._given_up: str | None = None  # the kind of that fault
+        self._lock = threading.Lock()
+
+    def unused(self, history: History) -> list[Turn]:
+        """The turns of proposals of earlier sessions that no trial has used yet."""
+        return [Turn(p.asked, p.known or 0, p, note=p.note) for p in self._proposer.unused(history)]
 
     def ask(self, history: History, number: int) -> list[Turn]:
         """The turns that come of asking for trial `number` after `history`: one a design, or one with a fault."""
         known = len(history)
         if self._given_up is not None:
             return [Turn(number, known, fault=self._given_up)]
+        if self._tell is not None:
+            self._tell(number)
         try:
-            made = self._proposer.propose(history, derived_seed(self._seed, PROPOSING, number), number)
+            made = self._proposer.propose(history, self.seed(number), number)
         except ProposalError as fault:
-            note = str(fault)
-            if fault.final and self._given_up is None:
-                self._given_up = fault.kind
-                note += "; no more questions are asked in this session"
-            return [Turn(number, known if fault.known is None else fault.known, fault=fault.kind, note=note)]
+            return [
+                Turn(number, known if fault.known is None else fault.known, fault=fault.kind, note=self._note(fault))
+            ]
         proposals = [made] if isinstance(made, Proposal) else list(made)
-        return [Turn(number, known if p.known is None else p.known, p, note=p.note) for p in proposals]
+        if not proposals:
+            return [Turn(number, known, fault="answer", note="the proposer gave no design")]
+        return [_checked(history, number, proposal) for proposal in proposals]
+
+    def seed(self, number: int) -> int:
+        """Of the question for trial `number`."""
+        return derived_seed(self._seed, PROPOSING, number)
+
+    def give_up(self, kind: str) -> bool:
+        """Asks no more in this session; whether that is news."""
+        with self._lock:
+            news, self._given_up = self._given_up is None, self._given_up or kind
+        return news
 
     def cancel(self) -> None:
         """Ends what is under way."""
         self._proposer.cancel()
+
+    def _note(self, fault: ProposalError) -> str:
+        """What the user should be told; a fault that ends the asking is said once, however many questions meet it."""
+        if not fault.final:
+            return str(fault)
+        return f"{fault}; no more questions are asked in this session" if self.give_up(fault.kind) else ""
+
+
+def _checked(history: History, number: int, proposal: Proposal) -> Turn:
+    known = len(history) if proposal.known is None else proposal.known
+    try:
+        history.problem.space.design(proposal.design.params)
+    except DesignError as refusal:
+        return Turn(number, known, fault="answer", note=str(refusal))
+    return Turn(number, known, proposal, note=proposal.note)
+
+
+def past_turns(history: History) -> list[Turn]:
+    """The proposer's turns that the finished trials were."""
+    return [turn for turn in map(_past_turn, history) if turn is not None]
+
+
+def _past_turn(trial: FinishedTrial) -> Turn | None:
+    if trial.proposal is None and trial.fault is None:
+        return None
+    asked = trial.number if trial.asked is None else trial.asked
+    return Turn(asked, trial.number if trial.feedback is None else trial.feedback, fault=trial.fault)
 
 
 class Nobody(Turns):
@@ -110,20 +165,15 @@ class Nobody(Turns):
         """Never the proposer's."""
         return None
 
-    def close(self) -> None:
-        """Nothing is under way."""
-
 
 class Alternating(Turns):
     """The first trial of each block is the proposer's; the study waits for its design."""
 
-    def __init__(
-        self, asker: Asker, schedule: Schedule, history: Callable[[], History], unused: Iterable[Turn]
-    ) -> None:
+    def __init__(self, asker: Asker, schedule: Schedule, history: Callable[[], History]) -> None:
         self._asker = asker
         self._schedule = schedule
         self._history = history
-        self._ready = deque(unused)
+        self._ready = deque(asker.unused(history()))
 
     def next(self, number: int) -> Turn | None:
         """Asks where the trial begins a block and nothing lies ready."""
@@ -133,69 +183,83 @@ class Alternating(Turns):
             self._ready.extend(self._asker.ask(self._history(), number))
         return self._ready.popleft()
 
-    def close(self) -> None:
-        """Nothing is under way."""
+    def upcoming(self, number: int) -> tuple[int, int]:
+        """The trial that is asked for next when `number` trials are finished, and how many will be finished then."""
+        begins = next(n for n in count(number) if self._schedule.begins_block(n))
+        asked = begins + len(self._ready) * self._schedule.n_step
+        return asked, asked
 
 
 class Recorded(Turns):
-    """Plays recorded turns: each enters at its trial, asked with the feedback of then."""
+    """Plays recorded turns: each enters at its trial, asked with the feedback of then.
 
-    def __init__(self, asker: Asker, turns: Mapping[int, RecordedTurn], history: Callable[[], History]) -> None:
+    Beyond the record's end, the proposals that would be due are missing.
+    """
+
+    def __init__(self, asker: Asker, record: Record, schedule: Schedule, history: Callable[[], History]) -> None:
         self._asker = asker
-        self._turns = turns
+        self._record = record
+        self._schedule = schedule
         self._history = history
-        self._ready: dict[int, deque[Turn]] = {}  # of calls that gave several designs
+        past = past_turns(history())
+        self._asked = {turn.asked for turn in past}
+        self._missed = any(turn.fault == "missing" for turn in past)
+        self._ready: dict[tuple[int, str | None], Turn] = {}  # by trial and proposal; None for a fault
+        self._take(asker.unused(history()))
 
     def next(self, number: int) -> Turn | None:
         """What was recorded for this trial."""
-        turn = self._turns.get(number)
+        turn = self._record.turns.get(number)
         if turn is None:
-            return None
-        ready = self._ready.get(turn.asked)
-        if not ready:
-            history = self._history()
-            used = {trial.proposal for trial in history} - {None}
-            came = self._asker.ask(history.before(turn.feedback), turn.asked)
-            ready = deque(t for t in came if t.proposal is None or t.proposal.id not in used)
-            if not ready:
-                return Turn(turn.asked, turn.feedback, fault="missing", note=f"no design is left of call {turn.asked}")
-            self._ready[turn.asked] = ready
-        return ready.popleft()
+            return self._beyond(number)
+        if (turn.asked, turn.proposal) not in self._ready and turn.asked not in self._asked:
+            self._take(self._asker.ask(self._history().before(turn.feedback), turn.asked))
+        self._asked.add(turn.asked)
+        missing = Turn(turn.asked, turn.feedback, fault="missing", note=f"no design is left of call {turn.asked}")
+        return self._ready.pop((turn.asked, turn.proposal), self._ready.pop((turn.asked, None), missing))
 
-    def close(self) -> None:
-        """Nothing is under way."""
+    def _take(self, turns: Iterable[Turn]) -> None:
+        for turn in turns:
+            self._ready[turn.asked, None if turn.proposal is None else turn.proposal.id] = turn
+
+    def _beyond(self, number: int) -> Turn | None:
+        if number < self._record.n_trials or len(past_turns(self._history())) >= self._schedule.begun(number):
+            return None
+        note = "" if self._missed else f"the record ends with trial {self._record.n_trials - 1}"
+        self._missed = True
+        return Turn(number, number, fault="missing", note=note)
 
 
 class Overlapping(Turns):
     """Questions go on in threads of their own while black-box trials run.
 
-    in_flight: questions at a time.  per_call: designs that a question asks for.
-    past: the turns of the trials that are finished, when a run is resumed.
+    in_flight: questions at a time.
 
     A question is asked when its block would begin, `in_flight` - 1 blocks ahead. The black box may run ahead of the
-    answers by what the blocks of the questions under way hold; then it waits, so the ratio is kept.
+    answers by what the blocks of the questions under way hold; then it waits, so the ratio is kept. An answer enters
+    as the next trial after it came; of an answer with several designs all but the first wait for their blocks.
     """
 
-    def __init__(
-        self,
-        asker: Asker,
-        schedule: Schedule,
-        history: Callable[[], History],
-        unused: Sequence[Turn],
-        past: Sequence[Turn],
-        in_flight: int,
-        per_call: int,
-    ) -> None:
+    def __init__(self, asker: Asker, schedule: Schedule, history: Callable[[], History], in_flight: int) -> None:
         self._asker = asker
         self._schedule = schedule
         self._history = history
         self._in_flight = in_flight
-        self._per_call = per_call
-        self._arrived: deque[Turn | BaseException] = deque(unused)
+        past = past_turns(history())
         self._entered = len(past)
-        self._asked = {turn.asked for turn in (*past, *unused)}
+        self._asked = {turn.asked for turn in past}
+        self._arrived: deque[list[Turn]] = deque()  # answers, each with its designs
+        self._surplus: deque[Turn] = deque()  # designs of answers whose first has entered
+        self._failure: BaseException | None = None  # raised again in the study's thread
+        self._threads: list[threading.Thread] = []
         self.under_way = 0
         self._change = threading.Condition()
+        for asked, turns in groupby(asker.unused(history()), lambda turn: turn.asked):
+            if asked in self._asked:
+                self._surplus.extend(turns)
+            else:
+                self._arrived.append(list(turns))
+                self._asked.add(asked)
 
     def next(self, number: int) -> Turn | None:
         """The turn of the answer that came first; None as long as the black box may go on without one."""
@@ -204,11 +268,11 @@ class Overlapping(Turns):
             return None
         with self._change:
             while True:
+                if self._failure is not None:
+                    raise self._failure
                 self._ask(counted)
-                if self._arrived and self._entered < self._schedule.n_proposals:
-                    turn = self._arrived.popleft()
-                    if isinstance(turn, BaseException):
-                        raise turn
+                turn = self._take(counted)
+                if turn is not None:
                     self._entered += 1
                     return turn
                 if self._black_box_may_run(counted - self._entered):
@@ -216,41 +280,82 @@ class Overlapping(Turns):
                 self._change.wait(LOOK_EVERY)
 
     def close(self) -> None:
-        """Ends the questions under way; their threads end by themselves."""
+        """Ends the questions under way; what has come is kept."""
         if self.under_way:
             self._asker.cancel()
+        deadline = time.monotonic() + LAST_WORDS
+        for thread in self._threads:
+            thread.join(max(0.0, deadline - time.monotonic()))
+
+    def upcoming(self, number: int) -> tuple[int, int]:
+        """The trial that is asked for next when `number` trials are finished, and how many will be finished then."""
+        return self._next_asked(), max(number, self._schedule.n_init + max(0, self._asks_at()))
+
+    def _take(self, counted: int) -> Turn | None:
+        """The next turn, if one is due."""
+        if self._entered >= self._schedule.n_proposals:
+            return None
+        if self._surplus and counted >= self._entered * self._schedule.n_step:
+            return self._surplus.popleft()
+        if self._arrived:
+            first, *others = self._arrived.popleft()
+            self._surplus.extend(others)
+            return first
+        return None
 
     def _black_box_may_run(self, drawn: int) -> bool:
         """drawn: counted trials of the black box so far."""
         s = self._schedule
-        ahead = (s.n_step - 1) * (self._entered + self._in_flight * self._per_call)
+        ahead = (s.n_step - 1) * (self._entered + self._in_flight * self._asker.per_call)
         return drawn < min(ahead, s.n_total - s.n_proposals)
 
     def _ask(self, counted: int) -> None:
         """Asks what is due; counted: counted trials that are finished."""
-        while self.under_way < self._in_flight:
-            supplied = self._entered + len(self._arrived) + self.under_way * self._per_call
-            ahead = (self._in_flight - 1) * self._per_call
-            if supplied >= self._schedule.n_proposals or counted < (supplied - ahead) * self._schedule.n_step:
+        while self.under_way < self._in_flight and self._supplied() < self._schedule.n_proposals:
+            if counted < self._asks_at():
                 return
-            block = 0
-            while self._schedule.number(block) in self._asked:
-                block += self._per_call
-            number = self._schedule.number(block)
+            number = self._next_asked()
             self._asked.add(number)
             self.under_way += 1
             question = threading.Thread(
                 target=self._wait_for, args=(self._history(), number), name=f"armwright-question-{number}", daemon=True
             )
+            self._threads = [thread for thread in self._threads if thread.is_alive()] + [question]
             question.start()
 
+    def _supplied(self) -> int:
+        """Designs that have come, or are asked for."""
+        came = self._entered + sum(map(len, self._arrived)) + len(self._surplus)
+        return came + self.under_way * self._asker.per_call
+
+    def _asks_at(self) -> int:
+        """After how many counted trials the next question is asked."""
+        return (self._supplied() - (self._in_flight - 1) * self._asker.per_call) * self._schedule.n_step
+
+    def _next_asked(self) -> int:
+        """The trial that is asked for next: the first of a block for which nothing was asked."""
+        numbers = (self._schedule.number(block) for block in count(0, self._asker.per_call))
+        return next(number for number in numbers if number not in self._asked)
+
     def _wait_for(self, history: History, number: int) -> None:
-        answer: list[Turn] | list[BaseException]
+        answer: list[Turn] = []
+        failure: BaseException | None = None
         try:
             answer = self._asker.ask(history, number)
         except BaseException as fault:  # noqa: BLE001 raised again in the study's thread
-            answer = [fault]
+            failure = fault
         with self._change:
             self.under_way -= 1
-            self._arrived.extend(answer)
+            self._failure = self._failure or failure
+            if answer:
+                self._arrived.append(answer)
             self._change.notify_all()
+
+
+def asking_turns(
+    asker: Asker, schedule: Schedule, history: Callable[[], History], in_flight: int | None
+) -> Alternating | Overlapping:
+    """The turns of a proposer that is asked; with `in_flight`, while black-box trials run."""
+    if in_flight is None:
+        return Alternating(asker, schedule, history)
+    return Overlapping(asker, schedule, history, in_flight)

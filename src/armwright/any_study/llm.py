@@ -85,13 +85,11 @@ class StudyLlmProposer(Dialogue, StudyProposer):
             self._call(CHECK, lambda question: self.speaker.check(), self._over)
         except ProposalError as fault:
             raise ModelError(f"{fault}. Check the model, its key and base_url") from fault
-        if self._price_is_missing():
-            raise ModelError(self._without_price)
+        if self._budget.price_is_missing:
+            raise ModelError(f"the price of {self.speaker.model} is not known, so max_cost cannot hold; use max_calls")
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """The next trial, from what the study has found."""
-        if self._price_is_missing():
-            raise ProposalError("budget", self._without_price, final=True)
         trials = study.get_trials(deepcopy=False)
         parameters = told_parameters(self.space(study), trials)
         if not parameters:
@@ -126,17 +124,6 @@ class StudyLlmProposer(Dialogue, StudyProposer):
         reasoning = self._form == "schema"
         schema = answer_schema(parameters, objectives, reasoning=reasoning, expected=self._expects)
         return self.speaker.ask_for(question, schema, read)
-
-    def _price_is_missing(self) -> bool:
-        """Whether calls were made whose cost is not known, though it is to be bounded."""
-        if self.max_cost is None:
-            return False
-        spent = self.summary()
-        return spent.calls > 0 and spent.cost_usd is None
-
-    @property
-    def _without_price(self) -> str:
-        return f"the price of {self.speaker.model} is not known, so max_cost cannot hold; use max_calls"
 
     @property
     def _expects(self) -> bool:

@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
 from armwright.llm.answer import without_words_around
 from armwright.llm.secrets import WithoutKeys, redacted, without_keys
-from armwright.llm.speaker import CHECK, CallError, Question, Reader, Reply, Speaker
+from armwright.llm.speaker import CHECK, MOST_REQUESTS, CallError, Interrupted, Question, Reader, Reply, Speaker
 
 try:
     from genai_prices import Usage, calc_price
@@ -39,7 +39,7 @@ except ImportError as fault:
 
 CALL_SECONDS = 120.0  # of one request, all attempts included
 CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
-REASKS = 2  # after a refused answer
+REASKS = MOST_REQUESTS - 1  # after a refused answer
 RETRIES = 2  # after a fault that may pass
 RETRY_SECONDS = 0.5  # before the first retry, where the server says nothing; doubled before the next
 ORIGINS = ("model", "scripted")
@@ -139,9 +139,9 @@ class Chat(Speaker):
         """A session begins."""
         self._cancelled = False
 
-    def check(self) -> Reply:
+    def check(self, question: Question = CHECK) -> Reply:
         """One tiny question, so that a wrong name, key or address is known before any work is done."""
-        return self._run(Agent(self._model), CHECK, CHECK_SECONDS)
+        return self._run(Agent(self._model), question, CHECK_SECONDS)
 
     def ask(self, question: Question) -> Reply:
         """The free answer to a prompt."""
@@ -184,6 +184,8 @@ class Chat(Speaker):
             except CancelledError as fault:
                 reply = self._reply(messages, time.perf_counter() - started)
                 raise CallError("cancelled", f"{self.model}: the call was ended", reply) from fault
+            except KeyboardInterrupt as fault:
+                raise Interrupted(self._reply(messages, time.perf_counter() - started)) from fault
             except CALL_FAULTS as fault:
                 reply = self._reply(messages, time.perf_counter() - started)
                 raise CallError(kind_of(fault), f"{self.model}: {_one_line(words_of(fault))}", reply) from fault

@@ -55,7 +55,8 @@ class Feedback:
     def __init__(self, history: History, seed: int) -> None:
         rng = np.random.default_rng(seed)
         front = [member.number for member in history.front]
-        others = [trial.number for trial in history if trial.number not in set(front)]
+        on_front = set(front)
+        others = [trial.number for trial in history if trial.number not in on_front]
         self.front = _draw(front, N_PARETO, rng)
         self.others = _draw(others, N_RANDOM, rng)
         self._history = history

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import AnswerPendingError, DesignError, FailureError
-from armwright.llm.speaker import CallError, Question, Reply, Speaker, TextReader
+from armwright.llm.speaker import CHECK, CallError, Question, Reply, Speaker, TextReader
 
 LOOK_EVERY = 0.5  # [s]
 ENDINGS = ("md", "json", "txt")  # of an answer's file
@@ -34,7 +34,7 @@ class People(Speaker):
         """A session begins."""
         self._cancelled.clear()
 
-    def check(self) -> Reply:
+    def check(self, question: Question = CHECK) -> Reply:
         """People are not asked before there is a question."""
         return Reply("")
 
@@ -54,12 +54,16 @@ class People(Speaker):
         """The question for trial `number`, and its answer."""
         return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
 
+    def is_answered(self, number: int) -> bool:
+        """Whether an answer lies there that has not been refused."""
+        return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
+
     def ask_people(self, question: Question, read: TextReader) -> Reply:
         """The answer as `read` gives it; what it refuses (DesignError) is put aside, with the reason, for another."""
         started = time.perf_counter()
-        number = f"{int(question.proposal.rpartition('-')[2]):03d}"
-        asked = self.folder / f"{number}-prompt.md"
-        answers = [self.folder / f"{number}-answer.{ending}" for ending in ENDINGS]
+        number = int(question.proposal.rpartition("-")[2])
+        asked, _ = self.files(number)
+        answers = self._answers(number)
         self._ask(asked, answers, question.prompt)
         refused = ""
         while True:
@@ -75,6 +79,9 @@ class People(Speaker):
                 raise AnswerPendingError(asked, answers[0], refused)
             if self._cancelled.wait(LOOK_EVERY):
                 raise CallError("cancelled", "the wait for an answer was ended", Reply(""))
+
+    def _answers(self, number: int) -> list[Path]:
+        return [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]
 
     def _ask(self, file: Path, answers: Sequence[Path], prompt: str) -> None:
         if os.path.isfile(file):
@@ -105,15 +112,15 @@ class People(Speaker):
         except OSError as fault:
             raise FailureError(f"cannot read {file}: {fault.strerror or fault}") from fault
 
-    def _refuse(self, number: str, answer: Path, reason: str) -> None:
+    def _refuse(self, number: int, answer: Path, reason: str) -> None:
         try:
-            before = len(list(self.folder.glob(f"{number}-refused-*")))
-            kept = self.folder / f"{number}-refused-{before + 1}{answer.suffix}"
+            before = len(list(self.folder.glob(f"{number:03d}-refused-*")))
+            kept = self.folder / f"{number:03d}-refused-{before + 1}{answer.suffix}"
             os.replace(answer, kept)
         except OSError as fault:
             raise FailureError(f"cannot rename {answer}: {fault.strerror or fault}") from fault
         self._write(
-            self.folder / f"{number}-refused.md",
+            self.folder / f"{number:03d}-refused.md",
             f"{kept.name} was refused:\n\n{reason}\n\nGive another {answer.name}.\n",
         )
 

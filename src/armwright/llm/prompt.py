@@ -48,8 +48,7 @@ VARIABLES = {
     "target_high": "the largest x, y and z of all targets",
     "updates": "updates of the inverse kinematics",
     "objectives": "what is minimised, each with symbol, label, unit, words",
-    "tolerance": "[m] by which base and links may be off, the worst case of which counts; 0 where designs count as they "
-    "stand",
+    "tolerance": "[m] by which base and links may be off, the worst case of which counts; 0: designs as they stand",
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
     "n_front": "how many of them are Pareto-optimal",

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import ReplayError
-from armwright.llm.speaker import CallError, Question, Reader, Reply, Speaker
+from armwright.llm.speaker import CHECK, CallError, Question, Reader, Reply, Speaker
 from armwright.llm.transcript import Call
 
 
@@ -27,7 +27,7 @@ class Recording(Speaker):
     def begin(self) -> None:
         """Nothing to begin."""
 
-    def check(self) -> Reply:
+    def check(self, question: Question = CHECK) -> Reply:
         """The first recorded check."""
         return self._play(next(call for call in self.calls if call.step == "check"))
 

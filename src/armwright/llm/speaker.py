@@ -10,6 +10,7 @@ from armwright.exceptions import ProposalError
 Reader = Callable[[Mapping[str, Any]], str]
 TextReader = Callable[[str], str]  # the same for an answer in free text
 
+MOST_REQUESTS = 3  # of a question: a refused answer goes back with the reason, at most twice
 FINAL = frozenset({"key", "quota", "unknown_model", "budget"})  # faults that asking again does not mend
 
 
@@ -52,6 +53,16 @@ class CallError(ProposalError):
         self.reply = reply
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C while an answer was waited for; `reply` says what the call cost all the same."""
+
+    kind = "cancelled"
+
+    def __init__(self, reply: Reply) -> None:
+        super().__init__("ended by Ctrl-C")
+        self.reply = reply
+
+
 class Speaker(Protocol):
     """Answers questions, several at a time if asked from several threads.
 
@@ -65,7 +76,7 @@ class Speaker(Protocol):
         """A session begins; what was cancelled before is past."""
         ...
 
-    def check(self) -> Reply:
+    def check(self, question: Question = CHECK) -> Reply:
         """One tiny question, before any work is done; CallError where no answers are to be had."""
         ...
 

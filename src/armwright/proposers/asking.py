@@ -11,6 +11,7 @@ from armwright.history import History
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.llm.prompt import MEMORIES, Form, Prompt, load_prompt, parameters_prompt
 from armwright.llm.speaker import CHECK, Question, Reply, Speaker
+from armwright.llm.transcript import Transcript
 from armwright.problem import Problem
 from armwright.proposers.dialogue import Dialogue
 from armwright.proposers.proposer import Proposal, Proposer
@@ -84,17 +85,30 @@ class AskingProposer(Dialogue, Proposer):
         """Reads what was said before in this run."""
         self._begin(None if folder is None else folder / TRANSCRIPTS)
 
+    def look(self, folder: Path) -> None:
+        """Reads what was said before in a run, and changes nothing there."""
+        self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
+
+    def asked(self) -> Mapping[int, int]:
+        """The trials that were asked for so far, and how many finished trials were known then."""
+        calls = [call for call in self._transcript.calls if call.proposal]
+        return {int(call.proposal.rpartition("-")[2]): call.known for call in calls}
+
     def check(self) -> None:
-        """Makes sure that answers are to be had."""
+        """Makes sure that answers are to be had; a budget that is used up is said at the first question."""
         try:
-            self._call(CHECK, lambda question: self.speaker.check(), self._over)
+            self._call(CHECK, self.speaker.check, self._over)
         except ProposalError as fault:
+            if fault.kind == "budget":
+                return
             raise ModelError(
-                f"{fault}. Check the model, its key and --base-url; --proposer rules needs none"
+                f"{fault}. Check the model, its key and --base-url; --proposer rules needs none",
+                final=fault.kind if fault.final else None,
             ) from fault
-        if self.max_cost is not None and self.summary().cost_usd is None:
+        if self._budget.price_is_missing:
             raise ModelError(
-                f"the price of {self.speaker.model} is not known, so --max-cost cannot hold; use --max-calls"
+                f"the price of {self.speaker.model} is not known, so --max-cost cannot hold; use --max-calls",
+                final="budget",
             )
 
     def unused(self, history: History) -> Sequence[Proposal]:
@@ -111,27 +125,32 @@ class AskingProposer(Dialogue, Proposer):
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """The next designs. An answer that was paid for in a run that was killed is used, not asked again."""
         over = self._over
-        identity = f"{self.name}-{number:04d}"
-        known = len(history)
+        problem = history.problem
+        question = self.question(history, seed, number)
         try:
-            if self._form == "then-schema":
-                thoughts = self._transcript.answered(identity, "reasoning")
-                if thoughts is None:
-                    question = Question(identity, "reasoning", self.prompt_for(history, seed), known)
-                    said = self._call(question, self.speaker.ask, over)
-                else:
-                    said, known = thoughts.answer, thoughts.known
-                question = Question(identity, "parameters", self._extract(history.problem, said), known)
-            else:
-                question = Question(identity, "answer", self.prompt_for(history, seed), known)
-            text = self._call(question, lambda asked: self.ask_designs(asked, history.problem), over)
+            if question.step == "reasoning":
+                said = self._call(question, self.speaker.ask, over)
+                question = self._extracting(problem, question.proposal, said, question.known)
+            text = self._call(question, lambda asked: self.ask_designs(asked, problem), over)
         except ProposalError as fault:
-            fault.known = known
+            fault.known = question.known
             raise
-        return self._proposals(identity, read_text(text, history.problem, self.asking.proposals), known)
+        answers = read_text(text, problem, self.asking.proposals)
+        return self._proposals(question.proposal, answers, question.known)
 
-    def _extract(self, problem: Problem, said: str) -> str:
-        return parameters_prompt(problem, said, proposals=self.asking.proposals, expected=self._expects)
+    def question(self, history: History, seed: int, number: int) -> Question:
+        """What is asked first for trial `number`; where free thoughts have come already, for their parameters."""
+        identity = f"{self.name}-{number:04d}"
+        if self._form != "then-schema":
+            return Question(identity, "answer", self.prompt_for(history, seed), len(history))
+        thoughts = self._transcript.answered(identity, "reasoning")
+        if thoughts is not None:
+            return self._extracting(history.problem, identity, thoughts.answer, thoughts.known)
+        return Question(identity, "reasoning", self.prompt_for(history, seed), len(history))
+
+    def _extracting(self, problem: Problem, identity: str, said: str, known: int) -> Question:
+        prompt = parameters_prompt(problem, said, proposals=self.asking.proposals, expected=self._expects)
+        return Question(identity, "parameters", prompt, known)
 
     def prompt_for(self, history: History, seed: int) -> str:
         """What is asked after `history`."""

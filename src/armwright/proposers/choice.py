@@ -157,7 +157,7 @@ def _language_model(wishes: Wishes, configured: ModelName) -> Choice:
 def _replay(wishes: Wishes, place: str) -> Choice:
     from armwright.proposers.replay import ReplayProposer
 
-    proposer = ReplayProposer(place, wishes.replay_strict)
+    proposer = ReplayProposer(place, wishes.replay_strict, wishes.asking)
     recording = proposer.recording
     return Choice(
         proposer,

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from armwright.exceptions import ProposalError
-from armwright.llm.speaker import CallError, Question, Reply, Speaker
+from armwright.llm.speaker import CallError, Interrupted, Question, Reply, Speaker
 from armwright.llm.transcript import Call, Transcript
+from armwright.proposers.budget import Budget
 from armwright.proposers.proposer import ProposerSummary
 
-NEVER_MADE = ("missing", "cancelled")  # faults of calls that nobody answered, and that cost nothing
+NEVER_MADE = ("missing", "cancelled")  # faults of calls that cost nothing, as long as no request was answered
 
 
 class Dialogue:
@@ -26,12 +26,9 @@ class Dialogue:
     ) -> None:
         self.name = name
         self.speaker = speaker
-        self.max_calls = max_calls
-        self.max_cost = max_cost
+        self._budget = Budget(max_calls, max_cost)
         self._transcript = Transcript(None)
         self._over = threading.Event()  # of the session, set when nothing more is wanted
-        self._under_way = 0
-        self._lock = threading.Lock()
 
     def summary(self) -> ProposerSummary:
         """Calls, tokens and cost of the whole run, earlier sessions included."""
@@ -52,33 +49,33 @@ class Dialogue:
     def cancel(self) -> None:
         """Ends the calls under way, and begins no more in this session."""
         self._over.set()
+        self._budget.wake()
         self.speaker.cancel()
 
     def _begin(self, transcript: Path | None) -> None:
         """A session begins; what was said before lies in `transcript`."""
         self._transcript = Transcript(transcript)
+        self._budget.begin(self._transcript.calls)
         self._over = threading.Event()
         self.speaker.begin()
 
     def _call(self, question: Question, ask: Callable[[Question], Reply], over: threading.Event) -> str:
-        if over.is_set():
-            raise ProposalError("cancelled", "the study is over")
-        question = self._within_budget(question)
-        error = None
-        try:
-            reply = ask(question)
-        except CallError as fault:
-            error, reply = fault, fault.reply
-        finally:
-            with self._lock:
-                self._under_way -= 1
-        if error is None or error.kind not in NEVER_MADE:
-            self._transcript.add(self._record(question, reply, error))
-        if error is not None:
-            raise error
+        """The answer; what came back is kept, and what it cost, even if the call was cut short by Ctrl-C."""
+        with self._budget.reserved(over.is_set) as requests:
+            try:
+                reply = ask(replace(question, most_requests=requests))
+            except (CallError, Interrupted) as fault:
+                if fault.kind not in NEVER_MADE or fault.reply.requests:
+                    self._keep(self._record(question, fault.reply, fault))
+                raise
+            self._keep(self._record(question, reply, None))
         return reply.text
 
-    def _record(self, question: Question, reply: Reply, error: CallError | None) -> Call:
+    def _keep(self, call: Call) -> None:
+        self._budget.spend(call)
+        self._transcript.add(call)
+
+    def _record(self, question: Question, reply: Reply, error: CallError | Interrupted | None) -> Call:
         return Call(
             proposal=question.proposal,
             step=question.step,
@@ -95,19 +92,3 @@ class Dialogue:
             fault=None if error is None else error.kind,
             error=None if error is None else str(error),
         )
-
-    def _within_budget(self, question: Question) -> Question:
-        """The question, bounded by what is left of the budget; ProposalError where nothing is left."""
-        with self._lock:
-            spent = self.summary()
-            if self.max_calls is not None:
-                left = self.max_calls - spent.calls - self._under_way
-                if left <= 0:
-                    raise ProposalError("budget", f"--max-calls {self.max_calls} is used up", final=True)
-                question = replace(question, most_requests=left)
-            if self.max_cost is not None:
-                each = (spent.cost_usd or 0.0) / max(1, spent.calls)
-                if (spent.cost_usd or 0.0) + each * (1 + self._under_way) > self.max_cost:
-                    raise ProposalError("budget", f"--max-cost {self.max_cost:g} USD is used up", final=True)
-            self._under_way += 1
-        return question

@@ -16,6 +16,8 @@ class ManualProposer(AskingProposer):
     wait: whether to wait for an answer; else AnswerPendingError is raised, and the same call goes on once it is there.
     """
 
+    overlaps = False  # a person answers one question at a time, and may be days over it
+
     def __init__(
         self,
         folder: str | Path,
@@ -32,8 +34,10 @@ class ManualProposer(AskingProposer):
         """Nobody is asked before there is a question."""
 
     def announce(self, number: int) -> str:
-        """Which file waits for which."""
+        """Which file waits for which, as long as there is no answer."""
         asked, answer = self.people.files(number)
+        if self.people.is_answered(number):
+            return ""
         return f"{asked} waits for your answer in {answer}"
 
     def ask_designs(self, question: Question, problem: Problem) -> Reply:

@@ -57,10 +57,23 @@ class ProposerSummary:
 
 @dataclass(frozen=True)
 class RecordedTurn:
-    """When a proposal entered a run that is played again: the trial it was asked for, and what was known then."""
+    """A proposer's turn in a run that is played again.
+
+    asked: the trial that it was asked for.  feedback: how many finished trials were known then.
+    proposal: the proposal's id; None where there was a fault instead.
+    """
 
     asked: int
     feedback: int
+    proposal: str | None
+
+
+@dataclass(frozen=True)
+class Record:
+    """A recorded run: the proposer's turns by trial number, and how many trials it has."""
+
+    turns: Mapping[int, RecordedTurn]
+    n_trials: int
 
 
 class Proposer(Protocol):
@@ -68,10 +81,12 @@ class Proposer(Protocol):
 
     name: the `source` of its trials.
     per_call: how many designs one call of `propose` gives, at most.
+    overlaps: whether it can be asked while black-box trials go on (--overlap), from other threads.
     """
 
     name: str
     per_call: int = 1
+    overlaps: bool = True
 
     def settings(self) -> Mapping[str, Any]:
         """What must be known to repeat its proposals; kept in config.yaml. No secrets."""
@@ -95,8 +110,8 @@ class Proposer(Protocol):
         """Proposals of earlier sessions of this run that no trial has used yet; they go first."""
         return ()
 
-    def recorded_turns(self) -> Mapping[int, RecordedTurn] | None:
-        """Of a record that is played again: when its proposals entered, by trial number."""
+    def record(self) -> Record | None:
+        """Of a run that is played again: when its proposals entered."""
         return None
 
     def summary(self) -> ProposerSummary:

@@ -1,18 +1,20 @@
 """A recorded run's proposals, played again."""
 
+import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import ProposalError, ReplayError
+from armwright.exceptions import ProposalError, ReplayError, SettingsError
 from armwright.history import FinishedTrial, History
-from armwright.llm.prompt import PROMPTS, Prompt
+from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import Recording
-from armwright.llm.transcript import Transcript
-from armwright.proposers.asking import TRANSCRIPTS, Asking, AskingProposer
-from armwright.proposers.proposer import Proposal, ProposerSummary, RecordedTurn
+from armwright.llm.transcript import Call, Transcript
+from armwright.proposers.asking import LAST_STEPS, TRANSCRIPTS, Asking, AskingProposer
+from armwright.proposers.proposer import Proposal, ProposerSummary, Record, RecordedTurn
 from armwright.run_folder import CONFIG, TRIALS, RunConfig, read_config, read_run
 
 
@@ -22,7 +24,8 @@ class ReplayProposer(AskingProposer):
     With the settings of the recorded run, on the same machine with the same versions, the run comes out equal to the
     bit. Where a prompt differs from the recorded one, it is reported; with `strict` it is an error.
 
-    asking: how the recorded run asked; read from the config.yaml beside the transcript where there is one.
+    asking: how the recorded run asked, where nothing says so: prompt and memory of a transcript without its
+        config.yaml. What differs from the defaults and from the record is refused.
     """
 
     def __init__(self, source: str | Path, strict: bool = False, asking: Asking | None = None) -> None:
@@ -36,8 +39,8 @@ class ReplayProposer(AskingProposer):
             raise ReplayError(f"{file} holds no proposal")
         name = next(call.proposal for call in calls if call.proposal).rpartition("-")[0]
         recorded = read_config(folder) if (folder / CONFIG).is_file() else None
-        prompt, then = recorded_asking(recorded)
-        super().__init__(Recording(calls, file, strict), asking or then, name, prompt=prompt)
+        prompt, then = _as_recorded(file, recorded, calls, asking or Asking())
+        super().__init__(Recording(calls, file, strict), then, name, prompt=prompt)
         self.recording: Recording = self.speaker  # pyright: ignore[reportAttributeAccessIssue]
         self._trials = _recorded_trials(folder, recorded)
 
@@ -50,8 +53,8 @@ class ReplayProposer(AskingProposer):
         if any(call.step == "check" and call.fault is None for call in self.recording.calls):
             super().check()
 
-    def recorded_turns(self) -> Mapping[int, RecordedTurn] | None:
-        """When the recorded proposals entered, by trial number; None where only the transcript is there."""
+    def record(self) -> Record | None:
+        """When the recorded proposals entered; None where only the transcript is there."""
         if not self._trials:
             return None
         turns: dict[int, RecordedTurn] = {}
@@ -59,8 +62,8 @@ class ReplayProposer(AskingProposer):
             if trial.proposal is not None or trial.fault is not None:
                 asked = trial.number if trial.asked is None else trial.asked
                 feedback = trial.number if trial.feedback is None else trial.feedback
-                turns[trial.number] = RecordedTurn(asked, feedback)
-        return turns
+                turns[trial.number] = RecordedTurn(asked, feedback, trial.proposal)
+        return Record(turns, len(self._trials))
 
     def summary(self) -> ProposerSummary:
         """The account of the recorded calls that were played."""
@@ -92,12 +95,45 @@ class ReplayProposer(AskingProposer):
 
 def recorded_asking(config: RunConfig | None) -> tuple[Prompt | None, Asking]:
     """How the proposer of a run asked, and its prompt where that was a template of the user's own."""
-    settings = config.method.proposer if config is not None else None
+    settings = config.study.proposer if config is not None else None
     if not settings or "prompt" not in settings:
         return None, Asking()
     own = Prompt(settings["prompt"], settings["template"]) if "template" in settings else None
     name = settings["prompt"] if settings["prompt"] in PROMPTS else PROMPTS[0]
     return own, Asking(name, settings["memory"], settings["answer"], settings["proposals"])
+
+
+def _as_recorded(file: Path, config: RunConfig | None, calls: Sequence[Call], wished: Asking) -> tuple[Prompt, Asking]:
+    """How a record was asked for; SettingsError where something else is wished."""
+    if config is not None and "prompt" in (config.study.proposer or {}):
+        own, then = recorded_asking(config)
+        prompt = own or load_prompt(then.prompt)
+    else:  # a transcript alone does not name its prompt and memory
+        prompt, then = load_prompt(wished.prompt), replace(asking_of(calls), memory=wished.memory)
+    for name, there in {**asdict(then), "prompt": prompt.name}.items():
+        wish = getattr(wished, name)
+        same = load_prompt(wish).template == prompt.template if name == "prompt" else wish == there
+        if not same and wish != getattr(Asking(), name):
+            raise SettingsError(f"{file} was recorded with {name} {there}; leave out --{name} {wish}")
+    return prompt, then
+
+
+def asking_of(calls: Sequence[Call]) -> Asking:
+    """How calls were asked for, as far as they show it: the form of the answer, and how many designs a call."""
+    proposed = [call for call in calls if call.proposal]
+    if all(call.step != "answer" for call in proposed):
+        form = "two-step"
+    else:
+        form = "text" if any(call.origin == "manual" for call in proposed) else "one-step"
+    answers = [call.answer for call in proposed if call.step in LAST_STEPS and call.fault is None]
+    return Asking(answer=form, proposals=max(map(_designs, answers), default=1))
+
+
+def _designs(answer: str) -> int:
+    """How many designs a kept answer holds."""
+    with suppress(ValueError, TypeError, KeyError):  # one design; or a transcript that was changed by hand
+        return max(1, len(json.loads(answer)["designs"]))
+    return 1
 
 
 def _recorded_trials(folder: Path, config: RunConfig | None) -> Sequence[FinishedTrial]:
