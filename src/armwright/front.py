@@ -114,7 +114,7 @@ def find_front(
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
         if known is None:
-            assert isinstance(begin_with, Proposer)
+            assert begin_with is not None and not isinstance(begin_with, (str, Path))  # noqa: PT018
             known = _proposed(problem, begin_with, seed, None if folder is None else folder.path)
         rows, origin = known
         config = RunConfig(

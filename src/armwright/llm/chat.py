@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 import os
 import re
 import threading
@@ -120,6 +121,10 @@ class Chat(Speaker):
             )
         if origin not in ORIGINS:
             raise SettingsError(f'unknown origin "{origin}": {" or ".join(ORIGINS)} is needed')
+        if not model.rpartition(":")[2].strip():
+            raise SettingsError(f'model "{model}" names no model: openai-chat:gpt-4o would')
+        if temperature is not None and not 0.0 <= temperature < math.inf:
+            raise SettingsError(f"temperature = {temperature}: a number from 0 is needed")
         self.model = model
         self.origin = origin
         self._place = _place(model, base_url)

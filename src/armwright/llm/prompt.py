@@ -126,7 +126,7 @@ class Prompt:
     def _render(self, values: Mapping[str, Any]) -> str:
         sandbox = _sandbox()
         try:
-            return _tidy(sandbox.rendered(sandbox.from_string(self.template), values))
+            text = _tidy(sandbox.rendered(sandbox.from_string(self.template), values))
         except _FAULTS as fault:
             line = next(
                 (f.lineno for f in reversed(traceback.extract_tb(fault.__traceback__)) if f.filename == "<template>"),
@@ -135,6 +135,9 @@ class Prompt:
             where = "" if line is None else f", line {line}"
             words = one_line(str(fault), 300) or type(fault).__name__
             raise SettingsError(f"prompt {self.name}{where} cannot be rendered: {words}") from fault
+        if not text.strip():
+            raise SettingsError(f"prompt {self.name} is empty: there would be nothing to answer")
+        return text
 
 
 # What a template can run into.

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from armwright.exceptions import SettingsError
 from armwright.llm.answer import read_text, written_answers
 from armwright.llm.people import People
 from armwright.llm.speaker import Question, Reply
@@ -27,6 +28,8 @@ class ManualProposer(AskingProposer):
         proposals: int = 1,
         wait: bool = True,
     ) -> None:
+        if Path(folder).exists() and not Path(folder).is_dir():
+            raise SettingsError(f"{folder} is a file; manual needs a folder for its questions")
         self.people = People(Path(folder), wait)
         super().__init__(self.people, Asking(prompt, memory, "text", proposals), "manual")
 

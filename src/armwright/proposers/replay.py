@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import ProposalError, ReplayError, SettingsError
+from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError
 from armwright.history import FinishedTrial, History
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import Recording
@@ -73,9 +73,16 @@ class ReplayProposer(AskingProposer):
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """The recorded designs; the recorded fault where there was one."""
         identity = f"{self.name}-{number:04d}"
-        if not any(call.proposal == identity for call in self.recording.calls):
-            raise ProposalError(*self._why_missing(number))
-        proposals = super().propose(history, seed, number)
+        try:
+            proposals = super().propose(history, seed, number)
+        except DesignError as refusal:
+            raise ReplayError(f"{self.recording.source}: the answer for {identity} was changed: {refusal}") from refusal
+        except ProposalError as fault:
+            if fault.kind != "missing":
+                raise
+            why = ProposalError(*self._why_missing(number))
+            why.known = fault.known
+            raise why from fault
         if identity not in self.recording.differing:
             return proposals
         note = f"the prompt for {identity} differs from the recorded one"
@@ -83,7 +90,7 @@ class ReplayProposer(AskingProposer):
 
     def _why_missing(self, number: int) -> tuple[str, str]:
         recorded = next((t for t in self._trials if t.fault and number == (t.asked or t.number)), None)
-        if recorded is not None:  # never asked: no budget, or a model that was given up
+        if recorded is not None:  # never asked, or not to the end: no budget, or a model that was given up
             assert recorded.fault is not None
             return recorded.fault, f"recorded: {recorded.fault}"
         there = sorted({int(c.proposal.rpartition("-")[2]) for c in self.recording.calls if c.proposal})
