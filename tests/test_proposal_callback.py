@@ -1,6 +1,8 @@
 """Proposals in a plain `study.optimize`: how many, by whom, and each of Optuna's traps."""
 
+import json
 import logging
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -12,13 +14,14 @@ import numpy as np
 import optuna
 import pytest
 from optuna.samplers import NSGAIIISampler, NSGAIISampler, TPESampler
-from optuna.storages import JournalStorage, RDBStorage
+from optuna.storages import InMemoryStorage, JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
 from armwright.any_study.callback import ProposalCallback
 from armwright.any_study.proposals import StudyProposal, StudyProposer, study_history
 from armwright.exceptions import ModelError, ProposalError, SettingsError
+from armwright.llm.transcript import Transcript
 from armwright.pareto import hypervolume
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -27,7 +30,7 @@ from armwright.proposers.rules import RulesProposer
 from armwright.sampling import distributions
 from armwright.space import Design
 from armwright.task import Task, load_task
-from tests.chat_server import ChatServer
+from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
 
 
 class Told(StudyProposer):
@@ -374,6 +377,97 @@ def test_the_language_model_for_arms_works_in_a_plain_study(chat_server: ChatSer
     ]
     assert study.trials[3].user_attrs["reason"] == "a universal shoulder at the centre"
     assert "3 designs have been evaluated" in chat_server.prompts()[0]
+
+
+def thinking(request: Request) -> Answer:
+    """Says how often it was asked, and gives a design of its own each time."""
+    if wants_design(request):
+        (n,) = re.findall(r"thought (\d+)", str(request["messages"]))
+        return json.dumps({**GOOD_DESIGN, "origin_x": int(n) / 100})
+    thinking.asked += 1  # type: ignore[attr-defined]
+    return f"thought {thinking.asked}"  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def thinker(chat_server: ChatServer) -> ChatServer:
+    thinking.asked = 0  # type: ignore[attr-defined]
+    chat_server.answer = thinking
+    return chat_server
+
+
+def origins(study: optuna.Study) -> list[float]:
+    return [trial.params["origin_x"] for trial in study.trials if trial.user_attrs.get("source") == "llm"]
+
+
+@pytest.mark.parametrize("callbacks", [1, 2])
+def test_one_proposer_in_two_studies_thinks_anew_for_each(thinker: ChatServer, callbacks: int) -> None:
+    """Both ask for trials 3 and 7; so would a study that is taken up again."""
+    llm = LlmProposer("test-model", thinker.url, max_calls=4)
+    made = [ProposalCallback(llm, 4, problem=PROBLEM) for _ in range(callbacks)]
+    studies = [tpe(seed, directions=["minimize"] * 2) for seed in range(2)]
+    for n, study in enumerate(studies):
+        arms(PROBLEM, study, 8, made[n % callbacks])
+    assert [origins(study) for study in studies] == [[0.01, 0.02], [0.03, 0.04]]
+    arms(PROBLEM, studies[0], 4, made[0])
+    assert origins(studies[0]) == [0.01, 0.02, 0.05]
+    assert [callback.faults for callback in made] == [{}] * callbacks  # each study has the whole budget
+
+
+def test_designs_left_of_another_study_are_not_taken_for_this_one() -> None:
+    class Pair(RulesProposer):
+        def propose(self, history: Any, seed: int, number: int) -> Any:
+            return [Proposal(d, f"pair-{number}.{i}") for i, d in enumerate(PROBLEM.space.sample(2, len(history)))]
+
+    callback = ProposalCallback(Pair(), 3, problem=PROBLEM)
+    for _ in range(2):
+        study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 3, callback)
+        assert [trial.user_attrs["proposal"] for trial in study.trials if trial.user_attrs] == ["pair-2.0"]
+
+
+def test_a_proposer_cannot_serve_two_studies_at_a_time(thinker: ChatServer) -> None:
+    llm = LlmProposer("test-model", thinker.url)
+
+    def meanwhile(request: Request) -> Answer:
+        other = tpe(1, directions=["minimize"] * 2)
+        with pytest.raises(SettingsError, match="llm is asking for another study; make one for each"):
+            arms(PROBLEM, other, 3, ProposalCallback(llm, 4, problem=PROBLEM))
+        return thinking(request)
+
+    thinker.answer = meanwhile
+    study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 4, ProposalCallback(llm, 4, problem=PROBLEM))
+    assert origins(study) == [0.01]
+
+
+def test_the_calls_of_a_study_are_kept_and_what_was_paid_for_is_used(thinker: ChatServer, tmp_path: Path) -> None:
+    storage = InMemoryStorage()
+
+    def go_on(n_trials: int) -> optuna.Study:
+        """As a new process would."""
+        study = optuna.create_study(
+            storage=storage, study_name="my/arms", directions=["minimize"] * 2, load_if_exists=True
+        )
+        llm = LlmProposer("test-model", thinker.url, proposals=2)
+        return arms(PROBLEM, study, n_trials, ProposalCallback(llm, 4, problem=PROBLEM, folder=tmp_path / "calls"))
+
+    def pair(request: Request) -> Answer:
+        if not wants_design(request):
+            return "two of them"
+        return json.dumps({"designs": [{**GOOD_DESIGN, "origin_x": x} for x in (0.1, 0.2)]})
+
+    thinker.answer = pair
+    go_on(4)
+    assert len(thinker.requests) == 2
+    study = go_on(4)
+    assert (origins(study), len(thinker.requests)) == ([0.1, 0.2], 2)
+    (folder,) = (tmp_path / "calls").iterdir()
+    assert folder.name.startswith("my_arms-2")
+    calls = Transcript(folder / "transcripts.jsonl").calls
+    assert [(call.proposal, call.step) for call in calls] == [("llm-0003", "reasoning"), ("llm-0003", "parameters")]
+    optuna.delete_study(study_name="my/arms", storage=storage)
+    assert origins(go_on(4)) == [0.1]  # another study of the same name: asked anew
+    assert len(thinker.requests) == 4
+    with pytest.raises(SettingsError, match="folder calls goes with problem"):
+        ProposalCallback(Told(), folder="calls")
 
 
 def test_several_designs_of_one_call_enter_one_a_block() -> None:

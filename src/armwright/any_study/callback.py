@@ -4,6 +4,7 @@ import operator
 import threading
 from collections import Counter
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import optuna
@@ -34,6 +35,8 @@ class ProposalCallback:
     every: a proposal comes in each block of so many trials.
     first: how many trials come before the first proposal; every - 1 if not given, so that blocks end with one.
     problem: the armwright problem whose design space the study searches.
+    folder: with problem, where the proposer keeps every call, in a folder for each study; of several processes each
+        needs its own. (StudyLlmProposer has `transcript`.)
     seed: of the proposer's own draws.
     on_model_failure: "continue" goes on without proposals, whatever becomes of the model; "stop" raises ModelError
         from `study.optimize` if a proposal fails before there was any.
@@ -51,12 +54,13 @@ class ProposalCallback:
         *,
         first: int | None = None,
         problem: Problem | None = None,
+        folder: str | Path | None = None,
         seed: int = 0,
         on_model_failure: str = "continue",
     ) -> None:
         if on_model_failure not in ON_MODEL_FAILURE:
             raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
-        self.proposer = _study_proposer(proposer, problem)
+        self.proposer = _study_proposer(proposer, problem, folder)
         self.every = _whole("every", every)
         self.first = max(1, self.every - 1) if first is None else _whole("first", first)
         self.seed = seed
@@ -133,7 +137,9 @@ def _attributes(source: str, proposal: StudyProposal) -> dict[str, Any]:
     return attributes
 
 
-def _study_proposer(proposer: StudyProposer | Proposer, problem: Problem | None) -> StudyProposer:
+def _study_proposer(
+    proposer: StudyProposer | Proposer, problem: Problem | None, folder: str | Path | None
+) -> StudyProposer:
     if isinstance(proposer, type):
         raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
     proposes_arms = Proposer in type(proposer).__mro__
@@ -142,10 +148,12 @@ def _study_proposer(proposer: StudyProposer | Proposer, problem: Problem | None)
             raise SettingsError(
                 f"proposer {proposer.name} proposes arms: give the problem too, ProposalCallback(…, problem=…)"
             )
+        if folder is not None:
+            raise SettingsError(f"folder {folder} goes with problem; StudyLlmProposer(transcript=…) keeps its calls")
         return proposer  # pyright: ignore[reportReturnType]
     if StudyProposer in type(proposer).__mro__:
         raise SettingsError(f"proposer {proposer.name} is for any study: leave out problem")
-    return ArmProposer(proposer, problem)  # pyright: ignore[reportArgumentType]
+    return ArmProposer(proposer, problem, folder)  # pyright: ignore[reportArgumentType]
 
 
 def _whole(name: str, value: Any) -> int:

@@ -1,9 +1,14 @@
 """What proposes for any Optuna study, and armwright's own proposers in that place."""
 
+import re
+import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
+from weakref import WeakValueDictionary
 
 import numpy as np
 import optuna
@@ -11,7 +16,7 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
 from armwright.any_study.parameters import Space, observed_space
-from armwright.exceptions import DesignError, SettingsError
+from armwright.exceptions import DesignError, RunFolderError, SettingsError
 from armwright.history import BBO, FinishedTrial, History
 from armwright.pareto import default_reference_point
 from armwright.problem import Problem
@@ -58,13 +63,22 @@ class StudyProposer(Protocol):
 
 
 class ArmProposer(StudyProposer):
-    """A proposer of arms, for somebody's own Optuna study over an armwright design space."""
+    """A proposer of arms, for somebody's own Optuna study over an armwright design space.
 
-    def __init__(self, proposer: Proposer, problem: Problem) -> None:
+    folder: where the proposer keeps what was said, in a folder for each study; None: nowhere.
+
+    One proposer may serve one study after the other: each begins anew, with an account of its own.
+    """
+
+    def __init__(self, proposer: Proposer, problem: Problem, folder: str | Path | None = None) -> None:
         self.name = proposer.name
         self.proposer = proposer
         self.problem = problem
+        self.folder = None if folder is None else Path(folder)
+        self._study: optuna.Study | None = None  # that the proposer was opened for
         self._ready: deque[Proposal] = deque()  # of a call that gave several designs
+        self._asking = 0
+        self._lock = threading.Lock()
 
     def space(self, study: optuna.Study) -> Space:
         """The design space's."""
@@ -73,14 +87,59 @@ class ArmProposer(StudyProposer):
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """What the proposer says to the study's complete trials."""
         history = study_history(study, self.problem)
-        try:
-            proposal = self._ready.popleft()
-        except IndexError:
-            made = self.proposer.propose(history, seed, number)
-            proposal, *rest = [made] if isinstance(made, Proposal) else list(made)
-            self._ready.extend(rest)
+        with self._opened(study, history):
+            try:
+                proposal = self._ready.popleft()
+            except IndexError:
+                made = self.proposer.propose(history, seed, number)
+                proposal, *rest = [made] if isinstance(made, Proposal) else list(made)
+                self._ready.extend(rest)
         design = self.problem.space.design(proposal.design.params)
         return StudyProposal(dict(design.params), proposal.id, proposal.reason, proposal.expected)
+
+    @contextmanager
+    def _opened(self, study: optuna.Study, history: History) -> Generator[None]:
+        """While the proposer serves this study, and no other.
+
+        What was said in another study, or in an earlier one of the same name, is not taken for this one's.
+        """
+        with _opening:
+            holder = _holders.get(id(self.proposer))
+            if holder is not self or self._study is not study:
+                if holder is not None and holder._asking:
+                    raise SettingsError(f"proposer {self.name} is asking for another study; make one for each")
+                self._open(study, history)
+                _holders[id(self.proposer)] = self
+            self._asking += 1
+        try:
+            yield
+        finally:
+            with _opening:
+                self._asking -= 1
+
+    def _open(self, study: optuna.Study, history: History) -> None:
+        folder = None if self.folder is None else self.folder / _folder_name(study)
+        if folder is not None:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as fault:
+                raise RunFolderError(f"cannot write {folder}: {fault.strerror or fault}") from fault
+        self.proposer.open(folder)
+        self._study = study
+        used = {trial.user_attrs.get("proposal") for trial in study.get_trials(deepcopy=False)}
+        self._ready = deque(proposal for proposal in self.proposer.unused(history) if proposal.id not in used)
+
+
+_opening = threading.Lock()
+# Who serves whom: by the id of each proposer the one that opened it last, as two callbacks may hold one proposer.
+_holders: WeakValueDictionary[int, ArmProposer] = WeakValueDictionary()
+
+
+def _folder_name(study: optuna.Study) -> str:
+    """The study's name and when it began: a study that was deleted and made again is another one."""
+    name = re.sub(r"[^A-Za-z0-9._-]+", "_", study.study_name)[:60]
+    began = next((trial.datetime_start for trial in study.get_trials(deepcopy=False) if trial.datetime_start), None)
+    return name if began is None else f"{name}-{began:%Y%m%d-%H%M%S-%f}"
 
 
 def study_history(study: optuna.Study, problem: Problem) -> History:
