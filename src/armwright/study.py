@@ -20,7 +20,7 @@ from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, results_are_there, summarize, write_results
-from armwright.run_folder import Method, RunConfig, RunFolder, versions
+from armwright.run_folder import Method, RunConfig, RunFolder, record_objectives, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_name
 from armwright.space import Design
 from armwright.turns import Alternating, Asker, Nobody, Overlapping, Recorded, Schedule, Turn, Turns
@@ -109,6 +109,7 @@ def optimize(
     config = RunConfig(
         task=problem.task,
         space=problem.space,
+        objectives=record_objectives(problem.objectives),
         reference_point=problem.reference_point,
         method=_method(proposer, sampler, n_init, n_step, n_total, in_flight),
         seed=_whole("seed", seed, 0),
@@ -142,7 +143,7 @@ class Study:
         self.folder = folder
         self.watch = watch
         self.black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives))
-        self.trials = folder.open_trials(problem.space) if folder is not None else []
+        self.trials = folder.open_trials(problem.space, len(problem.objectives)) if folder is not None else []
         self.black_box.restore(self.trials)
         self._tracker = FrontTracker(len(problem.objectives), config.reference_point)
         for trial in self.trials:
