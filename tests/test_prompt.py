@@ -48,6 +48,7 @@ from tests.fixed import (
 
 GOLDEN = Path(__file__).parent / "golden"
 PAPER = FixedProblem(load_task("target-1"))
+OPEN = load_task("target-1").model_copy(update={"reference_point": None})  # for other objectives than the paper's
 ONE_POINT = Task(name="one", targets=((0.2, 0.0, 0.3),), reference_point=(5.0, 5.0))
 DESIGNS = paper_space().sample(30, seed=9)
 REASONS = ("a universal shoulder at the centre", "", "longer links, because the far corners were missed", "x")
@@ -80,8 +81,8 @@ CASES: dict[str, Callable[[], str]] = {
     "text": lambda: rendered(fixed_history(PAPER), "minus", form="text"),
     "no-reference-point": lambda: rendered(fixed_history(FixedProblem(grid_task(3)), n=4), "minus"),
     "many-targets": lambda: rendered(fixed_history(FixedProblem(grid_task(200))), "minus"),
-    "one-objective": lambda: rendered(fixed_history(OneObjective(load_task("target-1")))),
-    "three-objectives": lambda: rendered(fixed_history(ThreeObjectives(load_task("target-1")))),
+    "one-objective": lambda: rendered(fixed_history(OneObjective(OPEN))),
+    "three-objectives": lambda: rendered(fixed_history(ThreeObjectives(OPEN))),
     "one-target-one-joint": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
     "two-joints-two-designs": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
     "nothing-yet": lambda: rendered(fixed_history(PAPER, n=0), "minus"),
@@ -240,7 +241,7 @@ def test_five_others_are_shown_however_small_the_front(n_front: int, n_others: i
 
 
 def test_designs_are_drawn_by_the_seed_alone_and_each_once() -> None:
-    history = fixed_history(ThreeObjectives(load_task("target-1")), 120)
+    history = fixed_history(ThreeObjectives(OPEN), 120)
     draws = [Feedback(history, seed) for seed in (1, 1, 2)]
     assert (draws[0].front, draws[0].others) == (draws[1].front, draws[1].others)
     assert (draws[0].front, draws[0].others) != (draws[2].front, draws[2].others)

@@ -26,7 +26,16 @@ from armwright.pareto import default_reference_point
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, read_summary, results_are_there, summarize_front, write_results
-from armwright.run_folder import PROPOSALS, SEARCH, FrontMethod, RunConfig, RunFolder, read_run, versions
+from armwright.run_folder import (
+    PROPOSALS,
+    SEARCH,
+    FrontMethod,
+    RunConfig,
+    RunFolder,
+    read_run,
+    record_objectives,
+    versions,
+)
 from armwright.search.front import FrontSearch
 from armwright.search.survival import thinned
 from armwright.study import optimize, whole
@@ -122,6 +131,7 @@ def find_front(
             space=problem.space,
             tolerance=problem.tolerance,
             device=problem.device,
+            objectives=record_objectives(problem.objectives),
             reference_point=problem.reference_point or _reference_point(problem, seed),
             method=FrontMethod(begin_with=origin),
             seed=seed,
@@ -235,7 +245,7 @@ class _Search:
         return FrontRun(history, self.config, there, path, resumed)
 
 
-def _reference_point(problem: Problem, seed: int) -> tuple[float, float]:
+def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
     """For a task that states none: from a few random designs."""
     return default_reference_point(problem.evaluate(problem.space.sample(N_SAMPLE, seed)))
 

@@ -72,7 +72,7 @@ class History:
     problem: Problem
     trials: Sequence[FinishedTrial]
     n_init: int
-    frozen_reference_point: tuple[float, float] | None = None
+    frozen_reference_point: tuple[float, ...] | None = None
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -82,17 +82,17 @@ class History:
 
     @cached_property
     def values(self) -> Array:
-        """(N, 2) position error [m] and torque [α-scaled]."""
+        """(N, M) the objectives; of the paper's: position error [m], torque [α-scaled]."""
         return np.array([trial.values for trial in self.trials]).reshape(len(self.trials), len(self.problem.objectives))
 
     @property
-    def reference_point(self) -> tuple[float, float] | None:
+    def reference_point(self) -> tuple[float, ...] | None:
         """The task's own, else the frozen one; None before the first n_init trials."""
         return self.problem.reference_point or self.frozen_reference_point
 
     @cached_property
     def front(self) -> list[FrontMember]:
-        """The Pareto set, by rising position error."""
+        """The Pareto set, by rising first objective."""
         return [self.member(number) for number in front_numbers(self.values)]
 
     def before(self, number: int) -> "History":

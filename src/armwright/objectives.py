@@ -56,4 +56,4 @@ TORQUE = Objective(
     "gravity",
     each=_torque,
 )
-PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)
+PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)

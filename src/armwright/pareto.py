@@ -79,7 +79,7 @@ def hypervolume_history(values: Array, reference_point: Sequence[float]) -> Arra
     return history
 
 
-def default_reference_point(values: Array) -> tuple[float, float]:
+def default_reference_point(values: Array) -> tuple[float, ...]:
     """1.1 times the worst non-dominated values, for a problem that states no reference point."""
     worst = 1.1 * values[front_mask(values)].max(axis=0)
     # A value of 0 would leave no area at all.
@@ -87,7 +87,7 @@ def default_reference_point(values: Array) -> tuple[float, float]:
 
 
 def knee_number(values: Array, reference_point: Sequence[float]) -> int | None:
-    """The row on the front that is farthest below the straight line between its ends within the reference box.
+    """The row on the front that is farthest below the straight line (plane) between its ends within the reference box.
 
     None where fewer than three designs of the front lie in the box.
     """
@@ -101,9 +101,11 @@ def knee_number(values: Array, reference_point: Sequence[float]) -> int | None:
 
 
 def solution_numbers(values: Array, reference_point: Sequence[float]) -> tuple[int, int] | None:
-    """Solutions 1 and 2 of the paper's figures: least position error, least torque, within the reference box.
+    """Solutions 1 and 2 of the paper's figures: least first, least last objective, within the reference box.
+
+    (Of the paper's objectives: least position error, least torque.)
 
     None where the front lies wholly outside the box.
     """
     numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
-    return (numbers[0], numbers[-1]) if numbers else None
+    return (numbers[0], min(numbers, key=lambda n: values[n, -1])) if numbers else None

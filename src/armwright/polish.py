@@ -51,7 +51,7 @@ def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
     config, _ = read_run(path)
     method = config.study
     with RunFolder(path) as folder:
-        trials = folder.open_trials(config.space)
+        trials = folder.open_trials(config.space, len(config.objectives))
         summary = read_summary(path)
         if len(trials) < method.n_trials or summary is None:
             raise RunFolderError(

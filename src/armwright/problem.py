@@ -8,6 +8,7 @@ import numpy as np
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation, evaluate, evaluate_arrays
+from armwright.exceptions import TaskError
 from armwright.kinematics.arrays import arrays_of
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.objectives import PAPER_OBJECTIVES, Objective
@@ -33,8 +34,19 @@ class Problem:
     device: Device = "cpu"
     objectives: ClassVar[tuple[Objective, ...]] = PAPER_OBJECTIVES
 
+    def __post_init__(self) -> None:
+        """TaskError where the task's reference point is for other objectives."""
+        point, names = self.reference_point, [objective.name for objective in self.objectives]
+        if point is not None and len(point) != len(names):
+            given = ", ".join(f"{value:g}" for value in point)
+            raise TaskError(
+                f"task {self.task.name} has a reference_point of {len(point)} values ({given}); the problem minimises "
+                f"{len(names)}: {', '.join(names)}. Give one value each, or none: then it is found from the first "
+                "random trials"
+            )
+
     @property
-    def reference_point(self) -> tuple[float, float] | None:
+    def reference_point(self) -> tuple[float, ...] | None:
         """The worst values that count for the hypervolume, where the task states them."""
         return self.task.reference_point
 
@@ -47,7 +59,7 @@ class Problem:
         return evaluate([self.arm(design) for design in designs], self.task.points, self.device)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
-        """(N, 2) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
+        """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
 
         Only the postures of a chunk of them are in memory at a time.
         """
@@ -62,11 +74,11 @@ class Problem:
         return values
 
     def values(self, evaluation: Evaluation) -> Array:
-        """(N, 2): position error [m] and torque [α-scaled] of evaluated designs; minimised."""
+        """(N, M): the objectives of evaluated designs, minimised."""
         return np.column_stack([objective(evaluation) for objective in self.objectives])
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
-        """(N, 2): position error [m] and torque [α-scaled] of N designs; minimised."""
+        """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
         values = self.values(self.evaluation(designs))
         if self.tolerance > 0.0:
             for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
@@ -74,5 +86,5 @@ class Problem:
         return values
 
     def _as_built(self, rows: Array) -> Array:
-        """(n, 2) of designs as rows, each built exactly as it stands there."""
+        """(n, M) of designs as rows, each built exactly as it stands there."""
         return self.values(evaluate_arrays(arrays_of(self.space, rows), self.task.points, self.device))

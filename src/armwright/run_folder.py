@@ -13,7 +13,7 @@ import errno
 import json
 import os
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
@@ -25,9 +25,11 @@ from filelock import FileLock, Timeout
 from pydantic import BaseModel, Field, ValidationError
 
 from armwright.documents import parse_document
+from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.devices import Device
+from armwright.objectives import PAPER_OBJECTIVES, Objective
 from armwright.problem import Problem
 from armwright.space import DesignSpace
 from armwright.task import Task
@@ -74,10 +76,25 @@ class FrontMethod(BaseModel, frozen=True, extra="forbid"):
         return 0
 
 
+class ObjectiveRecord(BaseModel, frozen=True, extra="forbid"):
+    """An objective as a run's settings tell of it; its formula is code."""
+
+    name: str
+    label: str
+    unit: str
+    symbol: str
+
+
+def record_objectives(objectives: Sequence[Objective]) -> tuple[ObjectiveRecord, ...]:
+    """What a run's settings tell of its objectives."""
+    return tuple(ObjectiveRecord(name=o.name, label=o.label, unit=o.unit, symbol=o.symbol) for o in objectives)
+
+
 class RunConfig(BaseModel, frozen=True, extra="forbid"):
     """Everything needed to repeat a run.
 
     tolerance, device: `Problem`'s.
+    objectives: what is minimised, in the order of the trials' values.
     reference_point: as the task states it, or as frozen after the first n_init trials (None until then).
     """
 
@@ -85,7 +102,8 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     space: DesignSpace
     tolerance: float = Field(default=0.0, ge=0.0)
     device: Device = "cpu"
-    reference_point: tuple[float, float] | None
+    objectives: tuple[ObjectiveRecord, ...] = record_objectives(PAPER_OBJECTIVES)
+    reference_point: tuple[float, ...] | None
     method: Method | FrontMethod
     seed: int
     versions: dict[str, str]
@@ -93,8 +111,15 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
 
     @property
     def problem(self) -> Problem:
-        """The problem of the run."""
-        return Problem(task=self.task, space=self.space, tolerance=self.tolerance, device=self.device)
+        """The problem of the run.
+
+        Objectives of one's own have their names and values here; to compute them again needs the problem itself.
+        """
+        if self.objectives == record_objectives(PAPER_OBJECTIVES):
+            return Problem(self.task, self.space, self.tolerance, self.device)
+        told = tuple(_told(objective) for objective in self.objectives)
+        recorded = cast("type[Problem]", type("RecordedProblem", (Problem,), {"objectives": told}))
+        return recorded(self.task, self.space, self.tolerance, self.device)
 
     @property
     def study(self) -> Method:
@@ -102,6 +127,15 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
         if isinstance(self.method, FrontMethod):
             raise RunFolderError("this run is a search for the whole front (armwright front), not a study")
         return self.method
+
+
+def _told(record: ObjectiveRecord) -> Objective:
+    def each(evaluation: Evaluation) -> Array:
+        raise RunFolderError(
+            f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
+        )
+
+    return Objective(record.name, record.label, record.unit, record.symbol, words=record.label.lower(), each=each)
 
 
 def versions() -> dict[str, str]:
@@ -177,10 +211,10 @@ class RunFolder:
         content = config.model_dump(mode="json")
         self.write_text(CONFIG, yaml.dump(content, Dumper=_ConfigDumper, sort_keys=False, allow_unicode=True))
 
-    def open_trials(self, space: DesignSpace) -> list[FinishedTrial]:
+    def open_trials(self, space: DesignSpace, n_objectives: int = len(PAPER_OBJECTIVES)) -> list[FinishedTrial]:
         """The finished trials; a last line that a crash cut short is dropped. Opens the file for `append`."""
         path = self.path / TRIALS
-        trials, intact = _read_trials(path, space)
+        trials, intact = _read_trials(path, space, n_objectives)
         try:
             self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
             self._trials.truncate(intact)
@@ -249,7 +283,7 @@ def read_run(path: str | Path) -> tuple[RunConfig, History]:
     """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
     path = Path(path)
     config = read_config(path)
-    trials, _ = _read_trials(path / TRIALS, config.space)
+    trials, _ = _read_trials(path / TRIALS, config.space, len(config.objectives))
     return config, History(config.problem, trials, config.method.n_init, config.reference_point)
 
 
@@ -267,7 +301,7 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     refines: int | None = None
     evaluations: int = Field(default=1, ge=1)
     params: dict[str, float | str]
-    values: list[float] = Field(min_length=2, max_length=2)
+    values: list[float] = Field(min_length=1)
     seconds: dict[str, float]
     sampler_notes: dict[str, dict[str, Any]] = {}
 
@@ -292,7 +326,7 @@ def _trial_line(trial: FinishedTrial) -> bytes:
     return json.dumps(record.model_dump(exclude_defaults=True)).encode() + b"\n"
 
 
-def _read_trials(path: Path, space: DesignSpace) -> tuple[list[FinishedTrial], int]:
+def _read_trials(path: Path, space: DesignSpace, n_objectives: int) -> tuple[list[FinishedTrial], int]:
     """The trials of a file, and its length [bytes] without a cut last line."""
     try:
         content = path.read_bytes()
@@ -304,7 +338,7 @@ def _read_trials(path: Path, space: DesignSpace) -> tuple[list[FinishedTrial], i
     trials: list[FinishedTrial] = []
     for number, line in enumerate(content[:end].split(b"\n")[:-1]):
         try:
-            trials.append(_parse_trial(line, number, space))
+            trials.append(_parse_trial(line, number, space, n_objectives))
         except (ValueError, DesignError) as fault:
             raise RunFolderError(
                 f"{path}, line {number + 1} is damaged ({_words(fault)}); restore the file, or delete this line and "
@@ -313,8 +347,10 @@ def _read_trials(path: Path, space: DesignSpace) -> tuple[list[FinishedTrial], i
     return trials, end
 
 
-def _parse_trial(line: bytes, number: int, space: DesignSpace) -> FinishedTrial:
+def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int) -> FinishedTrial:
     record = _TrialRecord.model_validate_json(line)
+    if len(record.values) != n_objectives:
+        raise ValueError(f"{len(record.values)} values where {n_objectives} are due")
     if record.number != number:
         raise ValueError(f"number {record.number} where {number} is due")
     return FinishedTrial(
@@ -370,6 +406,7 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     """What makes a run this run and no other, flat."""
     content = config.model_dump(mode="json")
     content["task"] = {key: content["task"][key] for key in ("name", "targets", "reference_point")}
+    content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)
     for key in ("versions", "earlier_versions", "reference_point"):

@@ -21,7 +21,7 @@ from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.refining import Refinement, refine_one
 from armwright.results import discard_results, read_summary, results_are_there, summarize, write_results
-from armwright.run_folder import Method, RunConfig, RunFolder, versions
+from armwright.run_folder import Method, RunConfig, RunFolder, record_objectives, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_name
 from armwright.space import Design
 from armwright.turns import Asker, Nobody, Recorded, Schedule, Turn, Turns, asking_turns, past_turns
@@ -120,6 +120,7 @@ def optimize(
         space=problem.space,
         tolerance=problem.tolerance,
         device=problem.device,
+        objectives=record_objectives(problem.objectives),
         reference_point=problem.reference_point,
         method=_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every),
         seed=whole("seed", seed, 0),
@@ -155,7 +156,7 @@ class Study:
         overlap = self.method.in_flight is not None
         self._asker = None if proposer is None else Asker(proposer, config.seed, None if overlap else self._asking)
         self.black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives))
-        self.trials = folder.open_trials(problem.space) if folder is not None else []
+        self.trials = folder.open_trials(problem.space, len(problem.objectives)) if folder is not None else []
         self.black_box.restore(self.trials)
         self._tracker = FrontTracker(len(problem.objectives), config.reference_point)
         for trial in self.trials:

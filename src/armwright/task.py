@@ -28,7 +28,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     targets: tuple[Point, ...]
-    reference_point: tuple[float, float] | None = None  # (position error [m], torque [α-scaled])
+    # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
+    reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
     description: str = Field(default="", max_length=10_000)
     provenance: str = Field(default="", max_length=10_000)
 
@@ -45,7 +46,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
                     "coordinates are in metres (armwright init --from FILE --unit mm converts)"
                 )
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
-            raise ValueError(f"reference_point = {list(self.reference_point)} must be above 0 in both objectives")
+            raise ValueError(f"reference_point = {list(self.reference_point)} must be above 0 in each objective")
         return self
 
     @property

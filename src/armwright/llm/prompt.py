@@ -218,7 +218,6 @@ def estimated_tokens(text: str) -> int:
 
 def _common(history: History, memory: str, proposals: int, form: Form) -> dict[str, Any]:
     problem = history.problem
-    reference = history.reference_point
     return {
         "space": problem.space,
         "joint_words": JOINT_WORDS,
@@ -229,8 +228,7 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "updates": UPDATES,
         "objectives": problem.objectives,
         "tolerance": problem.tolerance,
-        # A task states two numbers; a problem with other objectives has no use for them.
-        "reference_point": reference if reference and len(reference) == len(problem.objectives) else None,
+        "reference_point": history.reference_point,
         "n_finished": len(history),
         "n_front": len(history.front),
         "proposals": proposals,

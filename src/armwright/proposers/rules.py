@@ -13,6 +13,7 @@ import numpy as np
 
 from armwright.evaluation import Array
 from armwright.history import FrontMember, History
+from armwright.objectives import PAPER_OBJECTIVES, TORQUE
 from armwright.pareto import hypervolume_history
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.proposers.structures import OPENING, fitted
@@ -71,7 +72,7 @@ class RulesProposer(Proposer):
 
 def bounds(history: History) -> tuple[float, ...]:
     """The reference point; unbounded as long as there is none."""
-    return history.reference_point or (np.inf, np.inf)
+    return history.reference_point or (np.inf,) * len(history.problem.objectives)
 
 
 def members_inside(history: History) -> list[FrontMember]:
@@ -92,13 +93,15 @@ def most_promising(history: History, name: str) -> str:
             added[rule].append(float(gain[trial.number]))
     if len(history.problem.space.joint_types) == 1:
         del added["swap"]  # there is no other axis
+    if history.problem.objectives != PAPER_OBJECTIVES:
+        del added["fill"]  # it reads the front as position error against torque
     return max(added, key=lambda rule: float(np.mean(added[rule])))
 
 
 def open_with(history: History, earlier: int, rng: np.random.Generator) -> tuple[Design, str]:
     """A structure of the opening; from the second round on, of another size."""
     structure = OPENING[earlier % len(OPENING)]
-    torque = bounds(history)[1]
+    torque = dict(zip(history.problem.objectives, bounds(history), strict=True)).get(TORQUE, np.inf)
     if earlier >= len(OPENING):
         torque *= rng.uniform(0.1, 1.0) ** 2
     design = fitted(structure, history.problem, torque)

@@ -20,7 +20,7 @@ from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions
-from armwright.objectives import TORQUE
+from armwright.objectives import POSITION_ERROR, TORQUE
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, RC, TARGET, Look, look
 from armwright.results import FIGURES, read_summary
@@ -52,17 +52,21 @@ def write_figures(folder: str | Path) -> list[Path]:
 
 
 def _figures(history: History) -> Iterator[tuple[str, Figure]]:
+    plane = len(history.problem.objectives) > 1  # of the first two objectives
     yield "hypervolume", draw_hypervolume(history)
-    yield "samples", draw_samples(history)
+    if plane:
+        yield "samples", draw_samples(history)
     yield "credit", draw_credit(history)
-    yield "front", draw_front(history)
+    if plane:
+        yield "front", draw_front(history)
     yield from _arm_figures(history)
 
 
 def _search_figures(history: History, summary: Mapping[str, Any]) -> Iterator[tuple[str, Figure]]:
     """Of a search for the whole front, whose trials are that front."""
     yield "hypervolume", draw_search(history, summary)
-    yield "front", draw_front(history)
+    if len(history.problem.objectives) > 1:
+        yield "front", draw_front(history)
     yield from _arm_figures(history)
 
 
@@ -76,21 +80,25 @@ def _arm_figures(history: History) -> Iterator[tuple[str, Figure]]:
 def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     """Solution 1 (least position error), the knee, Solution 2 (least torque), all within the reference box.
 
-    Before them the most precise design of all, where it lies beyond the box.
+    Before them the most precise design of all, where it lies beyond the box. Of other objectives, the first and the
+    last one take the places of position error and torque.
     """
-    reference = _reference(history)
+    reference, objectives = _reference(history), history.problem.objectives
     numbers = front_numbers(history.values)
+    first, last = (f"least {objective.label.lower()}" for objective in (objectives[0], objectives[-1]))
     solutions = solution_numbers(history.values, reference)
     if solutions is None:
-        titled = {numbers[0]: "Least position error of all", numbers[-1]: "Least torque of all"}
+        lowest = min(numbers, key=lambda n: history.values[n, -1])
+        titled = {numbers[0]: f"{first.capitalize()} of all", lowest: f"{last.capitalize()} of all"}
         return [(title, history.member(number)) for number, title in titled.items()]
-    titled = {solutions[0]: "Solution 1: least position error"}
+    titled = {solutions[0]: f"Solution 1: {first}"}
     if numbers[0] != solutions[0]:
-        titled = {numbers[0]: "Most precise of all, beyond the reference point", **titled}
+        best = "Most precise" if objectives[0] is POSITION_ERROR else first.capitalize()
+        titled = {numbers[0]: f"{best} of all, beyond the reference point", **titled}
     knee = knee_number(history.values, reference)
     if knee is not None:
         titled.setdefault(knee, "Knee of the front")
-    titled.setdefault(solutions[1], "Solution 2: least torque")
+    titled.setdefault(solutions[1], f"Solution 2: {last}")
     return [(title, history.member(number)) for number, title in titled.items()]
 
 
@@ -153,7 +161,7 @@ def draw_samples(history: History) -> Figure:
     for axes, iteration in zip(panels, shown, strict=False):
         part = History(history.problem, history.trials[: history.n_init + iteration], history.n_init)
         _scatter(axes, part, _reference(history))
-        beyond = int(np.sum(np.any(part.values > SHOWN * np.asarray(_reference(history)), axis=1)))
+        beyond = int(np.sum(np.any(part.values[:, :2] > SHOWN * np.asarray(_reference(history)[:2]), axis=1)))
         axes.set_title(f"After {iteration} iterations" + (f"\n({beyond} designs outside the view)" if beyond else ""))
         axes.set_xlabel(_label(history, 0))
     for axes in panels[len(shown) :]:
@@ -189,18 +197,18 @@ def draw_front(history: History) -> Figure:
     _scatter(axes, history, reference, faint=True)
     for member in history.front:
         style = look(member.source)
-        axes.scatter(*member.values, s=1.6 * style.size, marker=style.marker, **_paint(style), zorder=4)
+        axes.scatter(*member.values[:2], s=1.6 * style.size, marker=style.marker, **_paint(style), zorder=4)
     near = 0  # labels of points close together are stacked
     before = np.full(2, np.inf)
     for title, member in chosen_members(history):
-        if np.any(np.array(member.values) > SHOWN * np.array(reference)):
+        place = np.array(member.values[:2]) / np.array(reference[:2])
+        if np.any(place > SHOWN):
             continue
-        place = np.array(member.values) / np.array(reference)
         near = near + 1 if np.abs(place - before).max() < 0.15 else 0
         before = place
         axes.annotate(
             f"{title.split(':')[0].split(',')[0]}\n#{member.number}  {member.design.joints}",
-            member.values,
+            member.values[:2],
             xytext=(10, -34 if place[1] > 0.9 * SHOWN else 10 + 40 * near),
             textcoords="offset points",
             fontsize=8,
@@ -274,12 +282,12 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
         )
     front = values[front_numbers(values)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
-    if len(inside):
+    if len(inside) and len(reference) == 2:  # of more objectives there is no line to draw
         x = [inside[0, 0], *inside[:, 0], reference[0]]
         y = [reference[1], *inside[:, 1], inside[-1, 1]]
         axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
         axes.fill_between(x, y, reference[1], step="post", color="#F0E442", alpha=0.18, linewidth=0, zorder=0.5)
-    axes.plot(*reference, marker="+", color=FRONT, markersize=9, clip_on=False)
+    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
     axes.set_xlim(0, SHOWN * reference[0])
     axes.set_ylim(0, SHOWN * reference[1])
     if not len(inside):
@@ -345,7 +353,8 @@ def _legend(history: History) -> list[Line2D]:
         Line2D([], [], linestyle="", marker=look(s).marker, color=look(s).colour, markersize=5, label=look(s).label)
         for s in _sources(history)
     ]
-    return [*marks, Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front")]
+    line = Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front")
+    return [*marks, line] if len(history.problem.objectives) == 2 else marks
 
 
 def _arm_legend() -> list[Line2D]:
@@ -369,10 +378,13 @@ def _fill(style: Look) -> dict[str, Any]:
 
 
 def _words(history: History, member: FrontMember) -> str:
-    error, torque = member.values
     length = sum(member.design.links)
     first = f"#{member.number} ({look(member.source).label}), {member.design.joints}, length {length:.2f} m"
-    return f"{first}\nposition error {error:.4g} m, torque {torque:.4g}"
+    values = (
+        f"{objective.label.lower()} {value:.4g}" + ("" if objective is TORQUE else f" {objective.unit}")
+        for objective, value in zip(history.problem.objectives, member.values, strict=True)
+    )
+    return f"{first}\n{', '.join(values)}"
 
 
 def _label(history: History, i: int) -> str:
@@ -385,7 +397,7 @@ def _pair(values: Sequence[float]) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"
 
 
-def _reference(history: History) -> tuple[float, float]:
+def _reference(history: History) -> tuple[float, ...]:
     reference = history.reference_point
     if reference is None:
         raise RunFolderError(f"figures need the {history.n_init} random trials; the run has only {len(history)} so far")
