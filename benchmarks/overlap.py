@@ -76,7 +76,7 @@ def main() -> None:
             seconds, run = timed(slow, proposer, 100, n_step=n_step, in_flight=in_flight)
             row(f"{EVALUATION:g} s a trial, n_step {n_step}, {answer}, {in_flight} in flight", seconds, bare, run)
         bare, _ = timed(fast, "none", 200)
-        for in_flight in (1, 2, 4):
+        for in_flight in (1, 2, 4, 8):
             proposer = LlmProposer("stand-in", server.url, origin="scripted")
             seconds, run = timed(fast, proposer, 200, n_step=10, in_flight=in_flight)
             calls = run.summary["proposer"]["calls"]
