@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-PARTS = ("evaluation.py", "overhead.py", "paper.py", "rules.py")
+PARTS = ("evaluation.py", "overhead.py", "paper.py", "rules.py", "front.py", "time_to_front.py", "overlap.py")
 
 
 def main() -> None:

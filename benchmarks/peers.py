@@ -38,7 +38,8 @@ class Nsga2:
         self.rows = np.empty((0, len(self._categorical)))
         self.values = np.empty((0, len(problem.objectives)))
         self.course: list[tuple[int, float, Array]] = []
-        minimize(_Columns(self), NSGA2(pop_size=population), _Over(self), seed=seed)
+        # A copy of the termination would watch a copy of this run, which never ends.
+        minimize(_Columns(self), NSGA2(pop_size=population), _Over(self), copy_termination=False, seed=seed)
         self.own_seconds = time.perf_counter() - self._started - self._kernels
 
     @property

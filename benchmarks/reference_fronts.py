@@ -27,11 +27,12 @@ from armwright.search.survival import front, thinned
 from armwright.space import FloatParameter
 from armwright.task import builtin_tasks
 
-SEEDS = range(3)
+SEEDS = range(2)
 EVALUATIONS = 400_000  # for each seed
-PER_SEQUENCE = 5_000
-PYMOO_EVALUATIONS = 100_000
-MOST = 500  # designs of a shipped front
+PER_SEQUENCE = 4_000
+PYMOO_EVALUATIONS = 50_000
+MOST = 1000  # designs of a shipped front
+DECIMALS = 6  # of its parameters: a micrometre
 PLACE = Path(armwright.__file__).parent / "fronts"
 
 
@@ -62,7 +63,9 @@ def make(problem: Problem) -> None:
     theirs = Nsga2(problem, seed=0, population=200, evaluations=PYMOO_EVALUATIONS)
     take(f"pymoo's NSGA-II, {PYMOO_EVALUATIONS:,} evaluations", (theirs.rows, theirs.values))
 
-    everything, worth = np.vstack(rows), np.vstack(values)
+    # Rounded first, so that the values are those of the numbers in the file.
+    everything = np.round(np.vstack(rows), DECIMALS)
+    worth = problem.evaluate_matrix(everything)
     on_front = front(worth, np.asarray(reference))
     kept = on_front[thinned(worth[on_front], np.asarray(reference), MOST)]
     kept = kept[np.argsort(worth[kept, 0])]
@@ -115,7 +118,7 @@ def write(problem: Problem, rows: Array, values: Array, reference: tuple[float, 
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([p.name for p in problem.space.parameters] + [o.name for o in problem.objectives])
     for design, row in zip(problem.space.designs(rows), values.tolist(), strict=True):
-        writer.writerow([*design.params.values(), *row])
+        writer.writerow([*design.params.values(), *(f"{value:.9g}" for value in row)])
     PLACE.mkdir(exist_ok=True)
     (PLACE / f"{problem.task.name}.csv").write_text(text.getvalue())
 
