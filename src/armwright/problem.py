@@ -52,7 +52,7 @@ class Problem:
         return self.values(evaluate_arrays(arrays_of(self.space, matrix), self.task.points))
 
     def values(self, evaluation: Evaluation) -> Array:
-        """(N, M): the objectives of evaluated designs, minimised; of the paper: position error [m], torque [α-scaled]."""
+        """(N, M): objectives of evaluated designs, minimised; of the paper: position error [m], torque [α-scaled]."""
         return np.column_stack([objective(evaluation) for objective in self.objectives])
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
