@@ -1,6 +1,7 @@
 """`front`: a search for the whole front in a run folder: counted, resumed, seeded, refused."""
 
 import json
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -169,7 +170,12 @@ def test_it_ends_when_nothing_grows() -> None:
 
 
 def known_tasks() -> list[str]:
-    return list(builtin_tasks())
+    fronts = resources.files("armwright") / "fronts"
+    return [name for name in builtin_tasks() if (fronts / f"{name}.csv").is_file()]
+
+
+def test_the_paper_s_tasks_have_a_best_known_front() -> None:
+    assert {"target-1", "target-2", "target-3"} <= set(known_tasks())
 
 
 @pytest.mark.parametrize("name", known_tasks())
