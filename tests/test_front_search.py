@@ -180,3 +180,32 @@ def test_arms_are_found_far_better_than_at_random():
     columns = Columns(SPACE.parameters)
     random = problem.evaluate_matrix(columns.random(search.evaluations, np.random.default_rng(0)))
     assert search.hypervolume > 1.1 * hypervolume(random, (5.0, 5.0))
+
+
+@pytest.mark.slow
+def test_pymoo_s_nsga2_finds_no_more_on_average_over_five_seeds():
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem as PymooProblem
+    from pymoo.optimize import minimize
+
+    problem = Problem(load_task("target-2"))
+    bounds = [(p.low, p.high) if isinstance(p, FloatParameter) else (0.0, 3.0 - 1e-9) for p in SPACE.parameters]
+    categorical = [isinstance(p, CategoricalParameter) for p in SPACE.parameters]
+
+    class Arms(PymooProblem):
+        def _evaluate(self, x, out, *args, **kwargs):
+            out["F"] = problem.evaluate_matrix(np.where(categorical, np.floor(x), x))
+            found.append(out["F"])
+
+    theirs, ours = [], []
+    for seed in range(5):
+        found = []
+        low, high = np.array(bounds).T
+        arms = Arms(n_var=len(bounds), n_obj=2, xl=low, xu=high)
+        minimize(arms, NSGA2(pop_size=100), ("n_eval", 20_000), seed=seed)
+        theirs.append(hypervolume(np.vstack(found), (5.0, 5.0)))
+        search = FrontSearch(SPACE.parameters, problem.evaluate_matrix, (5.0, 5.0), seed)
+        while search.evaluations < 20_000:
+            search.step()
+        ours.append(search.hypervolume)
+    assert np.mean(ours) >= np.mean(theirs)

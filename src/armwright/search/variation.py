@@ -10,7 +10,7 @@ DIFFERENCE_SHARE = 0.35  # of the batch: a difference of two neighbours is added
 LINE_SHARE = 0.3  # of the batch: on the line to a neighbour, and somewhat beyond; the rest is a normal step
 STEP_EXPONENTS = (-4.5, -1.0)  # of ten; normal steps are this long, as a share of a parameter's range
 STEP_DENSITIES = (0.15, 0.3, 1.0)  # the share of parameters that a normal step changes
-CATEGORY_SHARE = 0.15  # of the batch: categories change, too
+CATEGORY_SHARE = 0.3  # of the batch: categories change, too
 
 
 def offspring(rows: Array, columns: Columns, n: int, rng: np.random.Generator) -> Array:
