@@ -211,7 +211,7 @@ class _Search:
         if not path.exists():
             return
         try:
-            with np.load(path, allow_pickle=False) as state:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as state:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
         except (OSError, EOFError, ValueError, KeyError, BadZipFile) as fault:
