@@ -24,9 +24,9 @@ from armwright.space import Parameter
 FRONT_LIMITS = (800, 1000)  # designs; a front longer than the second is thinned to the first
 CAPACITIES = (100, 1000)  # designs in the pool, at first and at last
 EVALUATIONS_A_PLACE = 200  # the pool grows by one design for so many evaluations
-SMALLEST_BATCH = 200  # designs a generation; as many as the pool holds once that is more
-FIRST_BATCH = 1000  # random designs at the start
-LEADER_SHARE = 0.5  # leaders of structures beside the pool, for one design in it
+SMALLEST_BATCH = 100  # designs a generation; as many as the pool holds once that is more
+FIRST_BATCH = 500  # random designs at the start
+LEADER_SHARE = 0.25  # leaders of structures beside the pool, for one design in it
 MARK_SPACING = 1.02  # the hypervolume is noted whenever the evaluations have grown by this factor
 STALL_SHARE = 0.5  # of the evaluations, the latest
 STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
