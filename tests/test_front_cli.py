@@ -80,4 +80,4 @@ def test_a_search_is_not_polished_and_a_study_not_continued_as_a_search(in_folde
     assert "not a study" in refused(1, "polish", "run")
     assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")
     assert "not a study" in refused(1, "prompt", "--after", "run")
-    assert "not a study" in refused(1, "optimize", "target-1", "--proposer", "replay:run", "--out", "other")
+    assert "to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:run", "--out", "other")

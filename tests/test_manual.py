@@ -201,8 +201,8 @@ def test_a_folder_with_what_is_left_of_another_run_is_refused(tmp_path: Path) ->
 
 def test_a_folder_that_cannot_be_one(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(FailureError, match=r"cannot write .*004-prompt\.md"):
-        run(ManualProposer(tmp_path / "file", wait=False), None)
+    with pytest.raises(SettingsError, match="file is a file; manual needs a folder"):
+        ManualProposer(tmp_path / "file", wait=False)
 
 
 def test_answers_are_kept_as_peoples(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, probl
     assert all("position error" in title or "spread" in title or "nee" in title for title in titles)
     with pytest.raises(RunFolderError, match="an objective of its own"):
         history.problem.evaluate(problem.space.sample(1, 0))
-    assert (tmp_path / "run" / "front.csv").read_text().splitlines()[0].endswith(",".join(names))
+    assert (tmp_path / "run" / "trials.csv").read_text().splitlines()[0].endswith(",".join(names))
 
 
 def test_other_objectives_are_another_run(tmp_path: Path) -> None:

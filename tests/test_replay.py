@@ -13,7 +13,6 @@ import pytest
 from armwright.exceptions import ReplayError, SettingsError
 from armwright.llm.transcript import Transcript
 from armwright.problem import Problem
-from armwright.proposers.asking import Asking
 from armwright.proposers.choice import Wishes, choose_proposer
 from armwright.proposers.llm import LlmProposer
 from armwright.proposers.replay import ReplayProposer
@@ -224,7 +223,7 @@ def test_what_a_transcript_cannot_say_is_taken_from_the_wishes(varied: ChatServe
     recorded(varied, tmp_path / "first", {"prompt": str(mine), "memory": "own"})
     shutil.copy(tmp_path / "first" / "transcripts.jsonl", tmp_path / "alone.jsonl")
     for record in ("first", "alone.jsonl"):
-        wishes = Wishes(f"replay:{tmp_path / record}", asking=Asking(str(mine), "own"), replay_strict=True)
+        wishes = Wishes(f"replay:{tmp_path / record}", prompt=str(mine), memory="own", replay_strict=True)
         again = optimize(PROBLEM, proposer=choose_proposer(wishes).proposer, **SETTINGS)
         assert again.summary["proposer"]["failures"] == {}
 
@@ -233,23 +232,23 @@ def test_what_a_transcript_cannot_say_is_taken_from_the_wishes(varied: ChatServe
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
-        (Asking(memory="own"), "recorded with memory none; leave out --memory own"),
-        (Asking(answer="one-step"), "recorded with answer two-step; leave out --answer one-step"),
-        (Asking(proposals=4), "recorded with proposals 1; leave out --proposals 4"),
-        (Asking("minus"), "recorded with prompt plus; leave out --prompt minus"),
+        ({"memory": "own"}, "recorded with memory none; leave out --memory own"),
+        ({"answer": "one-step"}, "recorded with answer two-step; leave out --answer one-step"),
+        ({"proposals": 4}, "recorded with proposals 1; leave out --proposals 4"),
+        ({"prompt": "minus"}, "recorded with prompt plus; leave out --prompt minus"),
     ],
 )
 def test_wishes_that_contradict_the_record_are_refused(
-    chat_server: ChatServer, tmp_path: Path, wish: Asking, words: str, alone: bool
+    chat_server: ChatServer, tmp_path: Path, wish: dict[str, Any], words: str, alone: bool
 ) -> None:
     recorded(chat_server, tmp_path / "first", n_total=1)
     if alone:
         (tmp_path / "first" / "config.yaml").unlink()
-    if alone and (wish.prompt, wish.memory) != ("plus", "none"):  # which nothing in the transcript says
-        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", asking=wish))
+    if alone and wish.keys() & {"prompt", "memory"}:  # which nothing in the transcript says
+        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", **wish))
         return
     with pytest.raises(SettingsError, match=words):
-        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", asking=wish))
+        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", **wish))
 
 
 def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatServer, tmp_path: Path) -> None:

@@ -31,16 +31,20 @@ def values_of(problem: Problem, designs: list[Design], start: np.ndarray | None 
     )
 
 
+def agree(found: np.ndarray, expected: np.ndarray) -> None:
+    """Values (N, 2) of whole solves, 8 or more a design: the chaotic among them show, by little, to either side."""
+    assert found.mean(axis=0) == pytest.approx(expected.mean(axis=0), rel=5e-3)
+    assert np.mean(np.all(np.abs(found - expected) < 0.02 * expected + 1e-3, axis=1)) > 0.8
+
+
 @pytest.fixture(scope="module")
 def designs() -> list[Design]:
     return PROBLEM.space.sample(60, seed=4)
 
 
 def test_exact_values_are_the_references(designs: list[Design]) -> None:
-    """In float64 the two agree but for the few designs on which the solver is chaotic even there."""
     found = verify(PROBLEM, designs, PROBLEM.evaluate(designs), BOX)
-    apart = np.abs(found.exact - values_of(PROBLEM, designs)).max(axis=1)
-    assert np.mean(apart < 1e-6) > 0.9
+    agree(found.exact, values_of(PROBLEM, designs))
 
 
 def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None:
@@ -53,7 +57,7 @@ def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None
         assert off.max(axis=1) == pytest.approx(1e-3)
     found = verify(PROBLEM, designs, PROBLEM.evaluate(designs), BOX)
     worst = np.max([values_of(PROBLEM, PROBLEM.space.designs(copy)) for copy in copies], axis=0)
-    assert np.mean(np.abs(found.moved - worst).max(axis=1) < 1e-6) > 0.9
+    agree(found.moved, worst)
 
 
 def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
@@ -61,9 +65,7 @@ def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
     shape = STARTS, len(PROBLEM.task.targets), PROBLEM.space.joints
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
     worst = np.max([values_of(PROBLEM, designs, start) for start in starts], axis=0)
-    # 160 solves a design, so the chaotic ones among them show in most: by little, and to either side.
-    assert found.started.mean(axis=0) == pytest.approx(worst.mean(axis=0), rel=5e-3)
-    assert np.mean(np.abs(found.started / worst - 1.0).max(axis=1) < 0.02) > 0.8
+    agree(found.started, worst)
 
 
 def test_what_is_solid_follows_from_the_worst_cases(designs: list[Design]) -> None:

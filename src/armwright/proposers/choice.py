@@ -54,7 +54,10 @@ class Wishes:
 
 
 _OF_MODELS = tuple(f.name for f in fields(Wishes) if f.name not in ("name", "replay_strict", "once"))
-_OF_MANUAL = ("prompt", "memory", "proposals")  # people answer in text, and cost nothing
+_USED = {
+    "manual": ("prompt", "memory", "proposals"),  # people answer in text, and cost nothing
+    "replay": ("prompt", "memory", "answer", "proposals"),  # for a transcript alone; what contradicts it is refused
+}
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,7 @@ def _check(wishes: Wishes, kind: str, colon: str, place: str) -> None:
             raise SettingsError(
                 f"--proposer {wishes.name} uses no language model; leave out --base-url {wishes.base_url}"
             )
-        if unused := wishes.unused(_OF_MANUAL if kind == "manual" else ()):
+        if unused := wishes.unused(_USED.get(kind, ())):
             raise SettingsError(f"--proposer {wishes.name} does not use {unused}; leave it out, or take --proposer llm")
     for value, option, needed in (
         (wishes.once, "--once", "manual"),

@@ -49,10 +49,12 @@ def refine(
     budget: evaluations for each design.
     """
     columns = Columns(parameters)
+    if not len(columns.real):
+        return Refined(rows, values, np.zeros(len(rows), dtype=bool), 0)
     best_rows, best_values = rows.copy(), values.copy()
     best = np.zeros(len(rows))  # how much worse than the given design, in the objective that lost most
     strategy = _Strategies(columns.units(rows), np.random.default_rng(seed))
-    generations = budget // POPULATION if len(columns.real) else 0
+    generations = budget // POPULATION
     every = np.arange(len(rows))
     for _ in range(generations):
         units = strategy.ask()  # (N, K, R)
