@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from armwright.exceptions import SettingsError
+from armwright.exceptions import ReplayError, SettingsError
 from armwright.proposers.choice import Wishes, choose_proposer
 
 
@@ -30,6 +30,9 @@ def test_an_option_that_has_no_use_is_refused(tmp_path: Path, name: str, said: s
     wishes = Wishes(name.replace("x", str(tmp_path / "x")), **{said: value})
     if name == "manual:x" and said in ("prompt", "memory", "proposals"):
         assert choose_proposer(wishes).proposer is not None
+    elif name == "replay:x" and said in ("prompt", "memory", "answer", "proposals"):  # checked against the record
+        with pytest.raises(ReplayError, match="to replay"):
+            choose_proposer(wishes)
     else:
         with pytest.raises(SettingsError, match=f"--{said.replace('_', '-')} {value}"):
             choose_proposer(wishes)
