@@ -189,7 +189,7 @@ def test_version_and_help() -> None:
         (("target-1", "--memory", "none"), "--memory none goes with a language model, and none is configured"),
         (("target-1", "--proposer", "rules", "--max-calls", "0"), "rules does not use --max-calls 0"),
         (("target-1", "--proposer", "none", "--temperature", "0"), "none does not use --temperature 0.0; leave it out"),
-        (("target-1", "--proposer", "replay:x", "--answer", "one-step"), "replay:x does not use --answer one-step"),
+        (("target-1", "--proposer", "replay:x", "--temperature", "0"), "replay:x does not use --temperature 0.0"),
         (("target-1", "--proposer", "manual:x", "--origin", "model"), "manual:x does not use --origin model"),
         (("target-1", "--proposer", "manual:x", "--answer", "text"), "manual:x does not use --answer text"),
         (("target-1", "--in-flight", "2"), "goes with --overlap"),
