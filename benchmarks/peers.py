@@ -22,7 +22,7 @@ class Nsga2:
     """One run of it.
 
     rows, values: the front of all designs that it evaluated.
-    course: (evaluations, seconds, front's values) after each generation.
+    course: (evaluations, seconds, front's values) after each generation; the keeping of that front takes no time here.
     own_seconds: without those in the kernels.
     """
 
@@ -32,7 +32,7 @@ class Nsga2:
         self._problem = problem
         self._categorical = [not isinstance(p, FloatParameter) for p in problem.space.parameters]
         self._most_evaluations, self._most_seconds = evaluations, seconds
-        self._kernels = 0.0
+        self._kernels = self._keeping = 0.0
         self._started = time.perf_counter()
         self.evaluations = 0
         self.rows = np.empty((0, len(self._categorical)))
@@ -40,23 +40,28 @@ class Nsga2:
         self.course: list[tuple[int, float, Array]] = []
         # A copy of the termination would watch a copy of this run, which never ends.
         minimize(_Columns(self), NSGA2(pop_size=population), _Over(self), copy_termination=False, seed=seed)
-        self.own_seconds = time.perf_counter() - self._started - self._kernels
+        self.own_seconds = self._seconds - self._kernels
 
     @property
     def is_over(self) -> bool:
-        seconds = time.perf_counter() - self._started
-        return self.evaluations >= self._most_evaluations or seconds >= self._most_seconds
+        return self.evaluations >= self._most_evaluations or self._seconds >= self._most_seconds
+
+    @property
+    def _seconds(self) -> float:
+        return time.perf_counter() - self._started - self._keeping
 
     def evaluate(self, x: Array) -> Array:
         rows = np.where(self._categorical, np.floor(x), x)
         started = time.perf_counter()
         values = self._problem.evaluate_matrix(rows)
-        self._kernels += time.perf_counter() - started
+        done = time.perf_counter()
+        self._kernels += done - started
         self.evaluations += len(rows)
         everything, worth = np.vstack([self.rows, rows]), np.vstack([self.values, values])
         kept = front_mask(worth)
         self.rows, self.values = everything[kept], worth[kept]
-        self.course.append((self.evaluations, time.perf_counter() - self._started, self.values))
+        self._keeping += time.perf_counter() - done
+        self.course.append((self.evaluations, self._seconds, self.values))
         return values
 
     @property

@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from armwright.best_known import standing
 from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
@@ -123,6 +124,7 @@ def draw_hypervolume(history: History) -> Figure:
                 zorder=3,
                 label=f"gained by {style.label}",
             )
+    _best_known(axes, history)
     axes.set_xlabel(f"Iteration (after {history.n_init} random trials)")
     axes.set_ylabel("Hypervolume")
     axes.set_title(f"{history.problem.task.name}, reference point {_pair(_reference(history))}")
@@ -139,9 +141,7 @@ def draw_search(history: History, summary: Mapping[str, Any]) -> Figure:
     figure, axes = _figure(5.2, 3.2)
     evaluations, volumes = np.array(summary["search"]["hypervolume_history"]).T
     axes.step(evaluations, volumes, where="post", color=FRONT, linewidth=1.4, label="hypervolume")
-    if summary["best_known"] is not None:
-        best = summary["best_known"]["hypervolume"]
-        axes.axhline(best, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=f"best known ({best:.2f})")
+    _best_known(axes, history)
     axes.set_xscale("log")
     axes.set_xlabel("Designs evaluated")
     axes.set_ylabel("Hypervolume")
@@ -292,6 +292,14 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
     axes.set_ylim(0, SHOWN * reference[1])
     if not len(inside):
         _say(axes, "No design lies within the reference box.")
+
+
+def _best_known(axes: Any, history: History) -> None:
+    """A line at the best known hypervolume of the task, where there is one."""
+    found = standing(history.problem, history.values, _reference(history))
+    if found is not None:
+        words = f"best known ({found.hypervolume:.2f})"
+        axes.axhline(found.hypervolume, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=words)
 
 
 def _stack(axes: Any, layers: Mapping[str, np.ndarray]) -> None:
