@@ -1,12 +1,13 @@
 """Problems with one objective, or with three: a run completes, resumes, and its numbers are moocore's."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import moocore
 import numpy as np
 import pytest
 
-from armwright.exceptions import RunConflictError, RunFolderError, TaskError
+from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError
 from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
 from armwright.problem import Problem
 from armwright.report.figures import chosen_members, write_figures
@@ -33,6 +34,20 @@ class Three(Problem):
 
 
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})
+
+
+def test_polish_within_a_study_of_one_objective() -> None:
+    run = optimize(One(OPEN), proposer="none", n_init=3, n_total=8, polish_every=3)
+    assert any(trial.refines is not None for trial in run.trials)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+def test_an_objective_that_is_no_finite_number_is_refused(tmp_path: Path, number: float) -> None:
+    class Broken(Problem):
+        objectives = (POSITION_ERROR, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))
+
+    with pytest.raises(SettingsError, match="objective spread of a design is"):
+        optimize(Broken(OPEN), proposer="none", n_total=2, out=tmp_path / "run")
 
 
 def bounded(*point: float) -> Task:

@@ -1,18 +1,19 @@
 """Refinement and polish: better in every objective, within the space, counted, and the same each time."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from armwright.exceptions import RunFolderError, SettingsError
+from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.history import POLISH
 from armwright.pareto import Array, hypervolume
 from armwright.polish import polish_run
 from armwright.problem import Problem
 from armwright.results import read_summary
 from armwright.run_folder import read_run
-from armwright.search.refinement import POPULATION, refine
+from armwright.search.refinement import POPULATION, Refined, refine
 from armwright.space import CategoricalParameter, FloatParameter
 from armwright.study import Run, optimize
 from armwright.task import load_task
@@ -106,16 +107,36 @@ def test_polish_adds_what_became_better(run: Run) -> None:
     assert read.trials == list(polished.history.trials)
 
 
-def test_a_polished_run_is_finished_and_can_be_extended(run: Run) -> None:
+def test_a_polished_run_is_finished_and_cannot_be_extended(run: Run) -> None:
     assert run.folder is not None
     polish_run(run.folder, 120)
     _, before = read_run(run.folder)
     settings = {"proposer": "rules", "n_init": 5, "n_step": 5, "seed": 0, "out": run.folder}
     again = optimize(PROBLEM, n_total=30, **settings)
     assert list(again.trials) == before.trials
-    longer = optimize(PROBLEM, n_total=30 + len(before) - 35 + 4, **settings)
-    assert list(longer.trials[: len(before)]) == before.trials
-    assert len(longer.trials) == len(before) + 4
+    with pytest.raises(RunConflictError, match="was polished"):
+        optimize(PROBLEM, n_total=100, **settings)
+    assert read_run(run.folder)[1].trials == before.trials
+
+
+def test_polish_counts_evaluations_in_vain_and_tries_anew(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert run.folder is not None
+    seeds: list[int] = []
+
+    def nothing_better(history: Any, members: Any, seed: int, evaluations: int) -> Refined:
+        seeds.append(seed)
+        values = np.array([member.values for member in members])
+        rows = history.problem.space.matrix([member.design for member in members])
+        return Refined(rows, values, np.zeros(len(rows), dtype=bool), evaluations * len(rows))
+
+    monkeypatch.setattr("armwright.polish.refine_members", nothing_better)
+    first = polish_run(run.folder, 120)
+    assert first.added == 0
+    assert first.summary["evaluations"] == 35 + first.evaluations
+    second = polish_run(run.folder, 120)
+    assert second.summary["evaluations"] == 35 + 2 * first.evaluations
+    assert second.summary["polish"] == {"rounds": 2, "in_vain": 2 * first.evaluations}
+    assert len(set(seeds)) == 2
 
 
 def test_polish_refuses_what_it_cannot_do(run: Run, tmp_path: Path) -> None:

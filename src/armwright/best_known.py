@@ -17,7 +17,7 @@ from armwright.problem import Problem
 from armwright.space import Design, FloatParameter, paper_space
 from armwright.task import builtin_tasks
 
-BEYOND = 2e-4  # of the best known hypervolume: any other front fills the gaps of a finite one by less
+BEYOND = 5e-4  # of the best known hypervolume: any other front fills the gaps of a finite one by less
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Standing:
     hypervolume: of the best known front.
     share: of it, what the front has; above 1 where it is better.
     beyond: how many of the front's designs the best known front does not dominate.
-    gain: what these add to the best known hypervolume, relative; where it is less than 0.02 %, both are 0.
+    gain: what these add to the best known hypervolume, relative; where it is less than 0.05 %, both are 0.
     """
 
     hypervolume: float
@@ -48,7 +48,7 @@ def known_front(problem: Problem) -> KnownFront | None:
     """The best known front of a problem: of a built-in task's targets in the paper's design space, else None."""
     paper = paper_space()
     same_space = problem.space.model_copy(update={"name": paper.name}) == paper
-    if not same_space or problem.tolerance or len(problem.objectives) != len(Problem.objectives):
+    if not same_space or problem.tolerance or problem.objectives != Problem.objectives:
         return None
     for name, task in builtin_tasks().items():
         if task.targets == problem.task.targets:

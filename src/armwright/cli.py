@@ -335,7 +335,11 @@ def front(
         _print_json({"folder": str(folder), **run.summary})
         return
     if run.resumed:
-        words.print(f"went on from {run.resumed:,} evaluations")
+        went_on = run.summary["search"]["evaluations"] > run.resumed
+        more = "a larger --budget goes on" if run.summary["search"]["ended_by"] == "budget" else "--no-stall goes on"
+        words.print(
+            f"went on from {run.resumed:,} evaluations" if went_on else f"finished before; nothing was computed: {more}"
+        )
     view.show_search(words, run, figures)
 
 

@@ -6,22 +6,21 @@ proposals/    the run in which a proposer gave the first designs, where one did
 """
 
 import io
-import math
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
 from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.history import FRONT, FinishedTrial, FrontMember, History
+from armwright.kinematics.solve import MANY_ARMS
 from armwright.pareto import default_reference_point
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposer
@@ -37,7 +36,6 @@ from armwright.run_folder import (
     versions,
 )
 from armwright.search.front import FrontSearch
-from armwright.search.survival import thinned
 from armwright.study import optimize, whole
 from armwright.verification import verify_front
 
@@ -57,6 +55,12 @@ class Budget:
     evaluations: int | None = None
     seconds: float | None = None
 
+    def __post_init__(self) -> None:
+        """SettingsError for a budget that nothing can be done with."""
+        for name, bound in (("evaluations", self.evaluations), ("seconds", self.seconds)):
+            if bound is not None and not 0.0 < bound <= LARGEST_BUDGET:
+                raise SettingsError(f"a budget of {bound} {name}: above 0 and at most {LARGEST_BUDGET:g}")
+
     @classmethod
     def of(cls, words: str) -> "Budget":
         """`5s`, `2min`, `1h`, or a number of evaluations such as `100000` or `1e6`."""
@@ -70,7 +74,8 @@ class Budget:
 
     def is_spent(self, evaluations: int, seconds: float) -> bool:
         """Whether that much is all, or more."""
-        return evaluations >= (self.evaluations or math.inf) or seconds >= (self.seconds or math.inf)
+        bounds = ((evaluations, self.evaluations), (seconds, self.seconds))
+        return any(bound is not None and spent >= bound for spent, bound in bounds)
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,7 @@ class FrontRun:
 def find_front(
     problem: Problem,
     *,
-    budget: str | Budget = "5s",
+    budget: str | int | Budget = "5s",
     seed: int = 0,
     begin_with: str | Path | Proposer | None = None,
     stop_at_stall: bool = True,
@@ -112,20 +117,16 @@ def find_front(
 ) -> FrontRun:
     """The Pareto front of `problem`, as nearly as the budget allows; with `out` a second call goes on.
 
-    budget: a time such as "5s" (loading the kernels not included), or a number of evaluations. With a number the result
-        depends on the seed alone.
+    budget: a time such as "5s" (loading the kernels not included), or a number of evaluations, of which the last batch
+        may go beyond it by up to 1000. With a number the result depends on the seed alone.
     begin_with: a run folder, all of whose designs are taken, or a proposer, who gives the first designs.
     stop_at_stall: whether to end early when the hypervolume hardly grows any more.
     """
-    budget = Budget.of(budget) if isinstance(budget, str) else budget
+    budget = budget if isinstance(budget, Budget) else Budget.of(str(budget))
     seed = whole("seed", seed, 0)
-    known = _known(problem, begin_with)  # before a folder is made
+    rows, origin = _beginning(problem, begin_with)  # before a folder is made
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
-        if known is None:
-            assert begin_with is not None and not isinstance(begin_with, (str, Path))  # noqa: PT018
-            known = _proposed(problem, begin_with, seed, None if folder is None else folder.path)
-        rows, origin = known
         config = RunConfig(
             task=problem.task,
             space=problem.space,
@@ -139,6 +140,12 @@ def find_front(
         )
         if folder is not None:
             config = folder.adopt(config)
+        if folder is None or not (folder.path / SEARCH).exists():
+            # A proposer is asked, and paid, only once the folder is known to be ours.
+            if begin_with is not None and not isinstance(begin_with, (str, Path)):
+                rows = _proposed(problem, begin_with, seed, None if folder is None else folder.path)
+            if folder is not None:
+                rows = np.vstack([rows, _rows(problem, folder.open_trials(problem.space, len(problem.objectives)))])
         return _Search(problem, config, folder, rows, watch).run(budget, stop_at_stall)
 
 
@@ -168,10 +175,13 @@ class _Search:
     def run(self, budget: Budget, stop_at_stall: bool) -> FrontRun:
         """Searches as long as the budget lasts, then writes what was found."""
         resumed = self.search.evaluations
-        self.problem.evaluate_matrix(self.problem.space.matrix(self.problem.space.sample(1, 0)))  # loads the kernels
+        few = self.problem.space.matrix(self.problem.space.sample(1, 0))
+        self.problem.evaluate_matrix(np.repeat(few, MANY_ARMS, axis=0))  # so many load all kernels that are used
         ended = self._end(budget, stop_at_stall)
         if not ended and self.folder is not None:
             discard_results(self.folder.path)
+            self.config = self.folder.note_versions(self.config)
+        state = None  # after the last whole generation, as a Ctrl-C may fall into the midst of one
         try:
             before, saved = self.seconds, time.monotonic()
             started = saved
@@ -179,14 +189,15 @@ class _Search:
                 self.search.step()
                 now = time.monotonic()
                 self.seconds = before + now - started
+                state = {"seconds": self.seconds, **self.search.state()}
                 if now - saved >= SAVE_SECONDS:
-                    self._save()
+                    self._save(state)
                     saved = now
                 if self.watch is not None:
                     self.watch(self._progress(budget))
         finally:
-            if self.search.evaluations > resumed:
-                self._save()
+            if state is not None:
+                self._save(state)
         return self._finish(ended, resumed)
 
     def _end(self, budget: Budget, stop_at_stall: bool) -> str:
@@ -199,11 +210,11 @@ class _Search:
         search = self.search
         return FrontProgress(search.evaluations, self.seconds, search.hypervolume, len(search.rows), budget)
 
-    def _save(self) -> None:
+    def _save(self, state: Mapping[str, Any]) -> None:
         if self.folder is None:
             return
         content = io.BytesIO()
-        np.savez_compressed(content, seconds=self.seconds, **self.search.state())
+        np.savez_compressed(content, **state)
         self.folder.write_bytes(SEARCH, content.getvalue())
 
     def _restore(self, folder: RunFolder) -> None:
@@ -214,13 +225,13 @@ class _Search:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as state:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
-        except (OSError, EOFError, ValueError, KeyError, BadZipFile) as fault:
+        except Exception as fault:  # numpy, zipfile, zlib and tokenize each have their own
             raise RunFolderError(
-                f"{path} is damaged ({fault}); delete it, and the search begins anew from the front in {folder.path}"
+                f"{path} is damaged ({fault}); delete it, and the search begins anew with the front in {folder.path}"
             ) from fault
 
     def _finish(self, ended: str, resumed: int) -> FrontRun:
-        kept = np.sort(thinned(self.search.values, np.asarray(self.config.reference_point), MOST_DESIGNS))
+        kept = self.search.best(MOST_DESIGNS)
         designs = self.problem.space.designs(self.search.rows[kept])
         trials = [
             FinishedTrial(number, FRONT, design, tuple(values))
@@ -233,14 +244,16 @@ class _Search:
             "ended_by": ended,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
+        found = self.search.values
         if self.folder is None:
-            return FrontRun(history, self.config, summarize_front(history, self.config, searched, None), None, resumed)
+            summary = summarize_front(history, self.config, found, searched, None)
+            return FrontRun(history, self.config, summary, None, resumed)
         path = self.folder.path
         there = read_summary(path)
         if there is None or not results_are_there(path, history) or there["search"]["ended_by"] != ended:
             self.folder.replace_trials(trials)
             verification = verify_front(history)
-            there = summarize_front(history, self.config, searched, verification)
+            there = summarize_front(history, self.config, found, searched, verification)
             write_results(self.folder, history, there, verification)
         return FrontRun(history, self.config, there, path, resumed)
 
@@ -250,28 +263,31 @@ def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
     return default_reference_point(problem.evaluate(problem.space.sample(N_SAMPLE, seed)))
 
 
-Beginning = tuple[Array, dict[str, Any] | None]  # designs as rows (N, P), and where they come from
+def _rows(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:
+    """(N, P) their designs."""
+    return problem.space.matrix([trial.design for trial in trials]).reshape(-1, len(problem.space.parameters))
 
 
-def _known(problem: Problem, begin_with: str | Path | Proposer | None) -> Beginning | None:
-    """Designs that are there already; None where a proposer is to give them."""
+def _beginning(problem: Problem, begin_with: str | Path | Proposer | None) -> tuple[Array, dict[str, Any] | None]:
+    """(N, P) designs that are there already, and where they come from; none yet where a proposer is to give them."""
+    nothing = _rows(problem, ())
     if begin_with is None:
-        return np.empty((0, len(problem.space.parameters))), None
+        return nothing, None
     if not isinstance(begin_with, (str, Path)):
-        return None
+        return nothing, {"proposer": {"name": begin_with.name, **begin_with.settings()}}
     _, run = read_run(begin_with)
-    if run.problem.space != problem.space or run.problem.task.targets != problem.task.targets:
+    space = run.problem.space.model_copy(update={"name": problem.space.name})
+    if space != problem.space or run.problem.task.targets != problem.task.targets:
         raise SettingsError(
             f"{begin_with} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"
         )
-    rows = problem.space.matrix([trial.design for trial in run])
+    rows = _rows(problem, run)
     return rows, {"run": str(begin_with), "designs": len(rows), "sha256": sha256(rows.tobytes()).hexdigest()}
 
 
-def _proposed(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Beginning:
-    """A proposer's designs, from a study in which every counted trial is its own: kept and paid for as in any other."""
+def _proposed(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Array:
+    """(N, P) a proposer's designs, from a study whose counted trials are all its own: kept and paid for as in any."""
     folder = None if out is None else out / PROPOSALS
     study = optimize(problem, proposer=proposer, n_step=1, n_total=N_PROPOSED, seed=seed, out=folder)
-    rows = problem.space.matrix([trial.design for trial in study.history])
-    return rows, {"proposer": {"name": proposer.name, **proposer.settings()}}
+    return _rows(problem, study.history)

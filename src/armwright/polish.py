@@ -9,10 +9,11 @@ import numpy as np
 
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.history import POLISH, FinishedTrial, FrontMember, History
-from armwright.refining import EVALUATIONS, refine_members, worth_refining
+from armwright.refining import EVALUATIONS, POLISHING, refine_members, worth_refining
 from armwright.results import discard_results, read_summary, resummarize, write_results
 from armwright.run_folder import RunFolder, read_run
 from armwright.search.refinement import POPULATION, Refined
+from armwright.seeding import derived_seed
 from armwright.verification import verify_front
 
 MOST_EVALUATIONS = 10**9
@@ -60,8 +61,12 @@ def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
             )
         before = History(config.problem, tuple(trials), method.n_init, config.reference_point)
         members = worth_refining(before)
-        refined = refine_members(before, members, config.seed, evaluations)
+        earlier = summary.get("polish") or {"rounds": 0, "in_vain": 0}
+        seed = derived_seed(config.seed, POLISHING, len(before), earlier["rounds"])
+        refined = refine_members(before, members, seed, evaluations)
         found = _trials(before, members, refined)
+        in_vain = earlier["in_vain"] + (0 if found else refined.evaluations)
+        summary = {**summary, "polish": {"rounds": earlier["rounds"] + 1, "in_vain": in_vain}}
         discard_results(path)
         for trial in found:
             folder.append(trial)
@@ -73,7 +78,10 @@ def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
 
 
 def _trials(history: History, members: Sequence[FrontMember], refined: Refined) -> list[FinishedTrial]:
-    """A trial for each design that became better; all evaluations are shared out among these."""
+    """A trial for each design that became better; all evaluations are shared out among these.
+
+    Where none did, the summary tells of the evaluations: under `polish`, and in its sum.
+    """
     better = np.flatnonzero(refined.improved).tolist()
     designs = history.problem.space.designs(refined.rows[better])
     return [

@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation, evaluate, evaluate_arrays
-from armwright.exceptions import TaskError
+from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import arrays_of
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.objectives import PAPER_OBJECTIVES, Objective
@@ -35,7 +35,9 @@ class Problem:
     objectives: ClassVar[tuple[Objective, ...]] = PAPER_OBJECTIVES
 
     def __post_init__(self) -> None:
-        """TaskError where the task's reference point is for other objectives."""
+        """Settles which device "auto" is; TaskError where the task's reference point is for other objectives."""
+        if self.device not in POSTURES_AT_ONCE:
+            object.__setattr__(self, "device", resolve_device(self.device, many=True))
         point, names = self.reference_point, [objective.name for objective in self.objectives]
         if point is not None and len(point) != len(names):
             given = ", ".join(f"{value:g}" for value in point)
@@ -63,7 +65,7 @@ class Problem:
 
         Only the postures of a chunk of them are in memory at a time.
         """
-        size = max(1, POSTURES_AT_ONCE[resolve_device(self.device, many=True)] // len(self.task.points))
+        size = max(1, POSTURES_AT_ONCE[self.device] // len(self.task.points))
         values = np.empty((len(matrix), len(self.objectives)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
@@ -74,8 +76,15 @@ class Problem:
         return values
 
     def values(self, evaluation: Evaluation) -> Array:
-        """(N, M): the objectives of evaluated designs, minimised."""
-        return np.column_stack([objective(evaluation) for objective in self.objectives])
+        """(N, M): the objectives of evaluated designs, minimised; SettingsError where one is not a finite number."""
+        values = np.column_stack([objective(evaluation) for objective in self.objectives])
+        if not np.all(np.isfinite(values)):
+            row, column = np.argwhere(~np.isfinite(values))[0]
+            raise SettingsError(
+                f"objective {self.objectives[column].name} of a design is {values[row, column]}; it must be a finite "
+                "number for every design, a large one for a bad design"
+            )
+        return values
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
         """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""

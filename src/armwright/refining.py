@@ -32,15 +32,15 @@ class Refinement:
 def refine_one(history: History, seed: int) -> Refinement:
     """The design of the front that is worth it most, refined; seed: the run's."""
     member = next_to_refine(history)
-    refined = refine_members(history, [member], seed, EVALUATIONS)
+    refined = refine_members(history, [member], derived_seed(seed, POLISHING, len(history)), EVALUATIONS)
     (design,) = history.problem.space.designs(refined.rows)
     return Refinement(member.number, design if refined.improved[0] else None, refined.evaluations)
 
 
 def worth_refining(history: History) -> list[FrontMember]:
     """The front within the reference box, or the whole one where it lies outside."""
-    reference = np.asarray(history.reference_point or np.inf)
-    return [member for member in history.front if np.all(np.array(member.values) < reference)] or history.front
+    inside = [member for member in history.front if np.all(np.array(member.values) < history.reference_point)]
+    return inside or history.front
 
 
 def next_to_refine(history: History) -> FrontMember:
@@ -49,24 +49,26 @@ def next_to_refine(history: History) -> FrontMember:
     tried = {trial.refines for trial in history}
     fresh = [m for m in members if m.source != POLISH and m.number not in tried] or members
     values = np.array([member.values for member in members])
-    if history.reference_point is None or hypervolume(values, history.reference_point) == 0.0:
+    reference = history.reference_point
+    assert reference is not None  # what is refined comes after the first random trials
+    if values.shape[1] == 1 or hypervolume(values, reference) == 0.0:
         return fresh[0]
-    contributions = moocore.hv_contributions(values, ref=list(history.reference_point))
+    contributions = moocore.hv_contributions(values, ref=list(reference))
     adds = {member.number: float(c) for member, c in zip(members, contributions, strict=True)}
     return max(fresh, key=lambda member: adds[member.number])
 
 
 def refine_members(history: History, members: Sequence[FrontMember], seed: int, evaluations: int) -> Refined:
-    """The designs of `members`, refined side by side; seed: the run's."""
+    """The designs of `members`, refined side by side."""
     problem = history.problem
     values = np.array([member.values for member in members])
-    scale = history.reference_point or values.max(axis=0).tolist()
+    assert history.reference_point is not None
     return refine(
         problem.space.parameters,
         problem.evaluate_matrix,
         problem.space.matrix([member.design for member in members]),
         values,
-        scale,
+        history.reference_point,
         evaluations,
-        derived_seed(seed, POLISHING, len(history)),
+        seed,
     )

@@ -19,6 +19,7 @@ from typing import Any
 from armwright.best_known import standing
 from armwright.credit import credit_by_source
 from armwright.diagnostics import diagnose
+from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.history import FinishedTrial, FrontMember, History
@@ -115,10 +116,11 @@ def summarize(
             "mean": float(counted.mean()) if len(counted) else None,
             "history": curve.tolist(),
         },
-        "best_known": _standing_record(history),
+        "best_known": _standing_record(history, history.values),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         "evaluations": sum(trial.evaluations for trial in history),
+        "polish": None,
         "credit": {source: asdict(credit) for source, credit in credit_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
         "diagnostics": None if proposer is None else asdict(diagnose(history, proposer.name)),
@@ -128,10 +130,11 @@ def summarize(
 
 
 def summarize_front(
-    history: History, config: RunConfig, search: Mapping[str, Any], verification: Verification | None
+    history: History, config: RunConfig, found: Array, search: Mapping[str, Any], verification: Verification | None
 ) -> dict[str, Any]:
     """What a search for the whole front came to, as summary.json says it.
 
+    found: (N, M) the whole front, of which `history` may hold a part only.
     search: evaluations, seconds, why it ended, and the hypervolume over the evaluations.
     """
     reference = history.reference_point or ()
@@ -140,8 +143,8 @@ def summarize_front(
         "seed": config.seed,
         "n_trials": len(history),
         "by_source": dict(Counter(trial.source for trial in history)),
-        "hypervolume": {"reference_point": list(reference), "final": hypervolume(history.values, reference)},
-        "best_known": _standing_record(history),
+        "hypervolume": {"reference_point": list(reference), "final": hypervolume(found, reference)},
+        "best_known": _standing_record(history, found),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         "search": dict(search),
@@ -154,17 +157,20 @@ def resummarize(
 ) -> dict[str, Any]:
     """The summary of a finished run after trials were added or designs verified; what only its sessions knew stays."""
     if isinstance(config.method, FrontMethod):
-        return summarize_front(history, config, summary["search"], verification)
-    known = {key: summary[key] for key in ("proposer", "diagnostics") if key in summary}
-    return summarize(history, config, None, verification) | known
+        return {**summary, "verification": _verification_record(history, verification)}
+    known = {key: summary[key] for key in ("proposer", "diagnostics", "polish") if key in summary}
+    new = summarize(history, config, None, verification) | known
+    if new["polish"] is not None:
+        new["evaluations"] += new["polish"]["in_vain"]
+    return new
 
 
-def _standing_record(history: History) -> dict[str, Any] | None:
-    """How the front compares with the best known one, where there is one."""
+def _standing_record(history: History, found: Array) -> dict[str, Any] | None:
+    """How a front compares with the best known one, where there is one."""
     if history.reference_point is None:
         return None
-    found = standing(history.problem, history.values, history.reference_point)
-    return None if found is None else asdict(found)
+    stands = standing(history.problem, found, history.reference_point)
+    return None if stands is None else asdict(stands)
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:

@@ -28,7 +28,7 @@ from armwright.documents import parse_document
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
 from armwright.history import FinishedTrial, History
-from armwright.kinematics.devices import Device
+from armwright.kinematics.devices import Device, usable_device
 from armwright.objectives import PAPER_OBJECTIVES, Objective
 from armwright.problem import Problem
 from armwright.space import DesignSpace
@@ -111,21 +111,24 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
 
     @property
     def problem(self) -> Problem:
-        """The problem of the run.
+        """The problem of the run; on the CPU, where its GPU is not here.
 
         Objectives of one's own have their names and values here; to compute them again needs the problem itself.
         """
         if self.objectives == record_objectives(PAPER_OBJECTIVES):
-            return Problem(self.task, self.space, self.tolerance, self.device)
+            return Problem(self.task, self.space, self.tolerance, usable_device(self.device))
         told = tuple(_told(objective) for objective in self.objectives)
         recorded = cast("type[Problem]", type("RecordedProblem", (Problem,), {"objectives": told}))
-        return recorded(self.task, self.space, self.tolerance, self.device)
+        return recorded(self.task, self.space, self.tolerance, usable_device(self.device))
 
     @property
     def study(self) -> Method:
         """How its study searches; RunFolderError where it is a search for the whole front."""
         if isinstance(self.method, FrontMethod):
-            raise RunFolderError("this run is a search for the whole front (armwright front), not a study")
+            raise RunFolderError(
+                "this run is a search for the whole front, not a study: its front needs no polish, and "
+                "`armwright front` with a larger --budget goes on with it"
+            )
         return self.method
 
 
@@ -187,9 +190,22 @@ class RunFolder:
         there = read_config(self.path)
         _check_same_run(self.path, there, config)
         if config.method != there.method:  # a larger n_total
+            if (self.path / TRIALS).read_bytes().count(b"\n") > there.study.n_trials:
+                raise RunConflictError(
+                    f"{self.path} was polished, so its study cannot go on; give another --out DIR, or polish it again"
+                )
             there = there.model_copy(update={"method": config.method})
             self.write_config(there)
         return there
+
+    def note_versions(self, config: RunConfig) -> RunConfig:
+        """The configuration of a run that goes on: where the versions are others now, those before are noted."""
+        now = versions()
+        if config.versions != now:
+            earlier = [*config.earlier_versions, config.versions]
+            config = config.model_copy(update={"versions": now, "earlier_versions": earlier})
+            self.write_config(config)
+        return config
 
     def _holds_run(self) -> bool:
         """Whether a run lies here that came to a trial, or to a first state of its search."""
@@ -409,6 +425,8 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)
+    if method.get("begin_with"):
+        method["begin_with"].pop("run", None)  # a path has many spellings; what lay there is known by its sha256
     for key in ("versions", "earlier_versions", "reference_point"):
         del content[key]
     return _flat({**content, **method})

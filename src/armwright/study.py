@@ -224,11 +224,7 @@ class Study:
         if self.folder is None:
             return
         discard_results(self.folder.path)
-        now = versions()
-        if self.config.versions != now:
-            earlier = [*self.config.earlier_versions, self.config.versions]
-            self.config = self.config.model_copy(update={"versions": now, "earlier_versions": earlier})
-            self.folder.write_config(self.config)
+        self.config = self.folder.note_versions(self.config)
 
     def _step(self, number: int, turns: Turns) -> None:
         started = time.perf_counter()

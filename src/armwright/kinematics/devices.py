@@ -28,6 +28,11 @@ def resolve_device(name: str, many: bool) -> Device:
     return cast("Device", name)
 
 
+def usable_device(device: Device) -> Device:
+    """The device, or the CPU where it is not here: a run of another machine can still be read, drawn and verified."""
+    return "cpu" if device == "cuda" and not _has_cuda() else device
+
+
 def cores() -> int:
     """The processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -3,10 +3,10 @@
 An elitist search over one pool of designs: each generation varies its members, evaluates the children as one batch,
 and keeps those that the hypervolume needs. The pool is small at first, to get near the front, and grows, to resolve it.
 
-The combination of categories (an arm's joint sequence) is a design's structure. The best design of each structure
-stays beside the pool, so that no structure is given up because another was good first. The pool is sorted by
-structure and then by the first objective: a member's neighbours are designs whose parameters mean the same and whose
-values are near, and their differences are the steps worth trying.
+The combination of categories (an arm's joint sequence) is a design's structure. The best designs of the most promising
+structures stay beside the pool, so that these are not given up because another was good first. The pool is sorted by
+structure and then by the first objective: a member's neighbours are mostly designs whose parameters mean the same and
+whose values are near, and their differences are the steps worth trying.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +16,7 @@ import numpy as np
 
 from armwright.pareto import hypervolume
 from armwright.search.columns import Array, Columns
-from armwright.search.survival import front, leaders, survivors, thinned
+from armwright.search.survival import Rows, front, leaders, nearest, survivors, thinned
 from armwright.search.variation import offspring
 from armwright.seeding import derived_seed
 from armwright.space import Parameter
@@ -28,6 +28,7 @@ SMALLEST_BATCH = 100  # designs a generation; as many as the pool holds once tha
 FIRST_BATCH = 500  # random designs at the start
 LEADER_SHARE = 0.25  # leaders of structures beside the pool, for one design in it
 MARK_SPACING = 1.02  # the hypervolume is noted whenever the evaluations have grown by this factor
+STALL_FROM = 20_000  # evaluations; a good beginning looks like a stall at first
 STALL_SHARE = 0.5  # of the evaluations, the latest
 STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
 
@@ -74,7 +75,10 @@ class FrontSearch:
 
     @property
     def rows(self) -> Array:
-        """(K, P) the designs of the front within the reference box, at most 1000, by rising first objective."""
+        """(K, P) the designs of the front within the reference box, at most 1000, by rising first objective.
+
+        As long as none lies within: those of the front nearest to it.
+        """
         return self._front_rows
 
     @property
@@ -94,7 +98,9 @@ class FrontSearch:
 
     @property
     def stalled(self) -> bool:
-        """Whether the latest half of the evaluations brought less than 0.03 % of hypervolume."""
+        """Whether the latest half of the evaluations, 20,000 at least, brought less than 0.03 % of hypervolume."""
+        if self._evaluations < STALL_FROM:
+            return False
         evaluations, hypervolumes = self.history.T
         before = np.searchsorted(evaluations, (1.0 - STALL_SHARE) * self._evaluations, side="right") - 1
         return bool(before >= 0 and 0.0 < hypervolumes[-1] <= (1.0 + STALL_GROWTH) * hypervolumes[before])
@@ -119,8 +125,14 @@ class FrontSearch:
         rows = self.ask()
         self.tell(rows, self._evaluate(rows))
 
+    def best(self, most: int) -> Rows:
+        """The places in `rows`, rising, of so many designs at most: of those that the hypervolume needs most."""
+        if self.hypervolume == 0.0:
+            return np.sort(nearest(self._front_values, self._reference_point, most))
+        return np.sort(thinned(self._front_values, self._reference_point, most))
+
     def state(self) -> dict[str, Any]:
-        """All that `restore` needs, arrays and numbers."""
+        """All that `restore` needs, arrays and numbers; they never change."""
         return {
             "generation": self._generation,
             "evaluations": self._evaluations,
@@ -147,9 +159,11 @@ class FrontSearch:
     def _select(self, rows: Array, values: Array) -> None:
         """Takes new designs into the front and the pool, as far as they are good enough."""
         front_rows, front_values = np.vstack([self._front_rows, rows]), np.vstack([self._front_values, values])
-        kept = front(front_values, self._reference_point)
         shortened, longest = FRONT_LIMITS
-        if len(kept) > longest:
+        kept = front(front_values, self._reference_point)
+        if not len(kept):
+            kept = nearest(front_values, self._reference_point, shortened)
+        elif len(kept) > longest:
             kept = kept[thinned(front_values[kept], self._reference_point, shortened)]
         kept = kept[np.argsort(front_values[kept, 0], kind="stable")]
         self._front_rows, self._front_values = front_rows[kept], front_values[kept]

@@ -17,6 +17,14 @@ def front(values: Array, reference_point: Array) -> Rows:
     return within[front_mask(values[within])]
 
 
+def nearest(values: Array, reference_point: Array, most: int) -> Rows:
+    """The rows on the front of `values` (N, M), at most so many, that exceed the reference box least, each objective by
+    its own scale."""
+    best = np.flatnonzero(front_mask(values))
+    excess = np.maximum(values[best] / reference_point - 1.0, 0.0).sum(axis=1)
+    return best[np.argsort(excess, kind="stable")[:most]]
+
+
 def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
     """The rows of `values` (N, M) that stay, at most `capacity`: of the front, or the whole front and the next best.
 
