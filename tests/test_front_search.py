@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -133,6 +135,25 @@ def test_a_search_stalls_when_the_hypervolume_no_longer_grows():
         assert search.evaluations < 500_000
     late, early = search.hypervolume, np.interp(search.evaluations / 2, *search.history.T)
     assert late / early - 1.0 < 1e-3
+
+
+def test_side_pools_begin_join_and_survive_a_stop(monkeypatch):
+    for name, value in (("SIDE_FROM", 2000), ("SIDE_LIFE", 1500)):
+        monkeypatch.setattr(f"armwright.search.front.{name}", value)
+    search, ages = made(), []
+    while search.evaluations < 12_000:
+        search.step()
+        ages.append(int(search.state()["side_age"]))
+        if len(ages) == 60:
+            other = made()
+            other.restore(search.state())
+    assert max(ages) < 1500
+    assert sum(before > after for before, after in itertools.pairwise(ages)) >= 1  # one joined
+    spent = search.state()["side_evaluations"]
+    assert spent == pytest.approx(0.25 * (search.evaluations - 2000), abs=FIRST_BATCH)
+    while other.evaluations < 12_000:
+        other.step()
+    assert np.array_equal(other.rows, search.rows)
 
 
 def test_a_front_wholly_outside_the_box_is_drawn_towards_it():

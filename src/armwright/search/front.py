@@ -7,6 +7,9 @@ The combination of categories (an arm's joint sequence) is a design's structure.
 structures stay beside the pool, so that these are not given up because another was good first. The pool is sorted by
 structure and then by the first objective: a member's neighbours are mostly designs whose parameters mean the same and
 whose values are near, and their differences are the steps worth trying.
+
+What a pool has lost it hardly finds again. So a part of the evaluations goes to a side pool, which begins at random,
+knows nothing of the main one, and joins it after a while; then the next one begins.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -27,6 +30,9 @@ EVALUATIONS_A_PLACE = 200  # the pool grows by one design for so many evaluation
 SMALLEST_BATCH = 100  # designs a generation; as many as the pool holds once that is more
 FIRST_BATCH = 500  # random designs at the start
 LEADER_SHARE = 0.25  # leaders of structures beside the pool, for one design in it
+SIDE_FROM = 25_000  # evaluations
+SIDE_SHARE = 0.25  # of the evaluations after these
+SIDE_LIFE = 5_000  # evaluations of a side pool until it joins
 MARK_SPACING = 1.02  # the hypervolume is noted whenever the evaluations have grown by this factor
 STALL_FROM = 20_000  # evaluations; a good beginning looks like a stall at first
 STALL_SHARE = 0.5  # of the evaluations, the latest
@@ -64,6 +70,8 @@ class FrontSearch:
         self._values = np.empty((0, len(self._reference_point)))
         self._marks: list[tuple[int, float]] = []
         self._front_rows, self._front_values = self._rows, self._values
+        self._side_rows, self._side_values = self._rows, self._values
+        self._side_evaluations = self._side_age = 0
         if values is not None:
             self._select(self._known, values)
             self._known = self._known[:0]
@@ -110,13 +118,23 @@ class FrontSearch:
         rng = np.random.default_rng(derived_seed(self._seed, self._generation))
         if self._generation == 0:
             return np.vstack([self._known, self._columns.random(FIRST_BATCH, rng)])
-        return offspring(self._rows, self._columns, max(SMALLEST_BATCH, self._capacity), rng)
+        if not self._is_side_turn:
+            return offspring(self._rows, self._columns, max(SMALLEST_BATCH, self._capacity), rng)
+        if not len(self._side_rows):
+            return self._columns.random(FIRST_BATCH, rng)
+        return offspring(self._side_rows, self._columns, SMALLEST_BATCH, rng)
 
     def tell(self, rows: Array, values: Array) -> None:
         """Takes what `ask` gave, evaluated."""
+        side = self._is_side_turn
         self._generation += 1
         self._evaluations += len(rows)
-        self._select(rows, values)
+        if side:
+            self._side_evaluations += len(rows)
+            self._side_age += len(rows)
+            self._select_beside(rows, values)
+        else:
+            self._select(rows, values)
         if not self._marks or self._evaluations >= MARK_SPACING * self._marks[-1][0]:
             self._marks.append((self._evaluations, self.hypervolume))
 
@@ -140,6 +158,10 @@ class FrontSearch:
             "values": self._values,
             "front_rows": self._front_rows,
             "front_values": self._front_values,
+            "side_rows": self._side_rows,
+            "side_values": self._side_values,
+            "side_evaluations": self._side_evaluations,
+            "side_age": self._side_age,
             "history": self.history,
         }
 
@@ -149,6 +171,8 @@ class FrontSearch:
         self._evaluations = int(state["evaluations"])
         self._rows, self._values = np.array(state["rows"]), np.array(state["values"])
         self._front_rows, self._front_values = np.array(state["front_rows"]), np.array(state["front_values"])
+        self._side_rows, self._side_values = np.array(state["side_rows"]), np.array(state["side_values"])
+        self._side_evaluations, self._side_age = int(state["side_evaluations"]), int(state["side_age"])
         self._marks = [(int(evaluations), float(value)) for evaluations, value in state["history"]]
 
     @property
@@ -156,8 +180,27 @@ class FrontSearch:
         smallest, largest = CAPACITIES
         return min(max(smallest, self._evaluations // EVALUATIONS_A_PLACE), largest)
 
+    @property
+    def _is_side_turn(self) -> bool:
+        return self._side_evaluations < SIDE_SHARE * (self._evaluations - SIDE_FROM)
+
     def _select(self, rows: Array, values: Array) -> None:
         """Takes new designs into the front and the pool, as far as they are good enough."""
+        self._keep(rows, values)
+        rows, values = np.vstack([self._rows, rows]), np.vstack([self._values, values])
+        self._rows, self._values = self._survivors(rows, values, self._capacity)
+
+    def _select_beside(self, rows: Array, values: Array) -> None:
+        """The same with the side pool, which joins the other one when it is old enough."""
+        self._keep(rows, values)
+        rows, values = np.vstack([self._side_rows, rows]), np.vstack([self._side_values, values])
+        self._side_rows, self._side_values = self._survivors(rows, values, CAPACITIES[0])
+        if self._side_age >= SIDE_LIFE:
+            self._select(self._side_rows, self._side_values)
+            self._side_rows, self._side_values, self._side_age = rows[:0], values[:0], 0
+
+    def _keep(self, rows: Array, values: Array) -> None:
+        """Takes new designs into the front."""
         front_rows, front_values = np.vstack([self._front_rows, rows]), np.vstack([self._front_values, values])
         shortened, longest = FRONT_LIMITS
         kept = front(front_values, self._reference_point)
@@ -168,10 +211,11 @@ class FrontSearch:
         kept = kept[np.argsort(front_values[kept, 0], kind="stable")]
         self._front_rows, self._front_values = front_rows[kept], front_values[kept]
 
-        rows, values = np.vstack([self._rows, rows]), np.vstack([self._values, values])
+    def _survivors(self, rows: Array, values: Array, capacity: int) -> tuple[Array, Array]:
+        """A pool of these designs, sorted."""
         structures = self._columns.structures(rows)
-        best = survivors(values, self._reference_point, self._capacity)
-        leading = leaders(values, structures, self._reference_point, int(LEADER_SHARE * self._capacity))
+        best = survivors(values, self._reference_point, capacity)
+        leading = leaders(values, structures, self._reference_point, int(LEADER_SHARE * capacity))
         kept = np.union1d(best, leading)
         kept = kept[np.lexsort((values[kept, 0], structures[kept]))]
-        self._rows, self._values = rows[kept], values[kept]
+        return rows[kept], values[kept]
