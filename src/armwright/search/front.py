@@ -70,7 +70,8 @@ class FrontSearch:
         self._values = np.empty((0, len(self._reference_point)))
         self._marks: list[tuple[int, float]] = []
         self._front_rows, self._front_values = self._rows, self._values
-        self._side_rows, self._side_values = self._rows, self._values
+        self._side_rows: Array = self._rows
+        self._side_values: Array = self._values
         self._side_evaluations = self._side_age = 0
         if values is not None:
             self._select(self._known, values)
