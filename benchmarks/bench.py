@@ -1,6 +1,6 @@
 """Every figure of docs/benchmarks.md, one after the other.
 
-python benchmarks/bench.py          # some 20 minutes on two cores
+python benchmarks/bench.py          # more than an hour on two cores
 """
 
 import os
