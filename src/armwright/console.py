@@ -54,10 +54,7 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     console.print(
         f"hypervolume {volume['final']:.3f} (mean over iterations {volume['mean']:.3f}; reference point {reference})"
     )
-    if volume["final"] == 0.0:
-        console.print(
-            "The front lies wholly outside the reference point: no design counts yet. Give more trials or another one."
-        )
+    _show_emptiness(console, volume["final"], "trials")
     _show_standing(console, summary["best_known"])
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
     console.print(f"{summary['n_trials']} trials{more}: {sources}; {_seconds(summary['seconds'])}")
@@ -88,6 +85,7 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     volume, search = summary["hypervolume"], summary["search"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
     console.print(f"hypervolume {volume['final']:.3f} (reference point {reference}), {len(run.history)} designs")
+    _show_emptiness(console, volume["final"], "--budget")
     _show_standing(console, summary["best_known"])
     why = {"budget": "the budget is spent", "stall": "the hypervolume hardly grew any more"}[search["ended_by"]]
     console.print(f"{search['evaluations']:,} evaluations in {search['seconds']:.1f} s; {why}")
@@ -105,6 +103,13 @@ def show_polish(console: Console, polished: Polished) -> None:
         f"and were added; hypervolume {before[-1]:.3f} -> {final:.3f}"
     )
     _show_standing(console, polished.summary["best_known"])
+
+
+def _show_emptiness(console: Console, hypervolume: float, more: str) -> None:
+    if hypervolume == 0.0:
+        console.print(
+            f"The front lies wholly outside the reference point: no design counts yet. Give more {more} or another one."
+        )
 
 
 def _show_standing(console: Console, standing: dict[str, Any] | None) -> None:
