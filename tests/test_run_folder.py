@@ -82,6 +82,7 @@ def test_summary(run: Run) -> None:
         "front_size",
         "verification",
         "evaluations",
+        "polish",
         "credit",
         "proposer",
         "diagnostics",
