@@ -54,7 +54,7 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     console.print(
         f"hypervolume {volume['final']:.3f} (mean over iterations {volume['mean']:.3f}; reference point {reference})"
     )
-    _show_emptiness(console, volume["final"], "trials")
+    _show_emptiness(console, volume["final"], "more trials")
     _show_standing(console, summary["best_known"])
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
     console.print(f"{summary['n_trials']} trials{more}: {sources}; {_seconds(summary['seconds'])}")
@@ -85,7 +85,7 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     volume, search = summary["hypervolume"], summary["search"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
     console.print(f"hypervolume {volume['final']:.3f} (reference point {reference}), {len(run.history)} designs")
-    _show_emptiness(console, volume["final"], "--budget")
+    _show_emptiness(console, volume["final"], "a larger --budget")
     _show_standing(console, summary["best_known"])
     why = {"budget": "the budget is spent", "stall": "the hypervolume hardly grew any more"}[search["ended_by"]]
     console.print(f"{search['evaluations']:,} evaluations in {search['seconds']:.1f} s; {why}")
@@ -108,7 +108,7 @@ def show_polish(console: Console, polished: Polished) -> None:
 def _show_emptiness(console: Console, hypervolume: float, more: str) -> None:
     if hypervolume == 0.0:
         console.print(
-            f"The front lies wholly outside the reference point: no design counts yet. Give more {more} or another one."
+            f"The front lies wholly outside the reference point: no design counts yet. Give {more} or another one."
         )
 
 

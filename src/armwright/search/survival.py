@@ -18,8 +18,7 @@ def front(values: Array, reference_point: Array) -> Rows:
 
 
 def nearest(values: Array, reference_point: Array, most: int) -> Rows:
-    """The rows on the front of `values` (N, M), at most so many, that exceed the reference box least, each objective by
-    its own scale."""
+    """The rows on the front of `values` (N, M), at most so many, that exceed the reference box by the least share."""
     best = np.flatnonzero(front_mask(values))
     excess = np.maximum(values[best] / reference_point - 1.0, 0.0).sum(axis=1)
     return best[np.argsort(excess, kind="stable")[:most]]
