@@ -28,9 +28,9 @@ from armwright.space import FloatParameter
 from armwright.task import builtin_tasks
 
 SEEDS = range(3)
-EVALUATIONS = 300_000  # for each seed
-PER_SEQUENCE = 4_000
-PYMOO_EVALUATIONS = 50_000
+EVALUATIONS = 250_000  # for each seed
+PER_SEQUENCE = 2_000
+PYMOO_EVALUATIONS = 30_000
 MOST = 1000  # designs of a shipped front
 DECIMALS = 9  # of its parameters: a nanometre, as a micrometre already costs 0.1 % of target-2's hypervolume
 PLACE = Path(armwright.__file__).parent / "fronts"

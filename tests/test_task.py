@@ -16,20 +16,18 @@ from armwright.task import Task, builtin_tasks, load_task, random_task, read_poi
 def test_the_built_in_tasks() -> None:
     tasks = builtin_tasks()
     assert list(tasks)[:3] == ["target-1", "target-2", "target-3"]
-    assert {name: len(task.targets) for name, task in tasks.items()} == {
-        "target-1": 8,
-        "target-2": 9,
-        "target-3": 8,
-        "autodesign-1": 4,
-        "autodesign-2": 6,
-        "autodesign-3": 6,
-        "slideopt-wide": 9,
-        "slideopt-arm": 7,
-    }
+    published = {"autodesign-1": 4, "autodesign-2": 6, "autodesign-3": 6, "slideopt-wide": 9, "slideopt-arm": 7}
+    sizes = {name: len(task.targets) for name, task in tasks.items()}
+    assert sizes.items() >= {"target-1": 8, "target-2": 9, "target-3": 8, **published}.items()
+    assert len(tasks) >= 24
     for name, task in tasks.items():
         assert task.name == name
         assert task.provenance
         assert task.description
+        assert len(set(task.targets)) == len(task.targets)
+        assert np.abs(task.points).max() <= 1.3, "within reach of some arm of the paper's space: base ±1 m, 1.2 m long"
+        if not name.startswith("target-"):
+            assert task.reference_point == (0.625 * len(task.targets),) * 2  # target-1's, target by target
     for name in ("target-1", "target-2", "target-3"):
         assert tasks[name].reference_point == (5.0, 5.0)
         assert "reconstruction" in tasks[name].provenance

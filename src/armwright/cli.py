@@ -69,6 +69,7 @@ Robust = Annotated[
     bool, typer.Option("--robust", help="Count a design by its worst case with the base or a link 1 mm off.")
 ]
 DeviceName = Annotated[str, typer.Option(help="Where arms are evaluated: auto, cpu or cuda.")]
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures of a finished run.")]
 BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")]
 
 
@@ -139,6 +140,7 @@ def optimize(
         bool, typer.Option("--verify/--no-verify", help="Mark each design of the front solid or fragile.")
     ] = True,
     device: DeviceName = "auto",
+    figures: Figures = True,
     n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.")] = 10,
     n_step: Annotated[int, typer.Option(help="Trials in a block; the first is the proposer's.")] = 10,
     n_total: Annotated[int, typer.Option(help="Counted trials.")] = 200,
@@ -180,9 +182,9 @@ def optimize(
                 watch=watch,
             )
         finished_before = run.resumed == len(run.trials)
-        if not finished_before:
+        if figures and not finished_before:
             words.print("drawing the figures")
-        figures = _figures(folder)
+        drawn = _figures(folder) if figures else []
     except KeyboardInterrupt:
         kept = f"every finished trial is in {folder}/" if folder.exists() else "nothing was begun"
         words.print(f"\nstopped; {kept}. Go on with:\n  {_same_command()}")
@@ -204,7 +206,7 @@ def optimize(
         words.print(f"{folder}/ is finished; nothing was computed again. A larger --n-total extends it.")
     elif run.resumed:
         words.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
-    view.show_result(words, run, figures)
+    view.show_result(words, run, drawn)
 
 
 @app.command(name="prompt")
@@ -292,6 +294,7 @@ def front(
     ] = None,
     robust: Robust = False,
     device: DeviceName = "auto",
+    figures: Figures = True,
     stall: Annotated[
         bool, typer.Option("--stall/--no-stall", help="End early when the hypervolume hardly grows any more.")
     ] = True,
@@ -327,7 +330,7 @@ def front(
                 out=folder,
                 watch=watch,
             )
-        figures = _figures(folder)
+        drawn = _figures(folder) if figures else []
     except KeyboardInterrupt:
         words.print(f"\nstopped; the search is kept in {folder}/. Go on with:\n  {_same_command()}")
         sys.exit(INTERRUPTED)
@@ -340,7 +343,134 @@ def front(
         words.print(
             f"went on from {run.resumed:,} evaluations" if went_on else f"finished before; nothing was computed: {more}"
         )
-    view.show_search(words, run, figures)
+    view.show_search(words, run, drawn)
+
+
+@app.command()
+def experiment(
+    name: Annotated[str, typer.Argument(help="A built-in experiment (paper, rules, suite), or a YAML file.")],
+    seeds: Annotated[int | None, typer.Option(help="So many seeds, from 0 on, instead of the file's.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Only this method of the file (may be repeated).")] = None,
+    task: Annotated[list[str] | None, typer.Option(help="Only this task of the file (may be repeated).")] = None,
+    model: ModelName = None,
+    base_url: BaseUrl = None,
+    replay: Annotated[
+        Path | None, typer.Option(help="Folder of an earlier experiment, whose recorded calls stand for the model.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(help="Cells at a time.  [default: one a core]")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Run the cells on the Dask cluster at this address (tcp://HOST:PORT).")
+    ] = None,
+    print_commands: Annotated[
+        bool, typer.Option("--print-commands", help="Print one command for each cell that is to be run, and end.")
+    ] = False,
+    print_: Annotated[bool, typer.Option("--print", help="Print the file of a built-in experiment, and end.")] = False,
+    figures: Figures = True,
+    out: Annotated[Path | None, typer.Option(help="Folder; without it, experiments/NAME.")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print a summary as JSON alone to stdout.")] = False,
+) -> None:
+    """Run methods on tasks with seeds, and compare them. The same command again goes on; finished runs stay."""
+    from armwright import console as view
+    from armwright.experiment import outcome, plan, running
+    from armwright.report.comparison import Curves, write_comparison_figures
+    from armwright.report.tables import write_tables
+
+    if print_:
+        print(plan.builtin_text(name), end="")
+        return
+    jobs = running.most_jobs() if jobs is None else jobs
+    if jobs < 1:
+        raise SettingsError(f"--jobs {jobs}: a whole number from 1 is needed")
+    words = view.stderr_console() if json_ or print_commands else view.stdout_console()
+    whole, beside = plan.load_experiment(name)
+    chosen = plan.with_model(plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds), model, base_url)
+    out = out or Path("experiments") / chosen.name
+    cells, skipped = plan.cells_of(chosen, beside, out, replay)
+    before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
+    finished = {done.cell for done in before}
+    due = [cell for cell in cells if cell not in finished]
+    view.show_plan(words, due, len(before), skipped, None if scheduler else jobs)
+    if print_commands:
+        print("\n".join(cell.command for cell in due))
+        return
+    failed: list[running.Outcome] = []
+    try:
+        outcome.write_plan(chosen, out)
+        ended = running.run_on_dask(due, scheduler) if scheduler else running.run_here(due, jobs)
+        for number, done in enumerate(ended, start=1):
+            view.show_outcome(words, done, number, len(due))
+            failed += [done] if done.fault else []
+        comparison = outcome.collect(chosen, cells)
+        notes = view.notes_on_cells(skipped, failed)
+        title = f"Experiment {chosen.name}"
+        tables = write_tables(out, comparison, title, outcome.published(chosen), chosen.published_in, notes)
+        drawn: list[Path] = []
+        if figures:
+            words.print("drawing the figures")
+            labels = {key: one.label for key, one in chosen.methods.items()}
+            curves = [Curves(key, f.title, [labels[m] for m in f.methods]) for key, f in chosen.figures.items()]
+            drawn = write_comparison_figures(out, comparison, curves, [labels[key] for key in chosen.samples])
+    except KeyboardInterrupt:
+        words.print(f"\nstopped; every finished trial is in {out}/. Go on with:\n  {_same_command()}")
+        sys.exit(INTERRUPTED)
+    if json_:
+        record = {"folder": str(out), "cells": len(cells), "skipped": len(skipped), "failed": len(failed)}
+        _print_json({**record, "tables": [str(path) for path in tables], "figures": [str(path) for path in drawn]})
+    else:
+        view.show_comparison(words, tables, drawn)
+    if failed:
+        sys.exit(FailureError.exit_code)
+
+
+@app.command()
+def compare(
+    places: Annotated[list[Path], typer.Argument(help="Run folders, or folders with such below.")],
+    baseline: Annotated[
+        str | None, typer.Option(help="The method that the others are compared with.  [default: of the first run]")
+    ] = None,
+    figures: Figures = True,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for tables and figures; without it, none are written.")
+    ] = None,
+) -> None:
+    """Compare finished runs by method, task and seed: tables, intervals, tests."""
+    from armwright import console as view
+    from armwright.comparison import compare as side_by_side
+    from armwright.comparison import find_runs, read_run_record
+    from armwright.report.tables import markdown, write_tables
+    from armwright.results import read_summary
+
+    found = list(dict.fromkeys(find_runs(places)))
+    finished = [folder for folder in found if read_summary(folder) is not None]
+    words = view.stdout_console()
+    notes = [f"{folder} is not finished, and left out" for folder in found if folder not in finished]
+    comparison = side_by_side([read_run_record(folder) for folder in finished], baseline)
+    title = "Runs compared"
+    words.print(markdown(comparison, title, notes=notes), end="")
+    if out is not None:
+        tables = write_tables(out, comparison, title, notes=notes)
+        drawn: list[Path] = []
+        if figures:
+            from armwright.report.comparison import write_comparison_figures
+
+            drawn = write_comparison_figures(out, comparison)
+        view.show_files(words, tables, drawn)
+
+
+@app.command()
+def runs(
+    places: Annotated[list[Path] | None, typer.Argument(help="Folders to look in.  [default: runs]")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """List the runs that lie in a folder, and how far each has come."""
+    from armwright import console as view
+    from armwright.comparison import find_runs, list_runs
+
+    listed = list_runs(find_runs(places or [Path("runs")]))
+    if json_:
+        _print_json(listed)
+    else:
+        view.show_runs(view.stdout_console(), listed)
 
 
 @app.command()

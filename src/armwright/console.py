@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +14,8 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column, Table
 from rich.text import Text
 
+from armwright.experiment.plan import Cell, Skipped
+from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
 from armwright.history import History
 from armwright.objectives import TORQUE_SCALE
@@ -129,6 +132,77 @@ def _show_places(console: Console, folder: Path | None, figures: Sequence[Path])
     console.print(f"results: {folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
     if figures:
         console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+
+
+def show_plan(
+    console: Console, due: Sequence[Cell], finished: int, skipped: Sequence[Skipped], jobs: int | None
+) -> None:
+    """What an experiment is about to do."""
+    where = "on the cluster" if jobs is None else f"{jobs} at a time"
+    parts = [f"{len(due)} to run, {where}" if due else "nothing to run", f"{finished} finished before"]
+    console.print(f"{len(due) + finished + len(skipped)} cells: {', '.join(parts)}, {len(skipped)} skipped")
+    for note in notes_on_cells(skipped, ()):
+        console.print(note)
+    asking = [cell for cell in due if cell.plan.asks_a_model and cell.replay is None]
+    if asking:
+        proposals = sum(-(-cell.n_total // cell.plan.n_step) for cell in asking)
+        models = ", ".join(sorted({str(cell.plan.model) for cell in asking}))
+        console.print(f"{len(asking)} of them ask {models} for some {proposals:,} proposals in all")
+
+
+def notes_on_cells(skipped: Sequence[Skipped], failed: Sequence[Outcome]) -> list[str]:
+    """What to say of cells that are missing: a line for each method and reason, and one for each failure."""
+    reasons = Counter((one.cell.plan.label, one.reason) for one in skipped)
+    notes = [
+        f"skipped: {label}, {count} {'cell' if count == 1 else 'cells'}: {reason}"
+        for (label, reason), count in reasons.items()
+    ]
+    return notes + [f"FAILED: {outcome.cell.words}: {outcome.fault}" for outcome in failed]
+
+
+def show_outcome(console: Console, outcome: Outcome, number: int, of: int) -> None:
+    """A cell that has ended."""
+    if outcome.fault:
+        console.print(f"[{number}/{of}] FAILED: {outcome.cell.words}: {outcome.fault}")
+    else:
+        assert outcome.hypervolume is not None
+        console.print(
+            f"[{number}/{of}] {outcome.cell.words}: hypervolume {outcome.hypervolume:.3f}, {outcome.seconds:.1f} s"
+        )
+    console.file.flush()
+
+
+def show_comparison(console: Console, tables: Sequence[Path], figures: Sequence[Path]) -> None:
+    """The readable table, and where all of it lies."""
+    console.print()
+    console.print(tables[0].read_text(encoding="utf-8"))
+    show_files(console, tables, figures)
+
+
+def show_files(console: Console, tables: Sequence[Path], figures: Sequence[Path]) -> None:
+    """Where tables and figures lie."""
+    console.print(f"tables: {tables[0].parent}/ ({', '.join(path.name for path in tables)})")
+    if figures:
+        console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+
+
+def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
+    """Runs as a table, a line each."""
+    if not listed:
+        console.print("no run lies here")
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for name in ("run", "task", "method", "seed", "trials", "hypervolume", "share", "state"):
+        table.add_column(name, justify="right" if name in ("seed", "trials", "hypervolume", "share") else "left")
+    for run in listed:
+        volume, share = run["hypervolume"], run["share_of_best_known"]
+        table.add_row(
+            *(Text(str(run[name])) for name in ("folder", "task", "method", "seed", "trials")),
+            "" if volume is None else f"{volume:.3f}",
+            "" if share is None else f"{share:.1%}",
+            Text(str(run["state"])),
+        )
+    console.print(table)
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:

@@ -188,7 +188,7 @@ class RunFolder:
             self.write_config(config)
             return config
         there = read_config(self.path)
-        _check_same_run(self.path, there, config)
+        check_same_run(self.path, there, config)
         if config.method != there.method:  # a larger n_total
             if (self.path / TRIALS).read_bytes().count(b"\n") > there.study.n_trials:
                 raise RunConflictError(
@@ -394,7 +394,7 @@ def _words(fault: Exception) -> str:
     return f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
 
 
-def _check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
+def check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
     """RunConflictError where `asked` is another run than the one that lies there; a larger n_total is the same."""
     old, new = _identity(there), _identity(asked)
     differences = [

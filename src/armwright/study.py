@@ -113,19 +113,8 @@ def optimize(
         proposer = choose_proposer(proposer).proposer
     elif isinstance(proposer, type):
         raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
-    if in_flight is not None and proposer is not None and not proposer.overlaps:
-        raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
-    config = RunConfig(
-        task=problem.task,
-        space=problem.space,
-        tolerance=problem.tolerance,
-        device=problem.device,
-        objectives=record_objectives(problem.objectives),
-        reference_point=problem.reference_point,
-        method=_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every),
-        seed=whole("seed", seed, 0),
-        versions=versions(),
-    )
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every)
+    config = study_config(problem, method, seed)
     with ExitStack() as stack:
         folder = None
         if out is not None:
@@ -327,7 +316,7 @@ class Study:
         return Run(history, self.config, summary, folder, resumed)
 
 
-def _method(
+def study_method(
     proposer: Proposer | None,
     sampler: str | SamplerFactory,
     n_init: int,
@@ -336,6 +325,9 @@ def _method(
     in_flight: int | None,
     polish_every: int | None,
 ) -> Method:
+    """How `optimize` searches with these arguments; SettingsError where they do not go together."""
+    if in_flight is not None and proposer is not None and not proposer.overlaps:
+        raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
     return Method(
         proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
         sampler=sampler_name(sampler),
@@ -344,6 +336,21 @@ def _method(
         n_total=whole("n_total", n_total, 1),
         in_flight=None if in_flight is None else whole("in_flight", in_flight, 1),
         polish_every=None if polish_every is None else whole("polish_every", polish_every, 1),
+    )
+
+
+def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
+    """The settings of a new run."""
+    return RunConfig(
+        task=problem.task,
+        space=problem.space,
+        tolerance=problem.tolerance,
+        device=problem.device,
+        objectives=record_objectives(problem.objectives),
+        reference_point=problem.reference_point,
+        method=method,
+        seed=whole("seed", seed, 0),
+        versions=versions(),
     )
 
 

@@ -21,6 +21,7 @@ Point = tuple[float, float, float]
 LARGEST_COORDINATE = 1000.0  # [m]
 MOST_TARGETS = 10_000
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
+_RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 
 
 class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -64,10 +65,12 @@ def builtin_tasks() -> dict[str, Task]:
 
 
 def load_task(name_or_path: str | Path) -> Task:
-    """A built-in task by its name, or the task of a YAML file."""
+    """A built-in task by its name, `random-N` of the seeded family, or the task of a YAML file."""
     known = builtin_tasks()
     if str(name_or_path) in known:
         return known[str(name_or_path)]
+    if seeded := _RANDOM.fullmatch(str(name_or_path)):
+        return random_task(int(seeded[1]))
     path = Path(name_or_path)
     if os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long, too
         return read_document(path, Task, TaskError)
@@ -77,7 +80,7 @@ def load_task(name_or_path: str | Path) -> Task:
         raise TaskError(f"there is no file {path}; `armwright init {path}` writes one to edit")
     raise TaskError(
         f'unknown task "{name_or_path}".{did_you_mean(str(name_or_path), known)} '
-        f"Built-in tasks: {', '.join(known)}; or give a YAML file"
+        f"Built-in tasks: {', '.join(known)}; random-N; or give a YAML file"
     )
 
 

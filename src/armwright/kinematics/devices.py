@@ -34,8 +34,10 @@ def usable_device(device: Device) -> Device:
 
 
 def cores() -> int:
-    """The processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """The processor cores that this process may use; no more than OMP_NUM_THREADS, where that is set."""
+    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    wished = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+    return min(there, int(wished)) if wished.isdecimal() and int(wished) > 0 else there
 
 
 _loading = threading.Lock()

@@ -1,13 +1,10 @@
 """The figures of one run, as .png and .pdf in its folder, for papers and for the eye."""
 
 import math
-import shutil
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -21,11 +18,13 @@ from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions
-from armwright.objectives import POSITION_ERROR, TORQUE
+from armwright.objectives import POSITION_ERROR, TORQUE, Objective
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, RC, TARGET, Look, look
+from armwright.report.drawing import one_panel, several_panels, write_drawn
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, TARGET, Look, look
 from armwright.results import FIGURES, read_summary
-from armwright.run_folder import FrontMethod, read_run
+from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
+from armwright.space import DesignSpace
 
 REACHED = 1e-3  # [m]; a target missed by less counts as reached
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
@@ -39,17 +38,7 @@ def write_figures(folder: str | Path) -> list[Path]:
     config, history = read_run(folder)
     summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
     drawn = _figures(history) if summary is None else _search_figures(history, summary)
-    place, part = folder / FIGURES, folder / f"{FIGURES}.part"
-    with matplotlib.rc_context(RC), _writing(place):
-        if part.exists():
-            shutil.rmtree(part)
-        part.mkdir()
-        names = [_save(figure, part / f"{name}.png") for name, figure in drawn]
-        # In one step, so that a folder with this name always holds all figures of one state of the run.
-        if place.exists():
-            shutil.rmtree(place)
-        part.rename(place)
-    return [place / name for name in names]
+    return write_drawn(folder / FIGURES, drawn)
 
 
 def _figures(history: History) -> Iterator[tuple[str, Figure]]:
@@ -105,7 +94,7 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
 
 def draw_hypervolume(history: History) -> Figure:
     """The hypervolume over the counted trials, with the trials of the proposer marked where they enlarged it."""
-    figure, axes = _figure(5.2, 3.2)
+    figure, axes = one_panel(5.2, 3.2)
     curve = history.hypervolume
     start = hypervolume(history.values[: history.n_init], _reference(history))
     iterations = np.arange(len(curve) + 1)
@@ -138,7 +127,7 @@ def draw_hypervolume(history: History) -> Figure:
 
 def draw_search(history: History, summary: Mapping[str, Any]) -> Figure:
     """The hypervolume of a search over its evaluations, beside the best known one."""
-    figure, axes = _figure(5.2, 3.2)
+    figure, axes = one_panel(5.2, 3.2)
     evaluations, volumes = np.array(summary["search"]["hypervolume_history"]).T
     axes.step(evaluations, volumes, where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     _best_known(axes, history)
@@ -153,8 +142,7 @@ def draw_search(history: History, summary: Mapping[str, Any]) -> Figure:
 
 def draw_samples(history: History) -> Figure:
     """All trials after 5, 35, 65 and 100 % of the counted ones, coloured by source, with the front."""
-    figure = Figure(figsize=(10.4, 3.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = several_panels(10.4, 3.4)
     panels: Sequence[Any] = figure.subplots(1, 4, sharex=True, sharey=True)
     counted = len(history) - history.n_init
     shown = sorted({max(1, round(share * counted)) for share in SAMPLE_SHARES}) if counted > 0 else [0]
@@ -173,8 +161,7 @@ def draw_samples(history: History) -> Figure:
 
 def draw_credit(history: History) -> Figure:
     """Who found what over the counted trials: hypervolume gained and designs on the front, stacked by source."""
-    figure = Figure(figsize=(8.4, 3.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = several_panels(8.4, 3.4)
     volume, members = figure.subplots(1, 2)
     _stack(volume, gained_by_source(history) or {})
     _stack(members, front_by_source(history))
@@ -192,7 +179,7 @@ def draw_credit(history: History) -> Figure:
 
 def draw_front(history: History) -> Figure:
     """The front at the end, its designs by source, the chosen ones named."""
-    figure, axes = _figure(5.2, 4.2)
+    figure, axes = one_panel(5.2, 4.2)
     reference = _reference(history)
     _scatter(axes, history, reference, faint=True)
     for member in history.front:
@@ -235,7 +222,7 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
         axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
         targets = range(len(evaluation.targets))
         _draw_postures(axes, member, evaluation, column, targets)
-        _frame(axes, _extent(evaluation, [m for _, m in chosen]))
+        frame(axes, _extent(evaluation, [m for _, m in chosen]))
         axes.set_title(f"{title}\n{_words(history, member)}", y=1.0)
     figure.legend(handles=_arm_legend(), loc="lower center", ncols=3 if len(chosen) == 1 else 6)
     return figure
@@ -256,7 +243,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
         _draw_postures(axes, member, evaluation, 0, [target])
-        _frame(axes, extent)
+        frame(axes, extent)
         error = evaluation.position_error[0, target]
         verdict = "reached" if error < REACHED else f"missed by {1e3 * error:.0f} mm"
         axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=FRONT if error < REACHED else MISSED)
@@ -331,7 +318,7 @@ def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: 
     axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
 
 
-def _frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
+def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
     """Equal scales, so that angles and lengths look as they are."""
     centre, half = extent
     for name, middle in zip("xyz", centre, strict=True):
@@ -396,8 +383,12 @@ def _words(history: History, member: FrontMember) -> str:
 
 
 def _label(history: History, i: int) -> str:
-    objective = history.problem.objectives[i]
-    toy = "; toy masses" if objective is TORQUE and history.problem.space.is_toy else ""
+    return axis_label(history.problem.objectives[i], history.problem.space)
+
+
+def axis_label(objective: Objective | ObjectiveRecord, space: DesignSpace) -> str:
+    """An objective with its unit; torques of arms that weigh some grams say so."""
+    toy = "; toy masses" if objective.name == TORQUE.name and space.is_toy else ""
     return f"{objective.label} [{objective.unit.replace(' x ', ' × ')}{toy}]"
 
 
@@ -414,23 +405,3 @@ def _reference(history: History) -> tuple[float, ...]:
 
 def _say(axes: Any, words: str) -> None:
     axes.annotate(words, (0.5, 0.5), xycoords="axes fraction", ha="center", color="#666666")
-
-
-def _figure(width: float, height: float) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure, figure.subplots()
-
-
-def _save(figure: Figure, png: Path) -> str:
-    figure.savefig(png)
-    figure.savefig(png.with_suffix(".pdf"), metadata={"CreationDate": None})
-    return png.name
-
-
-@contextmanager
-def _writing(path: Path) -> Generator[None]:
-    try:
-        yield
-    except OSError as fault:
-        raise RunFolderError(f"cannot write {path}: {fault.strerror or fault}; the trials are safe") from fault

@@ -55,3 +55,27 @@ RC: Any = {  # read-only by custom
 def look(source: str) -> Look:
     """The look of a source; proposers of a user's own look like the built-in ones."""
     return _LOOKS.get(source, Look(source, "#D55E00", "^", 44, "////"))
+
+
+class Line(NamedTuple):
+    """How the curve of one method is drawn; the pattern tells it apart in grey, too."""
+
+    colour: str
+    pattern: Any
+    marker: str
+
+
+_LINES = (
+    Line("#0072B2", "-", "o"),
+    Line("#D55E00", (0, (6, 2)), "^"),
+    Line("#009E73", (0, (2, 1.5)), "s"),
+    Line("#CC79A7", (0, (6, 2, 1.5, 2)), "D"),
+    Line("#56B4E9", (0, (1, 1)), "v"),
+    Line("#E69F00", (0, (8, 2, 2, 2, 2, 2)), "P"),
+    Line("#000000", (0, (3, 4)), "X"),
+)
+
+
+def line(number: int) -> Line:
+    """The look of the method with this number; they repeat after seven."""
+    return _LINES[number % len(_LINES)]

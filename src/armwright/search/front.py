@@ -3,10 +3,11 @@
 An elitist search over one pool of designs: each generation varies its members, evaluates the children as one batch,
 and keeps those that the hypervolume needs. The pool is small at first, to get near the front, and grows, to resolve it.
 
-The combination of categories (an arm's joint sequence) is a design's structure. The best designs of the most promising
-structures stay beside the pool, so that these are not given up because another was good first. The pool is sorted by
-structure and then by the first objective: a member's neighbours are mostly designs whose parameters mean the same and
-whose values are near, and their differences are the steps worth trying.
+The combination of categories (an arm's joint sequence) is a design's structure. A few of the best designs of the most
+promising structures stay beside the pool, so that these are not given up because another was good first, and rare
+structures have more than their share of children. The pool is sorted by structure and then by the first objective: a
+member's neighbours are mostly designs whose parameters mean the same and whose values are near, and their differences
+are the steps worth trying.
 
 What a pool has lost it hardly finds again. So a part of the evaluations goes to a side pool, which begins at random,
 knows nothing of the main one, and joins it after a while; then the next one begins.
@@ -29,7 +30,8 @@ CAPACITIES = (100, 1000)  # designs in the pool, at first and at last
 EVALUATIONS_A_PLACE = 200  # the pool grows by one design for so many evaluations
 SMALLEST_BATCH = 100  # designs a generation; as many as the pool holds once that is more
 FIRST_BATCH = 500  # random designs at the start
-LEADER_SHARE = 0.25  # leaders of structures beside the pool, for one design in it
+LEADING_SHARE = 0.12  # structures whose best designs stay beside the pool, for one design in it
+LEADERS_EACH = 4  # designs of such a structure
 SIDE_FROM = 25_000  # evaluations
 SIDE_SHARE = 0.25  # of the evaluations after these
 SIDE_LIFE = 5_000  # evaluations of a side pool until it joins
@@ -216,7 +218,7 @@ class FrontSearch:
         """A pool of these designs, sorted."""
         structures = self._columns.structures(rows)
         best = survivors(values, self._reference_point, capacity)
-        leading = leaders(values, structures, self._reference_point, int(LEADER_SHARE * capacity))
+        leading = leaders(values, structures, self._reference_point, int(LEADING_SHARE * capacity), LEADERS_EACH)
         kept = np.union1d(best, leading)
         kept = kept[np.lexsort((values[kept, 0], structures[kept]))]
         return rows[kept], values[kept]

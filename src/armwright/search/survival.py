@@ -39,16 +39,23 @@ def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
     return np.concatenate([best, others[np.lexsort((rank, outside))]])[:capacity]
 
 
-def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int) -> Rows:
-    """The row of `values` (N, M) with the largest box of each structure (N,), for the `most` largest boxes.
+def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int, each: int) -> Rows:
+    """Of the `most` best structures (N,), the rows of `values` (N, M) that its own front needs most, `each` at most.
 
-    A point's box is what it dominates alone, bounded by the reference point.
+    A structure is as good as the largest box of its points: what a point dominates alone, bounded by the reference
+    point.
     """
-    box = np.prod(np.maximum(reference_point - values, 0.0), axis=1)
-    order = np.lexsort((-box, structures))
-    _, first = np.unique(structures[order], return_index=True)
-    best = order[first]
-    return best[np.argsort(-box[best], kind="stable")[:most]]
+    boxes = np.prod(np.maximum(reference_point - values, 0.0), axis=1)
+    order = np.lexsort((-boxes, structures))
+    starts = np.unique(structures[order], return_index=True)[1]
+    leading = starts[np.argsort(-boxes[order[starts]], kind="stable")[:most]]
+    ends = np.append(starts[1:], len(order))[np.searchsorted(starts, leading)]
+    found = [np.zeros(0, dtype=np.intp)]
+    for start, end in zip(leading, ends, strict=True):
+        mine = order[start:end]
+        own = mine[front(values[mine], reference_point)]
+        found.append(own[thinned(values[own], reference_point, each)])
+    return np.concatenate(found)
 
 
 def thinned(front: Array, reference_point: Array, capacity: int) -> Rows:

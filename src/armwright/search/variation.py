@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from armwright.search.columns import Array, Columns
 
-MIXED_SHARE = 0.4  # of the batch: two members mixed, of any structure, as a base may be good for many of them
+RARE_SHARE = 0.3  # of the parents: of any structure in the pool alike, however few designs there are of it
+MIXED_SHARE = 0.6  # of the batch: two members mixed, of any structure, as a base may be good for many of them
 MIXED_SPREAD = 0.3  # of the distance between the two
 NEIGHBOURS = 10  # places in the pool, to either side
 DIFFERENCE_SHARE = 0.35  # of the others: a difference of two neighbours is added
@@ -17,11 +18,19 @@ CATEGORY_SHARE = 0.3  # of the others: categories change, too
 
 def offspring(rows: Array, columns: Columns, n: int, rng: np.random.Generator) -> Array:
     """(n, P) new rows from a pool `rows` (N, P) whose neighbours resemble each other."""
-    parents = rng.integers(len(rows), size=n)
+    parents = _parents(columns.structures(rows), n, rng)
     children, units = rows[parents], columns.units(rows)
     children[:, columns.real] = columns.from_units(_moved(units, parents, rng))
     children[:, columns.categorical] = _recategorised(children[:, columns.categorical], columns.choices, rng)
     return np.where(rng.random((n, 1)) < MIXED_SHARE, _mixed(rows, parents, columns, rng), children)
+
+
+def _parents(structures: NDArray[np.int64], n: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """(n,) places in a pool whose members have these structures (N,)."""
+    _, structure, members = np.unique(structures, return_inverse=True, return_counts=True)
+    rare = np.searchsorted(np.cumsum(1.0 / members[structure]), rng.random(n) * len(members), side="right")
+    anywhere = rng.integers(len(structures), size=n)
+    return np.where(rng.random(n) < RARE_SHARE, np.minimum(rare, len(structures) - 1), anywhere)
 
 
 def _mixed(rows: Array, parents: NDArray[np.int64], columns: Columns, rng: np.random.Generator) -> Array:

@@ -1,0 +1,1 @@
+"""Experiments: methods on tasks with seeds, each cell an ordinary run folder."""
