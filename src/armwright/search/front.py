@@ -30,7 +30,7 @@ CAPACITIES = (100, 1000)  # designs in the pool, at first and at last
 EVALUATIONS_A_PLACE = 200  # the pool grows by one design for so many evaluations
 SMALLEST_BATCH = 100  # designs a generation; as many as the pool holds once that is more
 FIRST_BATCH = 500  # random designs at the start
-LEADING_SHARE = 0.12  # structures whose best designs stay beside the pool, for one design in it
+LEADING = 12  # structures whose best designs stay beside the pool
 LEADERS_EACH = 4  # designs of such a structure
 SIDE_FROM = 25_000  # evaluations
 SIDE_SHARE = 0.25  # of the evaluations after these
@@ -218,7 +218,7 @@ class FrontSearch:
         """A pool of these designs, sorted."""
         structures = self._columns.structures(rows)
         best = survivors(values, self._reference_point, capacity)
-        leading = leaders(values, structures, self._reference_point, int(LEADING_SHARE * capacity), LEADERS_EACH)
+        leading = leaders(values, structures, self._reference_point, LEADING, LEADERS_EACH)
         kept = np.union1d(best, leading)
         kept = kept[np.lexsort((values[kept, 0], structures[kept]))]
         return rows[kept], values[kept]

@@ -40,21 +40,26 @@ def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
 
 
 def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int, each: int) -> Rows:
-    """Of the `most` best structures (N,), the rows of `values` (N, M) that its own front needs most, `each` at most.
+    """Of the `most` best structures (N,), the rows of `values` (N, M) that contribute most to its own front, `each`.
 
     A structure is as good as the largest box of its points: what a point dominates alone, bounded by the reference
     point.
     """
     boxes = np.prod(np.maximum(reference_point - values, 0.0), axis=1)
     order = np.lexsort((-boxes, structures))
-    starts = np.unique(structures[order], return_index=True)[1]
-    leading = starts[np.argsort(-boxes[order[starts]], kind="stable")[:most]]
-    ends = np.append(starts[1:], len(order))[np.searchsorted(starts, leading)]
+    starts = np.flatnonzero(np.diff(structures[order], prepend=-1))
+    ends = np.append(starts[1:], len(order))
+    leading = np.argsort(-boxes[order[starts]], kind="stable")[:most]
     found = [np.zeros(0, dtype=np.intp)]
-    for start, end in zip(leading, ends, strict=True):
+    for start, end in zip(starts[leading], ends[leading], strict=True):
         mine = order[start:end]
-        own = mine[front(values[mine], reference_point)]
-        found.append(own[thinned(values[own], reference_point, each)])
+        if len(mine) > each:
+            mine = mine[front(values[mine], reference_point)]
+        if len(mine) > each:  # with many objectives, exact contributions would cost too much here, too
+            exact = values.shape[1] <= MOST_EXACT
+            worth = moocore.hv_contributions(values[mine], ref=reference_point) if exact else boxes[mine]
+            mine = mine[np.argsort(-worth, kind="stable")[:each]]
+        found.append(mine)
     return np.concatenate(found)
 
 
