@@ -1,9 +1,8 @@
-"""Every figure of docs/benchmarks.md, one after the other.
+"""The figures of docs/benchmarks.md that go with the kernels and the search, one after the other.
 
-python benchmarks/bench.py          # some 40 minutes on two cores
+    python benchmarks/bench.py          # some 20 minutes on two cores
 
-The comparison of the rules is on 6 random tasks here, and that of the search on three tasks with three seeds; what the
-scripts do by themselves is more (their own words say what).
+rules.py and overlap.py take long and are run by themselves.
 """
 
 import os
@@ -20,8 +19,6 @@ PARTS = (
     ("experiment.py",),
     ("front.py", "--seeds", "3", "--budget", "100000", "--populations", "100", "--tasks", *PAPER_TASKS),
     ("time_to_front.py",),
-    ("rules.py", "--tasks", "6", "--seeds", "3"),
-    ("overlap.py",),
 )
 
 

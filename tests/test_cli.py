@@ -142,11 +142,15 @@ def test_init_writes_a_file_to_edit_and_overwrites_none(in_folder: Path) -> None
     assert "cannot read" in refused(2, "init", "other.yaml", "--from", "nothing.csv")
 
 
-def test_tasks_are_listed_with_points_and_provenance() -> None:
-    done = armwright("tasks")
-    for word in ("target-1", "(-0.45, -0.45, -0.45)", "reconstruction", "slideopt-wide", "arXiv 2309.14226"):
-        assert word in done.stdout
+def test_tasks_are_listed_and_told() -> None:
+    listed = armwright("tasks").stdout
+    for word in ("target-1", "slideopt-wide", "shelf", "armwright tasks NAME"):
+        assert word in listed
+    told = armwright("tasks", "target-1", "slideopt-wide", "random-7").stdout
+    for word in ("(-0.45, -0.45, -0.45)", "reconstruction", "arXiv 2409.20038", "random_task(7)"):
+        assert word in told
     assert json.loads(armwright("tasks", "--json").stdout)[0]["name"] == "target-1"
+    assert 'Did you mean "shelf"' in refused(2, "tasks", "shelv")
 
 
 def test_version_and_help() -> None:

@@ -16,11 +16,13 @@ from armwright.comparison import Comparison, compare, find_runs, list_runs, read
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.front import find_front
 from armwright.problem import Problem
+from armwright.proposers.llm import LlmProposer
 from armwright.report.comparison import write_comparison_figures
 from armwright.report.tables import latex, markdown, write_tables
 from armwright.statistics import interval, paired_test
 from armwright.study import optimize
 from armwright.task import Task, load_task
+from tests.chat_server import ChatServer, designer, wants_design
 
 SEEDS = range(3)
 TASKS = ("target-1", "random-4")
@@ -177,6 +179,16 @@ def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) ->
         assert (tmp_path / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         pdf = (tmp_path / "figures" / f"{name}.pdf").read_bytes()
         assert b"/FontFile2" in pdf, "the fonts are embedded, as TrueType"
+
+
+def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_server: ChatServer) -> None:
+    words = "Step 1: $\\alpha_{x \x1b[31m and _no_ markup\n" + "reason " * 3000
+    chat_server.answer = lambda request: designer(request) if wants_design(request) else words
+    proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
+    optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
+    found = compare([read_run_record(tmp_path / "run")])
+    names = {path.stem for path in write_comparison_figures(tmp_path, found)}
+    assert "reasoning-target-1" in names
 
 
 def test_the_commands(runs: Path, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -280,28 +281,33 @@ def test_a_cell_that_always_kills_its_worker_is_given_up_and_the_others_are_not(
     assert "killed 3 times" in faults["llm"]
 
 
-def test_workers_end_with_the_process_that_they_work_for(tmp_path: Path, chat_server: ChatServer) -> None:
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT], ids=["kill", "Ctrl-C"])
+def test_workers_end_with_the_process_that_they_work_for(
+    tmp_path: Path, chat_server: ChatServer, how: signal.Signals
+) -> None:
     file = file_of(tmp_path, tasks=["random-3"], seeds=1, methods={"llm": asking(chat_server)})
     reached, released = threading.Event(), threading.Event()
 
     def answer(request: Request) -> Answer:
         reached.set()
-        released.wait(60)
+        released.wait(120)
         return designer(request)
 
     chat_server.answer = answer
     command = [sys.executable, "-m", "armwright", "experiment", str(file), "--out", str(tmp_path / "out")]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    assert reached.wait(60)
-    import psutil
-
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert reached.wait(120)
     workers = psutil.Process(process.pid).children(recursive=True)
     assert workers
-    process.kill()
-    process.wait()
-    _, alive = psutil.wait_procs(workers, timeout=30)
+    process.send_signal(how)
+    said, complained = process.communicate()
+    _, alive = psutil.wait_procs(workers, timeout=60)
     released.set()
     assert not alive
+    if how == signal.SIGINT:
+        assert process.returncode == 130
+        assert "Go on with:" in said
+        assert "Traceback" not in complained
 
 
 @pytest.mark.slow

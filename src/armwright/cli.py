@@ -372,8 +372,7 @@ def experiment(
     """Run methods on tasks with seeds, and compare them. The same command again goes on; finished runs stay."""
     from armwright import console as view
     from armwright.experiment import outcome, plan, running
-    from armwright.report.comparison import Curves, write_comparison_figures
-    from armwright.report.tables import write_tables
+    from armwright.report.experiment import write_experiment
 
     if print_:
         print(plan.builtin_text(name), end="")
@@ -400,16 +399,9 @@ def experiment(
         for number, done in enumerate(ended, start=1):
             view.show_outcome(words, done, number, len(due))
             failed += [done] if done.fault else []
-        comparison = outcome.collect(chosen, cells)
-        notes = view.notes_on_cells(skipped, failed)
-        title = f"Experiment {chosen.name}"
-        tables = write_tables(out, comparison, title, outcome.published(chosen), chosen.published_in, notes)
-        drawn: list[Path] = []
         if figures:
             words.print("drawing the figures")
-            labels = {key: one.label for key, one in chosen.methods.items()}
-            curves = [Curves(key, f.title, [labels[m] for m in f.methods]) for key, f in chosen.figures.items()]
-            drawn = write_comparison_figures(out, comparison, curves, [labels[key] for key in chosen.samples])
+        tables, drawn = write_experiment(out, chosen, cells, view.notes_on_cells(skipped, failed), figures)
     except KeyboardInterrupt:
         words.print(f"\nstopped; every finished trial is in {out}/. Go on with:\n  {_same_command()}")
         sys.exit(INTERRUPTED)
@@ -529,16 +521,25 @@ def doctor(
 
 
 @app.command()
-def tasks(json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> None:
-    """List the built-in tasks with their points and where they come from."""
+def tasks(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Tell all of these tasks (built-in, random-N, files).")
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """List the built-in tasks; with names, tell their points and where they come from."""
     from armwright import console as view
-    from armwright.task import builtin_tasks
+    from armwright.task import builtin_tasks, load_task
 
-    known = list(builtin_tasks().values())
+    known = [load_task(name) for name in names] if names else list(builtin_tasks().values())
     if json_:
         _print_json([task.model_dump(mode="json") for task in known])
-    else:
-        view.show_tasks(view.stdout_console(), known)
+        return
+    words = view.stdout_console()
+    if not names:
+        view.show_tasks(words, known)
+    for task in known if names else ():
+        view.show_task(words, task)
 
 
 @app.command()

@@ -206,15 +206,23 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
-    """Every task with its points and where they come from."""
+    """A line for every task."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for name, justify in (("task", "left"), ("targets", "right"), ("", "left")):
+        table.add_column(name, justify=justify, no_wrap=name != "")
     for task in tasks:
-        reference = (
-            "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
-        )
-        console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
-        console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
-        console.print(f"  reference point: {reference}")
-        console.print(f"  provenance: {task.provenance}\n")
+        table.add_row(task.name, str(len(task.targets)), Text(task.description))
+    console.print(table)
+    console.print("\narmwright tasks NAME tells all of one task; random-N is one of a seeded family.")
+
+
+def show_task(console: Console, task: DesignTask) -> None:
+    """All of one task: its points, and where they come from."""
+    reference = "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
+    console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
+    console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
+    console.print(f"  reference point: {reference}")
+    console.print(f"  provenance: {task.provenance}")
 
 
 def stdout_console() -> Console:

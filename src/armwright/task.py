@@ -6,6 +6,7 @@ import math
 import os
 import re
 import shlex
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Self
@@ -21,6 +22,7 @@ Point = tuple[float, float, float]
 LARGEST_COORDINATE = 1000.0  # [m]
 MOST_TARGETS = 10_000
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
+_FOLDER = resources.files("armwright") / "tasks"
 _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 
 
@@ -56,19 +58,28 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return np.array(self.targets, dtype=np.float64)
 
 
+def builtin_names() -> list[str]:
+    """The names of the tasks that come with armwright, the paper's first."""
+    names = [file.name.removesuffix(".yaml") for file in _FOLDER.iterdir() if file.name.endswith(".yaml")]
+    return sorted(names, key=_file_order)
+
+
 def builtin_tasks() -> dict[str, Task]:
     """The tasks that come with armwright, by name."""
-    folder = resources.files("armwright") / "tasks"
-    files = sorted((f for f in folder.iterdir() if f.name.endswith(".yaml")), key=lambda f: _file_order(f.name))
-    tasks = [parse_document(f.read_text(encoding="utf-8"), Task, TaskError, f.name) for f in files]
-    return {task.name: task for task in tasks}
+    return {name: _builtin(name) for name in builtin_names()}
+
+
+@cache
+def _builtin(name: str) -> Task:
+    file = _FOLDER / f"{name}.yaml"
+    return parse_document(file.read_text(encoding="utf-8"), Task, TaskError, file.name)
 
 
 def load_task(name_or_path: str | Path) -> Task:
     """A built-in task by its name, `random-N` of the seeded family, or the task of a YAML file."""
-    known = builtin_tasks()
+    known = builtin_names()
     if str(name_or_path) in known:
-        return known[str(name_or_path)]
+        return _builtin(str(name_or_path))
     if seeded := _RANDOM.fullmatch(str(name_or_path)):
         return random_task(int(seeded[1]))
     path = Path(name_or_path)

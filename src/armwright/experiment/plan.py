@@ -16,7 +16,7 @@ from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.llm.configuration import configured_model
 from armwright.llm.prompt import PROMPTS
 from armwright.proposers.choice import PROPOSERS, Wishes
-from armwright.task import builtin_tasks, load_task
+from armwright.task import builtin_names, load_task
 
 ALL_TASKS = "all"  # instead of a list: every built-in task
 RUNS = "runs"  # in an experiment's folder
@@ -143,7 +143,7 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     @property
     def task_list(self) -> tuple[str, ...]:
         """The tasks, each by itself."""
-        return tuple(builtin_tasks()) if self.tasks == ALL_TASKS else tuple(self.tasks)
+        return tuple(builtin_names()) if self.tasks == ALL_TASKS else tuple(self.tasks)
 
     @property
     def against(self) -> str:
