@@ -2,12 +2,15 @@ import itertools
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem import Problem
 from armwright.search.columns import Columns
 from armwright.search.front import CAPACITIES, FIRST_BATCH, SMALLEST_BATCH, FrontSearch
-from armwright.search.survival import survivors
+from armwright.search.survival import leaders, survivors
+from armwright.search.variation import RARE_SHARE, _parents
 from armwright.space import CategoricalParameter, FloatParameter, paper_space
 from armwright.task import load_task
 
@@ -177,6 +180,42 @@ def test_survivors_beside_a_small_front_are_the_next_best_and_of_equals_one_is_f
     values = np.array([[9.0, 9.0], [1.0, 1.0], [1.0, 1.0], [2.0, 2.0], [0.0, 7.0], [6.0, 0.0]])
     kept = survivors(values, np.array([5.0, 5.0]), 5)
     assert kept.tolist() == [1, 2, 3, 4, 5]
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0), st.integers(0, 5)), min_size=1, max_size=60),
+    st.integers(1, 4),
+    st.integers(1, 4),
+)
+def test_leaders_are_of_the_best_structures_and_on_their_fronts(points, most, each):
+    values, structures = np.array(points)[:, :2], np.array([kind for _, _, kind in points])
+    reference = np.array([1.5, 1.5])
+    kept = leaders(values, structures, reference, most, each)
+    boxes = np.prod(np.maximum(reference - values, 0.0), axis=1)
+    largest = {kind: boxes[structures == kind].max() for kind in set(structures.tolist())}
+    led = set(structures[kept].tolist())
+    worst_led = min((largest[kind] for kind in led), default=0.0)
+    assert len(set(kept.tolist())) == len(kept)
+    assert len(led) <= most
+    assert all(largest[kind] <= worst_led for kind in set(largest) - led) or len(led) < most
+    for kind in led:
+        mine = np.flatnonzero(structures == kind)
+        chosen = [row for row in kept if structures[row] == kind]
+        assert 1 <= len(chosen) <= each
+        if len(mine) > each:
+            assert set(chosen) <= set(mine[front_mask(values[mine])].tolist()) or largest[kind] == 0.0
+
+
+def test_rare_structures_have_more_than_their_share_of_children():
+    columns = Columns(MIXED)
+    rows = columns.random(100, np.random.default_rng(0))
+    rows[:, 1] = 0.0
+    rows[-1, 1] = 2.0  # the only one of its kind
+    structures = np.sort(columns.structures(rows))
+    parents = _parents(structures, 20_000, np.random.default_rng(1))
+    share = np.mean(structures[parents] == structures[-1])
+    assert share == pytest.approx(RARE_SHARE / 2 + (1 - RARE_SHARE) / 100, abs=0.01)
+    assert set(parents.tolist()) == set(range(100))
 
 
 def test_columns_are_the_space_s():

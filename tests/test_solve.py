@@ -157,3 +157,10 @@ def test_many_targets_are_a_question_of_memory_alone() -> None:
     postures = solve_postures(arms, targets, updates=5)
     assert postures.q.shape == (3, 2000, 4)
     assert np.array_equal(postures.q[:, 1234:1235], solve_postures(arms, targets[1234:1235], updates=5).q)
+
+
+@pytest.mark.parametrize(("said", "most"), [("1", 1), ("3,1", 3), ("", 8), ("many", 8), ("0", 8), ("99", 8)])
+def test_threads_are_no_more_than_openmp_s(monkeypatch: pytest.MonkeyPatch, said: str, most: int) -> None:
+    monkeypatch.setattr(devices.os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", said)
+    assert devices.cores() == most

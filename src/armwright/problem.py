@@ -88,11 +88,7 @@ class Problem:
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
         """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
-        values = self.values(self.evaluation(designs))
-        if self.tolerance > 0.0:
-            for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
-                values = np.maximum(values, self.values(self.evaluation(self.space.designs(copies))))
-        return values
+        return self.evaluate_matrix(self.space.matrix(designs))
 
     def _as_built(self, rows: Array) -> Array:
         """(n, M) of designs as rows, each built exactly as it stands there."""

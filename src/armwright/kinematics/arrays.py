@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
@@ -98,7 +99,7 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precis
     n, dof = len(matrix), space.joints
     axes = np.array([AXES.index(JOINT_AXES[kind]) for kind in space.joint_types], dtype=np.int32)
     links = matrix[:, 3 + dof :]
-    lower, upper = space.joint_range
+    lower, upper = _limits(*space.joint_range, precision)
     offset = np.zeros((n, dof, 3), dtype=precision)
     offset[..., 2] = links
     com = np.zeros((n, dof, 3), dtype=precision)
@@ -106,14 +107,19 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precis
     return ArmArrays(
         base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
         axis=axes[matrix[:, 3 : 3 + dof].astype(np.intp)],
-        lower=np.broadcast_to(-_never_above([[-lower]], precision), (n, dof)),
-        upper=np.broadcast_to(_never_above([[upper]], precision), (n, dof)),
+        lower=np.full((n, dof), lower, dtype=precision),
+        upper=np.full((n, dof), upper, dtype=precision),
         offset=offset,
         com=com,
         mass=np.ascontiguousarray(space.mass.masses(links), dtype=precision),
         joint_numbers=tuple(range(dof)),
         n_joints=dof,
     )
+
+
+@cache
+def _limits(lower: float, upper: float, precision: Precision) -> tuple[Any, Any]:
+    return -_never_above([[-lower]], precision)[0, 0], _never_above([[upper]], precision)[0, 0]
 
 
 def _never_above(limits: list[list[float]], precision: Precision) -> Any:

@@ -5,6 +5,7 @@ threads, on a GPU one chunk after another.
 """
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -23,6 +24,8 @@ BEFORE_THE_FIRST = 1e30  # stands for ∞, the limit gradient before the first u
 LANES: dict[Device, int] = {"cpu": 8, "cuda": 1}  # targets that a thread solves side by side
 FEW = 2  # lanes for as many targets or fewer at the end: half the time of 8 lanes, and the same bits,
 MANY_ARMS = 1000  # but another variant to compile, in seconds, so only for so many arms
+KEPT_ARMS = 256  # for so many at a time arrays are kept, as to make them anew takes as long as to solve a hundred arms
+MOST_KEPT = 8  # such sets of arrays, by thread
 SMALLEST_CHUNK = 32  # groups of targets; below it a thread costs more than it brings
 LARGEST_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: a core's cache; any GPU's memory
 
@@ -69,10 +72,8 @@ def solve_postures(
             q, reached, torque = _solve(chunk, targets[some], updates, begin, lanes, device)
             solved.q[rows, some], solved.reached[rows, some], solved.torque[rows, some] = q, reached, torque
 
-    # The numbers of an arm on the device: four for each joint and three for the tip in each lane, and the arm itself.
     groups = -(-t // LANES[device])
-    numbers = (4 * dof + 3) * groups * LANES[device] + 10 * dof + 3
-    size = max(1, LARGEST_CHUNK[device] // (numbers * solved.q.itemsize))
+    size = max(1, LARGEST_CHUNK[device] // _bytes_of_one(arms, groups, LANES[device]))
     if device == "cuda":
         _one_after_another(solve, n, size)
     else:
@@ -94,7 +95,7 @@ def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_befo
         for values in (np.zeros((1, 1, 3)), q[:, None], h_before[:, None])
     )
     _launch(moved, at[0], 1, q_last, h_last, wp, kernels)
-    return _from_lanes(q_last)[:, 0], _from_lanes(h_last)[:, 0]
+    return _from_lanes(q_last.numpy())[:, 0], _from_lanes(h_last.numpy())[:, 0]
 
 
 def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:
@@ -115,15 +116,85 @@ def _solve(
     device: Device,
 ) -> list[NDArray[Any]]:
     """Kept angles, reached points and torques of a chunk of arms, (N, T, ...)."""
-    wp, kernels = load(arms.precision, lanes, device)
-    at = wp.array(_in_lanes(targets[None], lanes)[0], dtype=kernels.Lane, device=device, copy=False)
-    q_last = wp.zeros((len(arms), len(at), arms.dof), dtype=kernels.Lane, device=device)
+    at = _in_lanes(targets[None], lanes)[0]
+    begin = None
     if start is not None:
-        clipped = np.clip(start, arms.lower[:, None], arms.upper[:, None])
-        q_last = wp.array(_in_lanes(clipped, lanes), dtype=kernels.Lane, device=device, copy=False)
-    h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
-    results = _launch(arms, at, updates, q_last, h_last, wp, kernels)
+        begin = _in_lanes(np.clip(start, arms.lower[:, None], arms.upper[:, None]), lanes)
+    if device == "cpu" and len(arms) <= _most_kept(arms, len(at), lanes):
+        results = _kept_arrays(arms, at, updates, lanes).solve(arms, at, begin)
+    else:
+        wp, kernels = load(arms.precision, lanes, device)
+        at_ = wp.array(at, dtype=kernels.Lane, device=device, copy=False)
+        q_last = wp.zeros((len(arms), len(at), arms.dof), dtype=kernels.Lane, device=device)
+        if begin is not None:
+            q_last = wp.array(begin, dtype=kernels.Lane, device=device, copy=False)
+        h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
+        results = [values.numpy() for values in _launch(arms, at_, updates, q_last, h_last, wp, kernels)]
     return [_from_lanes(values)[:, : len(targets)] for values in results]
+
+
+class _KeptArrays:
+    """What the kernels read and write on the CPU for some arms at a time, made once and filled again for others."""
+
+    def __init__(self, arms: ArmArrays, at: NDArray[Any], updates: int, lanes: int) -> None:
+        wp, kernels = load(arms.precision, lanes, "cpu")
+        most, groups, dof = _most_kept(arms, len(at), lanes), len(at), arms.dof
+        rows = {name: getattr(arms, name) for name in ARRAYS}
+        self._arms = {name: np.zeros((most, *some.shape[1:]), dtype=some.dtype) for name, some in rows.items()}
+        self._at = np.zeros(at.shape, dtype=arms.precision)
+        self._q_last, self._h_last, *self._results = (
+            np.zeros((most, groups, columns, lanes), dtype=arms.precision) for columns in (dof, dof, dof, 3, dof)
+        )
+        on_device = _on_device(replace(arms, **self._arms), wp, kernels, "cpu")
+        at_, q_last, h_last, *results = (
+            wp.array(values, dtype=kernels.Lane, device="cpu", copy=False)
+            for values in (self._at, self._q_last, self._h_last, *self._results)
+        )
+        self._steps = [
+            wp.launch(kernel, (most, groups), inputs=inputs, device="cpu", record_cmd=True)
+            for kernel, inputs in (
+                (kernels.descend, [on_device, at_, updates, q_last, h_last, results[0]]),
+                (kernels.hold, [on_device, at_, q_last, *results]),
+            )
+        ]
+        self._warp_s = (on_device, at_, q_last, h_last, results)  # a recorded launch keeps addresses alone
+
+    def solve(self, arms: ArmArrays, at: NDArray[Any], begin: NDArray[Any] | None) -> list[NDArray[Any]]:
+        """Kept angles, reached points and torques, (N, G, ...) in lanes, as long as nothing else is solved here."""
+        n = len(arms)
+        for name, values in self._arms.items():
+            values[:n] = getattr(arms, name)
+        self._at[...] = at
+        self._q_last[:n] = 0.0 if begin is None else begin
+        self._h_last[:n] = BEFORE_THE_FIRST
+        for step in self._steps:
+            step.set_dim((n, len(at)))
+            step.launch()
+        return [values[:n] for values in self._results]
+
+
+_kept = threading.local()
+
+
+def _kept_arrays(arms: ArmArrays, at: NDArray[Any], updates: int, lanes: int) -> _KeptArrays:
+    """This thread's arrays for arms with as many joints and targets."""
+    sets: dict[tuple[Any, ...], _KeptArrays] = _kept.__dict__.setdefault("sets", {})
+    key = (arms.dof, arms.precision, len(at), updates, lanes)
+    if key not in sets:
+        if len(sets) == MOST_KEPT:
+            sets.clear()
+        sets[key] = _KeptArrays(arms, at, updates, lanes)
+    return sets[key]
+
+
+def _most_kept(arms: ArmArrays, groups: int, lanes: int) -> int:
+    """For how many arms arrays are kept: fewer, down to none, where each has a great many targets."""
+    return min(KEPT_ARMS, LARGEST_CHUNK["cpu"] // _bytes_of_one(arms, groups, lanes))
+
+
+def _bytes_of_one(arms: ArmArrays, groups: int, lanes: int) -> int:
+    """Four numbers for each joint and three for the tip in each lane, and the arm itself."""
+    return ((4 * arms.dof + 3) * groups * lanes + 10 * arms.dof + 3) * arms.base.itemsize
 
 
 def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, wp: Any, kernels: Any) -> list[Any]:
@@ -178,9 +249,9 @@ def _in_lanes(values: NDArray[Any], lanes: int) -> NDArray[Any]:
     return np.ascontiguousarray(filled.reshape(n, groups, lanes, columns).swapaxes(2, 3))
 
 
-def _from_lanes(values: Any) -> NDArray[Any]:
-    """(N, G, C) in lanes as (N, G L, C), in numpy."""
-    lanes = values.numpy().swapaxes(2, 3)  # (N, G, L, C)
+def _from_lanes(values: NDArray[Any]) -> NDArray[Any]:
+    """(N, G, C, L) as (N, G L, C)."""
+    lanes = values.swapaxes(2, 3)  # (N, G, L, C)
     return lanes.reshape(len(lanes), -1, lanes.shape[3])
 
 
