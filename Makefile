@@ -24,7 +24,7 @@ format: .venv/.check
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 20 minutes on two cores
+bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes on two cores
 	$(BIN)/python benchmarks/bench.py
 
 .venv/.python:

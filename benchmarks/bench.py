@@ -1,6 +1,6 @@
 """The figures of docs/benchmarks.md that go with the kernels and the search, one after the other.
 
-    python benchmarks/bench.py          # some 20 minutes on two cores
+    python benchmarks/bench.py          # some 25 minutes on two cores
 
 rules.py and overlap.py take long and are run by themselves.
 """
@@ -19,6 +19,7 @@ PARTS = (
     ("experiment.py",),
     ("front.py", "--seeds", "3", "--budget", "100000", "--populations", "100", "--tasks", *PAPER_TASKS),
     ("time_to_front.py",),
+    ("front.py", "--seeds", "2", "--budget", "100000", "--populations"),
 )
 
 

@@ -185,25 +185,21 @@ def test_survivors_beside_a_small_front_are_the_next_best_and_of_equals_one_is_f
 @given(
     st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0), st.integers(0, 5)), min_size=1, max_size=60),
     st.integers(1, 4),
-    st.integers(1, 4),
 )
-def test_leaders_are_of_the_best_structures_and_on_their_fronts(points, most, each):
+def test_leaders_are_the_best_of_the_best_structures(points, most):
     values, structures = np.array(points)[:, :2], np.array([kind for _, _, kind in points])
     reference = np.array([1.5, 1.5])
-    kept = leaders(values, structures, reference, most, each)
+    kept = leaders(values, structures, reference, most)
     boxes = np.prod(np.maximum(reference - values, 0.0), axis=1)
     largest = {kind: boxes[structures == kind].max() for kind in set(structures.tolist())}
     led = set(structures[kept].tolist())
-    worst_led = min((largest[kind] for kind in led), default=0.0)
     assert len(set(kept.tolist())) == len(kept)
-    assert len(led) <= most
-    assert all(largest[kind] <= worst_led for kind in set(largest) - led) or len(led) < most
+    assert len(led) == min(most, len(largest))
+    assert all(largest[kind] <= min(largest[one] for one in led) for kind in set(largest) - led)
     for kind in led:
-        mine = np.flatnonzero(structures == kind)
         chosen = [row for row in kept if structures[row] == kind]
-        assert 1 <= len(chosen) <= each
-        if len(mine) > each:
-            assert set(chosen) <= set(mine[front_mask(values[mine])].tolist()) or largest[kind] == 0.0
+        assert 1 <= len(chosen) <= 3
+        assert largest[kind] in boxes[chosen]
 
 
 def test_rare_structures_have_more_than_their_share_of_children():

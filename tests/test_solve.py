@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -164,3 +165,26 @@ def test_threads_are_no_more_than_openmp_s(monkeypatch: pytest.MonkeyPatch, said
     monkeypatch.setattr(devices.os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", said)
     assert devices.cores() == most
+
+
+def test_threads_that_solve_other_numbers_of_arms_at_other_tasks_get_the_same_bits() -> None:
+    problems = [Problem(load_task(name)) for name in ("target-1", "target-2", "autodesign-1")]
+    known = [(rows := p.space.matrix(p.space.sample(700, 0)), p.evaluate_matrix(rows)) for p in problems]
+    wrong: list[tuple[int, int]] = []
+
+    def work(seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        for _ in range(40):
+            which, n = int(rng.integers(len(problems))), int(rng.choice([1, 2, 7, 33, 100, 250, 300, 600]))
+            rows, values = known[which]
+            first = int(rng.integers(0, 700 - n))
+            part = slice(first, first + n)
+            if not np.array_equal(problems[which].evaluate_matrix(rows[part]), values[part]):
+                wrong.append((which, n))
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong

@@ -150,14 +150,11 @@ class _KeptArrays:
             wp.array(values, dtype=kernels.Lane, device="cpu", copy=False)
             for values in (self._at, self._q_last, self._h_last, *self._results)
         )
-        self._steps = [
-            wp.launch(kernel, (most, groups), inputs=inputs, device="cpu", record_cmd=True)
-            for kernel, inputs in (
-                (kernels.descend, [on_device, at_, updates, q_last, h_last, results[0]]),
-                (kernels.hold, [on_device, at_, q_last, *results]),
-            )
-        ]
-        self._warp_s = (on_device, at_, q_last, h_last, results)  # a recorded launch keeps addresses alone
+        self._launch = wp.launch
+        self._steps = (
+            (kernels.descend, [on_device, at_, updates, q_last, h_last, results[0]]),
+            (kernels.hold, [on_device, at_, q_last, *results]),
+        )
 
     def solve(self, arms: ArmArrays, at: NDArray[Any], begin: NDArray[Any] | None) -> list[NDArray[Any]]:
         """Kept angles, reached points and torques, (N, G, ...) in lanes, as long as nothing else is solved here."""
@@ -167,9 +164,8 @@ class _KeptArrays:
         self._at[...] = at
         self._q_last[:n] = 0.0 if begin is None else begin
         self._h_last[:n] = BEFORE_THE_FIRST
-        for step in self._steps:
-            step.set_dim((n, len(at)))
-            step.launch()
+        for kernel, inputs in self._steps:
+            self._launch(kernel, (n, len(at)), inputs=inputs, device="cpu")
         return [values[:n] for values in self._results]
 
 

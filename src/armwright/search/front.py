@@ -31,7 +31,6 @@ EVALUATIONS_A_PLACE = 200  # the pool grows by one design for so many evaluation
 SMALLEST_BATCH = 100  # designs a generation; as many as the pool holds once that is more
 FIRST_BATCH = 500  # random designs at the start
 LEADING = 12  # structures whose best designs stay beside the pool
-LEADERS_EACH = 4  # designs of such a structure
 SIDE_FROM = 25_000  # evaluations
 SIDE_SHARE = 0.25  # of the evaluations after these
 SIDE_LIFE = 5_000  # evaluations of a side pool until it joins
@@ -218,7 +217,7 @@ class FrontSearch:
         """A pool of these designs, sorted."""
         structures = self._columns.structures(rows)
         best = survivors(values, self._reference_point, capacity)
-        leading = leaders(values, structures, self._reference_point, LEADING, LEADERS_EACH)
+        leading = leaders(values, structures, self._reference_point, LEADING)
         kept = np.union1d(best, leading)
         kept = kept[np.lexsort((values[kept, 0], structures[kept]))]
         return rows[kept], values[kept]

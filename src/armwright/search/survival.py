@@ -39,28 +39,26 @@ def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
     return np.concatenate([best, others[np.lexsort((rank, outside))]])[:capacity]
 
 
-def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int, each: int) -> Rows:
-    """Of the `most` best structures (N,), the rows of `values` (N, M) that contribute most to its own front, `each`.
+def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int) -> Rows:
+    """Of the `most` best structures (N,), the rows of `values` (N, M) that are best in one of M + 1 ways.
 
     A structure is as good as the largest box of its points: what a point dominates alone, bounded by the reference
-    point.
+    point. The other ways give the gain in one objective more weight, so that not only the middle of its front stays.
     """
-    boxes = np.prod(np.maximum(reference_point - values, 0.0), axis=1)
-    order = np.lexsort((-boxes, structures))
+    gains = np.maximum(reference_point - values, 0.0)
+    boxes = np.prod(gains, axis=1)
+    order = np.argsort(structures, kind="stable")
     starts = np.flatnonzero(np.diff(structures[order], prepend=-1))
-    ends = np.append(starts[1:], len(order))
-    leading = np.argsort(-boxes[order[starts]], kind="stable")[:most]
-    found = [np.zeros(0, dtype=np.intp)]
-    for start, end in zip(starts[leading], ends[leading], strict=True):
-        mine = order[start:end]
-        if len(mine) > each:
-            mine = mine[front(values[mine], reference_point)]
-        if len(mine) > each:  # with many objectives, exact contributions would cost too much here, too
-            exact = values.shape[1] <= MOST_EXACT
-            worth = moocore.hv_contributions(values[mine], ref=reference_point) if exact else boxes[mine]
-            mine = mine[np.argsort(-worth, kind="stable")[:each]]
-        found.append(mine)
-    return np.concatenate(found)
+    largest = np.maximum.reduceat(boxes[order], starts)
+    leading = np.argsort(-largest, kind="stable")[:most]
+    sizes = np.diff(starts, append=len(order))
+    found: list[Rows] = []
+    for worth in (boxes, *(boxes[:, None] * gains**2).T):
+        best = np.repeat(np.maximum.reduceat(worth[order], starts), sizes)
+        places = np.flatnonzero(worth[order] == best)
+        first = places[np.searchsorted(places, starts[leading])]
+        found.append(order[first])
+    return np.unique(np.concatenate(found))
 
 
 def thinned(front: Array, reference_point: Array, capacity: int) -> Rows:
