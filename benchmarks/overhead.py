@@ -25,7 +25,7 @@ from armwright.study import Run, optimize
 from armwright.task import load_task
 
 PROBLEM = Problem(load_task("target-1"))
-ROUNDS = 7
+ROUNDS = 5
 
 
 def main() -> None:
