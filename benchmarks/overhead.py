@@ -85,7 +85,8 @@ def whole_process() -> None:
         cold = seconds_and_memory([sys.executable, "-c", load], WARP_CACHE_PATH=folder)[0]
         warm = seconds_and_memory([sys.executable, "-c", load], WARP_CACHE_PATH=folder)[0]
         print(f"  kernels: compiled {cold:.2f} s, loaded from the cache {warm:.2f} s (with the import of Warp)")
-        for name, cache in (("first run", f"{folder}/new"), ("later run", folder)):
+        cache = f"{folder}/new"
+        for name in ("first run", "later run"):
             out = f"{folder}/run-{name}"
             run = [*command, "optimize", "target-1", "--out", out]
             seconds, memory = seconds_and_memory(run, WARP_CACHE_PATH=cache)

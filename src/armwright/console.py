@@ -208,8 +208,9 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     """A line for every task."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for name, justify in (("task", "left"), ("targets", "right"), ("", "left")):
-        table.add_column(name, justify=justify, no_wrap=name != "")
+    table.add_column("task", no_wrap=True)
+    table.add_column("targets", justify="right")
+    table.add_column("")
     for task in tasks:
         table.add_row(task.name, str(len(task.targets)), Text(task.description))
     console.print(table)
