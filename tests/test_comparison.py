@@ -186,7 +186,7 @@ def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_serv
     chat_server.answer = lambda request: designer(request) if wants_design(request) else words
     proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
     optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
-    found = compare([read_run_record(tmp_path / "run")])
+    found = compare([read_run_record(tmp_path / "run", "no $\\alpha_{x markup")])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}
     assert "reasoning-target-1" in names
 

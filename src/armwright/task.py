@@ -91,7 +91,7 @@ def load_task(name_or_path: str | Path) -> Task:
         raise TaskError(f"there is no file {path}; `armwright init {path}` writes one to edit")
     raise TaskError(
         f'unknown task "{name_or_path}".{did_you_mean(str(name_or_path), known)} '
-        f"Built-in tasks: {', '.join(known)}; random-N; or give a YAML file"
+        f"`armwright tasks` lists the {len(known)} built-in ones; random-N and YAML files are tasks, too"
     )
 
 

@@ -256,6 +256,8 @@ def cells_of(
     beside: the folder that the experiment's own files lie in. out: the experiment's folder.
     replay: a folder of an earlier experiment, whose recorded runs stand for the model.
     """
+    if replay is not None and not replay.is_dir():
+        raise SettingsError(f"--replay {replay}: there is no such folder of an earlier experiment")
     space = None if plan.space is None else str((beside / plan.space).resolve())
     tasks = [_task(name, beside) for name in plan.task_list]
     names = [name for _, name in tasks]

@@ -150,7 +150,7 @@ def draw_area(comparison: Comparison) -> Figure:
     axes.set_ylim(0, 1.15 * reference[1])
     _name_axes(axes, config)
     area = hypervolume(history.values[: config.study.n_trials], reference)
-    axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: $E_{{hv}}$ = {area:.2f}")
+    axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
     axes.legend(loc="lower left")
     return figure
 

@@ -49,6 +49,7 @@ RC: Any = {  # read-only by custom
     "savefig.dpi": 160,
     "pdf.fonttype": 42,  # fonts embedded as text, as journals ask
     "svg.hashsalt": "armwright",
+    "text.parse_math": False,  # names and words of others are no markup
 }
 
 
