@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from armwright.best_known import known_front
 from armwright.cli import app
 from armwright.comparison import Comparison, compare, find_runs, list_runs, read_run_record
 from armwright.exceptions import RunFolderError, SettingsError
@@ -22,7 +23,7 @@ from armwright.report.tables import latex, markdown, write_tables
 from armwright.statistics import interval, paired_test
 from armwright.study import optimize
 from armwright.task import Task, load_task
-from tests.chat_server import ChatServer, designer, wants_design
+from tests.chat_server import ChatServer, wants_design
 
 SEEDS = range(3)
 TASKS = ("target-1", "random-4")
@@ -183,9 +184,12 @@ def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) ->
 
 def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_server: ChatServer) -> None:
     words = "Step 1: $\\alpha_{x \x1b[31m and _no_ markup\n" + "reason " * 3000
-    chat_server.answer = lambda request: designer(request) if wants_design(request) else words
+    problem = Problem(load_task("target-1"))
+    known = known_front(problem)
+    best = json.dumps({**known.designs[0].params, "reason": "the most precise of all"})  # so it becomes Solution 1
+    chat_server.answer = lambda request: best if wants_design(request) else words
     proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
-    optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
+    optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
     found = compare([read_run_record(tmp_path / "run", "no $\\alpha_{x markup")])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}
     assert "reasoning-target-1" in names

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from armwright.arm import Arm
-from armwright.evaluation import Array, Evaluation, evaluate, evaluate_arrays
+from armwright.evaluation import Array, Evaluation, evaluate_arrays
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import arrays_of
 from armwright.kinematics.devices import Device, resolve_device
@@ -58,7 +58,7 @@ class Problem:
 
     def evaluation(self, designs: Sequence[Design]) -> Evaluation:
         """The physics of N designs at all targets."""
-        return evaluate([self.arm(design) for design in designs], self.task.points, self.device)
+        return evaluate_arrays(arrays_of(self.space, self.space.matrix(designs)), self.task.points, self.device)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
@@ -88,7 +88,11 @@ class Problem:
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
         """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
-        return self.evaluate_matrix(self.space.matrix(designs))
+        values = self.values(self.evaluation(designs))
+        if self.tolerance > 0.0:
+            for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
+                values = np.maximum(values, self.values(self.evaluation(self.space.designs(copies))))
+        return values
 
     def _as_built(self, rows: Array) -> Array:
         """(n, M) of designs as rows, each built exactly as it stands there."""
