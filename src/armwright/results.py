@@ -44,10 +44,10 @@ def write_results(
     verification: of the front, by rising position error; None where none was made.
     """
     verdicts = _verdicts(history, verification)
-    folder.write_text("trials.csv", _csv(_rows(history)))
+    folder.write_text("trials.csv", as_csv(_rows(history)))
     on_front = {member.number for member in history.front}
     rows = [row | _flat_verdict(verdicts.get(row["number"])) for row in _rows(history) if row["number"] in on_front]
-    folder.write_text("front.csv", _csv(rows))
+    folder.write_text("front.csv", as_csv(rows))
     _write_designs(folder, history, verdicts)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
@@ -307,7 +307,8 @@ def _objectives(history: History, values: Sequence[float]) -> dict[str, float]:
     return {o.name: value for o, value in zip(history.problem.objectives, values, strict=True)}
 
 
-def _csv(rows: Iterable[Mapping[str, Any]]) -> str:
+def as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Records of the same keys as CSV, with a first line of these; empty for none."""
     out = io.StringIO()
     writer: csv.DictWriter[str] | None = None
     for row in rows:

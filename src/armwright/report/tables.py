@@ -1,7 +1,5 @@
 """A comparison of runs as tables: CSV for programs, Markdown for people, LaTeX for papers."""
 
-import csv
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +8,7 @@ import numpy as np
 
 from armwright.comparison import Comparison, Row, Run
 from armwright.exceptions import RunFolderError
+from armwright.results import as_csv
 from armwright.statistics import Interval, least_p
 
 Published = Mapping[tuple[str, str], tuple[float, float]]  # (method, task): (E_hv, σ_hv)
@@ -33,12 +32,12 @@ def write_tables(
     published = published or {}
     files = {
         "table.md": markdown(comparison, title, published, published_in, notes),
-        "table.csv": _csv(_row_records(comparison, published)),
+        "table.csv": as_csv(_row_records(comparison, published)),
         "table.tex": latex(comparison, published, published_in),
-        "contrasts.csv": _csv(_contrast_records(comparison)),
-        "time-to.csv": _csv(_time_records(comparison)),
-        "proposers.csv": _csv(_proposer_records(comparison)),
-        "runs.csv": _csv(_run_records(comparison)),
+        "contrasts.csv": as_csv(_contrast_records(comparison)),
+        "time-to.csv": as_csv(_time_records(comparison)),
+        "proposers.csv": as_csv(_proposer_records(comparison)),
+        "runs.csv": as_csv(_run_records(comparison)),
     }
     written: list[Path] = []
     for name, text in files.items():
@@ -438,14 +437,3 @@ _TEX = str.maketrans(
 
 def _tex(text: str) -> str:
     return text.translate(_TEX)
-
-
-def _csv(records: Iterable[Mapping[str, Any]]) -> str:
-    out = io.StringIO()
-    writer: csv.DictWriter[str] | None = None
-    for record in records:
-        if writer is None:
-            writer = csv.DictWriter(out, fieldnames=list(record), lineterminator="\n")
-            writer.writeheader()
-        writer.writerow(record)
-    return out.getvalue()
