@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.chat_server import ChatServer
+from tests.postgres import PostgresServer, binaries
 
 
 @pytest.fixture(autouse=True)
@@ -21,6 +22,19 @@ def chat_server() -> Iterator[ChatServer]:
     """An OpenAI-compatible server on 127.0.0.1 that answers as a test tells it."""
     with ChatServer() as server:
         yield server
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[PostgresServer]:
+    """A real PostgreSQL, running."""
+    programs = binaries()
+    if programs is None:
+        pytest.skip("PostgreSQL is not installed (on Debian and Ubuntu: sudo apt install postgresql)")
+    server = PostgresServer(programs)
+    server.start()
+    yield server
+    server.stop()
+    server.remove()
 
 
 @pytest.fixture

@@ -5,21 +5,25 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pymoo.indicators.hv import HV
+from scipy.stats import wilcoxon
 from typer.testing import CliRunner
 
 from armwright.best_known import known_front
 from armwright.cli import app
-from armwright.comparison import Comparison, compare, find_runs, list_runs, read_run_record
+from armwright.comparison import Comparison, Run, compare_runs, find_runs, list_runs, read_run_record, side_by_side
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.front import find_front
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.report.comparison import write_comparison_figures
 from armwright.report.tables import latex, markdown, write_tables
+from armwright.run_folder import read_run
 from armwright.statistics import interval, paired_test
 from armwright.study import optimize
 from armwright.task import Task, load_task
@@ -45,7 +49,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def comparison(runs: Path) -> Comparison:
-    return compare([read_run_record(folder) for folder in find_runs([runs])], "BBO (12 trials)")
+    return compare_runs(runs, baseline="BBO (12 trials)")
 
 
 def changed(folder: Path, change: Callable[[dict], None]) -> None:
@@ -87,6 +91,30 @@ def test_contrasts_pair_the_seeds(comparison: Comparison) -> None:
     assert comparison.is_undecidable
 
 
+def test_over_all_tasks_each_counts_once(runs: Path) -> None:
+    records = [read_run_record(folder) for folder in find_runs([runs]) if "target-1" in folder.name]
+    gains = [0.9, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
+
+    def as_task(run: Run, i: int) -> Run:
+        """The same run on another task, the rules' hypervolume so many times as large."""
+        gain = gains[i] if "rules" in run.method else 1.0
+        history = [gain * value for value in run.summary["hypervolume"]["history"]]
+        summary = {**run.summary, "hypervolume": {**run.summary["hypervolume"], "history": history}}
+        return replace(run, task=f"task-{i}", summary=summary)
+
+    several = [as_task(run, i) for i in range(7) for run in records]
+    (over,) = side_by_side(several).overall
+    means = {m: np.mean([run.curve.mean() for run in records if run.method == m]) for m in {r.method for r in records}}
+    ours = next(mean for method, mean in means.items() if "rules" in method)
+    ratios = np.array(gains) * ours / next(mean for method, mean in means.items() if "rules" not in method)
+    assert over.ratio.mean == pytest.approx(ratios.mean())
+    assert over.test.p == pytest.approx(wilcoxon(np.log(ratios)).pvalue)
+    assert over.test.better == int(np.sum(ratios > 1.0))
+    assert "## Over all tasks" in markdown(side_by_side(several), "x")
+    five = [run for run in several if run.task not in ("task-5", "task-6")]
+    assert side_by_side(five).overall == []
+
+
 def test_times_say_how_many_got_there(comparison: Comparison) -> None:
     for time in comparison.times:
         curves = comparison.curves(time.method, time.task)
@@ -98,7 +126,7 @@ def test_times_say_how_many_got_there(comparison: Comparison) -> None:
 def test_a_flagged_run_stands_for_nothing(runs: Path, tmp_path: Path) -> None:
     place = shutil.copytree(runs, tmp_path / "runs")
     changed(place / "target-1-rules-1", lambda s: s["proposer"].update(flagged=True, fallback_share=0.5))
-    found = compare([read_run_record(folder) for folder in find_runs([place])])
+    found = side_by_side([read_run_record(folder) for folder in find_runs([place])])
     method = next(m for m in found.methods if "rules" in m)
     assert [run.seed for run in found.of(method, "target-1")] == [0, 2]
     assert "left out, as 50% of its proposals failed" in markdown(found, "x")
@@ -108,7 +136,7 @@ def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> Non
     place = shutil.copytree(runs, tmp_path / "runs")
     for seed in SEEDS:
         changed(place / f"target-1-rules-{seed}", lambda s: s["proposer"].update(origin="scripted", model="gpt-x"))
-    found = compare([read_run_record(folder) for folder in find_runs([place])])
+    found = side_by_side([read_run_record(folder) for folder in find_runs([place])])
     for text in (markdown(found, "x"), latex(found)):
         assert "[scripted]" in text
         assert "gpt-x" not in text
@@ -119,28 +147,56 @@ def test_what_cannot_be_compared_is_refused(runs: Path, tmp_path: Path) -> None:
     record = read_run_record(runs / "target-1-none-0")
     for words, task, settings in (
         ("targets differ", Task(name="target-1", targets=((0.3, 0.0, 0.2),), reference_point=(5.0, 5.0)), {}),
-        ("reference_point differ", load_task("target-1").model_copy(update={"reference_point": (4.0, 5.0)}), {}),
         ("12 and 13 counted trials", load_task("target-1"), {"n_total": 13}),
     ):
         out = tmp_path / words.split()[0]
         optimize(Problem(task), proposer="none", n_init=4, seed=1, out=out, verify=False, **{"n_total": 12, **settings})
         with pytest.raises(SettingsError, match=words):
-            compare([record, read_run_record(out)])
+            side_by_side([record, read_run_record(out)])
     copy = shutil.copytree(runs / "target-1-none-0", tmp_path / "copy")
     with pytest.raises(SettingsError, match="leave one out"):
-        compare([record, read_run_record(copy)])
+        side_by_side([record, read_run_record(copy)])
     with pytest.raises(SettingsError, match='no run is of the method "x"'):
-        compare([record], "x")
+        side_by_side([record], "x")
     (copy / "summary.json").unlink()
     with pytest.raises(RunFolderError, match="not finished"):
         read_run_record(copy)
     with pytest.raises(SettingsError, match="no finished run"):
-        compare([])
+        side_by_side([])
+
+
+def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest(tmp_path: Path) -> None:
+    task = Task(name="mine", targets=load_task("shelf").targets)
+    stated = task.model_copy(update={"reference_point": (0.5, 9.0)})
+    for seed in SEEDS:
+        for proposer in ("none", "rules"):
+            optimize(Problem(task), proposer=proposer, n_init=4, n_total=6, n_step=3, seed=seed, verify=False,
+                     out=tmp_path / f"{proposer}-{seed}")  # fmt: skip
+    optimize(Problem(stated), sampler="random", proposer="none", n_init=4, n_total=6, verify=False, out=tmp_path / "s")
+    find_front(Problem(task), budget=2000, out=tmp_path / "front")
+    records = [read_run_record(folder) for folder in find_runs([tmp_path])]
+    own = [record.config.reference_point for record in records]
+    assert len(set(own)) > 2
+    found = side_by_side(records)
+    shared = tuple(max(values) for values in zip(*own, strict=True))
+    assert found.widened == ["mine"]
+    assert found.reference_point("mine") == shared
+    for run in found.runs:
+        values = read_run(run.folder)[1].values
+        if len(run.curve):  # pymoo's hypervolume, after each counted trial
+            assert run.curve == pytest.approx([HV(np.array(shared))(values[: 4 + i]) for i in range(1, 7)])
+        assert run.final == pytest.approx(HV(np.array(shared))(values))
+        if run.proposer:
+            assert sum(run.gained.values()) == pytest.approx(1.0)
+    text = markdown(found, "x")
+    assert "mine: its runs had reference points of their own" in text
+    assert f"{shared[0]:.4g}, {shared[1]:.4g}" in text
+    assert write_comparison_figures(tmp_path, found)
 
 
 def test_searches_for_the_whole_front_stand_beside_studies(runs: Path, tmp_path: Path) -> None:
     find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
-    found = compare([read_run_record(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
+    found = side_by_side([read_run_record(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     row = next(row for row in found.rows if row.method == "front search")
     assert row.e_hv is None
     assert row.final.mean > 8.0
@@ -190,7 +246,7 @@ def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_serv
     chat_server.answer = lambda request: best if wants_design(request) else words
     proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
     optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
-    found = compare([read_run_record(tmp_path / "run", "no $\\alpha_{x markup")])
+    found = side_by_side([read_run_record(tmp_path / "run", "no $\\alpha_{x markup")])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}
     assert "reasoning-target-1" in names
 

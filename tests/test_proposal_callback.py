@@ -162,8 +162,8 @@ from optuna.storages import JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 import armwright as aw
 
-kind, path, url, seed = sys.argv[1:]
-storage = RDBStorage(f"sqlite:///{path}") if kind == "rdb" else JournalStorage(JournalFileBackend(path))
+kind, place, url, seed = sys.argv[1:]
+storage = RDBStorage(place) if kind == "postgres" else JournalStorage(JournalFileBackend(place))
 sampler = optuna.samplers.NSGAIISampler(population_size=8, seed=int(seed))
 study = optuna.load_study(study_name="shared", storage=storage, sampler=sampler)
 
@@ -176,15 +176,15 @@ study.optimize(objective, n_trials=10, callbacks=[aw.ProposalCallback(proposer, 
 """
 
 
-@pytest.mark.parametrize("kind", ["rdb", "journal"])
+@pytest.mark.parametrize("kind", ["postgres", "journal"])
 def test_several_processes_on_one_storage_share_the_proposals(
-    kind: str, chat_server: ChatServer, tmp_path: Path
+    kind: str, chat_server: ChatServer, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.125}, "reason": "an eighth"}'
-    path = tmp_path / "storage"
-    storage = RDBStorage(f"sqlite:///{path}") if kind == "rdb" else JournalStorage(JournalFileBackend(str(path)))
+    place = request.getfixturevalue("postgres").database() if kind == "postgres" else str(tmp_path / "journal")
+    storage = RDBStorage(place) if kind == "postgres" else JournalStorage(JournalFileBackend(place))
     study = optuna.create_study(study_name="shared", storage=storage, directions=["minimize"] * 2)
-    command = [sys.executable, "-c", WORKER, kind, str(path), chat_server.url]
+    command = [sys.executable, "-c", WORKER, kind, place, chat_server.url]
     workers = [subprocess.Popen([*command, str(seed)]) for seed in range(3)]
     assert [worker.wait() for worker in workers] == [0, 0, 0]
     finished = [trial.number for trial in study.trials if trial.state.is_finished()]

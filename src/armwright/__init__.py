@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from armwright.any_study.llm import StudyLlmProposer
     from armwright.any_study.proposals import StudyProposal, StudyProposer
     from armwright.arm import Arm, Joint, Link, uniform_link
+    from armwright.comparison import Comparison, compare_runs
     from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
     from armwright.export.urdf import to_urdf
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 _PLACES = {
     "Arm": "arm",
     "ArmwrightError": "exceptions",
+    "Comparison": "comparison",
     "Design": "space",
     "DesignSpace": "space",
     "Evaluation": "evaluation",
@@ -66,6 +68,7 @@ _PLACES = {
     "Task": "task",
     "UsageError": "exceptions",
     "builtin_tasks": "task",
+    "compare_runs": "comparison",
     "evaluate": "evaluation",
     "find_front": "front",
     "hypervolume": "pareto",
@@ -85,6 +88,7 @@ _PLACES = {
 __all__ = [
     "Arm",
     "ArmwrightError",
+    "Comparison",
     "Design",
     "DesignSpace",
     "Evaluation",
@@ -111,6 +115,7 @@ __all__ = [
     "Task",
     "UsageError",
     "builtin_tasks",
+    "compare_runs",
     "evaluate",
     "find_front",
     "hypervolume",

@@ -15,7 +15,7 @@ from armwright.evaluation import Array
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem import Problem
 from armwright.space import Design, FloatParameter, paper_space
-from armwright.task import builtin_names, load_task
+from armwright.task import Task, builtin_names, load_task
 
 BEYOND = 5e-4  # of the best known hypervolume: any other front fills the gaps of a finite one by less
 
@@ -55,6 +55,14 @@ def known_front(problem: Problem) -> KnownFront | None:
         if load_task(name).targets == problem.task.targets:
             return _read(name)
     return None
+
+
+def best_known_hypervolume(task: Task) -> float | None:
+    """Of a task in the paper's design space, within its own reference point; None where no front is known."""
+    known = known_front(Problem(task))
+    if known is None or task.reference_point is None:
+        return None
+    return hypervolume(known.values, task.reference_point)
 
 
 def standing(problem: Problem, values: Array, reference_point: Sequence[float]) -> Standing | None:

@@ -3,6 +3,7 @@
 import os
 import shlex
 import sys
+from dataclasses import asdict
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -372,7 +373,7 @@ def experiment(
     """Run methods on tasks with seeds, and compare them. The same command again goes on; finished runs stay."""
     from armwright import console as view
     from armwright.experiment import outcome, plan, running
-    from armwright.report.experiment import write_experiment
+    from armwright.report.experiment import write_experiment_figures, write_experiment_tables
 
     if print_:
         print(plan.builtin_text(name), end="")
@@ -399,9 +400,11 @@ def experiment(
         for number, done in enumerate(ended, start=1):
             view.show_outcome(words, done, number, len(due))
             failed += [done] if done.fault else []
+        found = outcome.collect(chosen, cells)
+        tables = write_experiment_tables(out, chosen, found, view.notes_on_cells(skipped, failed))
         if figures:
             words.print("drawing the figures")
-        tables, drawn = write_experiment(out, chosen, cells, view.notes_on_cells(skipped, failed), figures)
+        drawn = write_experiment_figures(out, chosen, found) if figures else []
     except KeyboardInterrupt:
         words.print(f"\nstopped; every finished trial is in {out}/. Go on with:\n  {_same_command()}")
         sys.exit(INTERRUPTED)
@@ -427,16 +430,13 @@ def compare(
 ) -> None:
     """Compare finished runs by method, task and seed: tables, intervals, tests."""
     from armwright import console as view
-    from armwright.comparison import compare as side_by_side
-    from armwright.comparison import find_runs, read_run_record
+    from armwright.comparison import finished_runs, side_by_side
     from armwright.report.tables import markdown, write_tables
-    from armwright.results import read_summary
 
-    found = list(dict.fromkeys(find_runs(places)))
-    finished = [folder for folder in found if read_summary(folder) is not None]
     words = view.stdout_console()
-    notes = [f"{folder} is not finished, and left out" for folder in found if folder not in finished]
-    comparison = side_by_side([read_run_record(folder) for folder in finished], baseline)
+    finished, unfinished = finished_runs(places)
+    notes = [f"{folder} is not finished, and left out" for folder in unfinished]
+    comparison = side_by_side(finished, baseline)
     title = "Runs compared"
     words.print(markdown(comparison, title, notes=notes), end="")
     if out is not None:
@@ -529,17 +529,27 @@ def tasks(
 ) -> None:
     """List the built-in tasks; with names, tell their points and where they come from."""
     from armwright import console as view
+    from armwright.baselines import baselines_of
+    from armwright.best_known import best_known_hypervolume
     from armwright.task import builtin_tasks, load_task
 
-    known = [load_task(name) for name in names] if names else list(builtin_tasks().values())
+    told = [load_task(name) for name in names] if names else list(builtin_tasks().values())
+    known = {task.name: best_known_hypervolume(task) for task in told} if names or json_ else {}
+    stored = {name: baselines_of(name) if known[name] is not None else [] for name in known}
     if json_:
-        _print_json([task.model_dump(mode="json") for task in known])
+        _print_json(
+            [
+                task.model_dump(mode="json")
+                | {"best_known_hypervolume": known[task.name], "baselines": [asdict(b) for b in stored[task.name]]}
+                for task in told
+            ]
+        )
         return
     words = view.stdout_console()
     if not names:
-        view.show_tasks(words, known)
-    for task in known if names else ():
-        view.show_task(words, task)
+        view.show_tasks(words, told)
+    for task in told if names else ():
+        view.show_task(words, task, known[task.name], stored[task.name])
 
 
 @app.command()

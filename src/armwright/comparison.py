@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from armwright.best_known import known_front
+from armwright.credit import credit_by_source
 from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError, SettingsError
+from armwright.history import History
 from armwright.pareto import hypervolume
 from armwright.results import read_summary
-from armwright.run_folder import CONFIG, TRIALS, FrontMethod, RunConfig, read_config
+from armwright.run_folder import CONFIG, TRIALS, FrontMethod, RunConfig, read_config, read_run
 from armwright.statistics import Interval, PairedTest, can_reject, holm, interval, paired_test
 
 LEVELS = (0.5, 0.75, 0.9, 0.95)  # of the best known hypervolume, for the time to get there
@@ -25,8 +27,8 @@ NAMES = {"rules": "rules", "llm": "LLM", "manual": "people", "scripted": "script
 class Run:
     """A finished run, as its summary tells of it.
 
-    curve: (I,) the hypervolume over the counted trials; empty for a search for the whole front.
-    share: of the best known hypervolume, where one is known. flagged: too many proposals failed.
+    reference_point: within which its hypervolume counts. Where this is not the one that it ran with, all is computed
+        anew from its trials: of a search for the whole front, from the designs that it kept.
     """
 
     folder: Path
@@ -35,18 +37,52 @@ class Run:
     seed: int
     config: RunConfig
     summary: Mapping[str, Any]
+    reference_point: tuple[float, ...]
 
     @cached_property
     def curve(self) -> Array:
-        """(I,) the hypervolume over the counted trials, without what was refined afterwards."""
+        """(I,) the hypervolume over the counted trials, without what was refined afterwards.
+
+        Empty for a search for the whole front.
+        """
         if isinstance(self.config.method, FrontMethod):
             return np.zeros(0)
-        return np.array(self.summary["hypervolume"]["history"])[: self.config.method.n_total]
+        whole = np.array(self.summary["hypervolume"]["history"]) if self._as_it_ran else self.history().hypervolume
+        return whole[: self.config.method.n_total]
 
-    @property
+    @cached_property
     def final(self) -> float:
         """The hypervolume at the end."""
-        return float(self.curve[-1]) if len(self.curve) else float(self.summary["hypervolume"]["final"])
+        if len(self.curve):
+            return float(self.curve[-1])
+        if self._as_it_ran:
+            return float(self.summary["hypervolume"]["final"])
+        return hypervolume(self.history().values, self.reference_point)
+
+    @cached_property
+    def gained(self) -> Mapping[str, float]:
+        """The share of the final hypervolume by which each source's trials enlarged it when they came."""
+        if self._as_it_ran:
+            gained = {source: credit["hypervolume_gained"] or 0.0 for source, credit in self.summary["credit"].items()}
+        else:
+            credits = credit_by_source(self.history())
+            gained = {source: credit.hypervolume_gained or 0.0 for source, credit in credits.items()}
+        whole = sum(gained.values())
+        return {source: share / whole for source, share in gained.items()} if whole else dict.fromkeys(gained, 0.0)
+
+    def history(self) -> History:
+        """Its trials, read from its folder."""
+        _, history = read_run(self.folder)
+        task = history.problem.task.model_copy(update={"reference_point": self.reference_point})
+        return replace(history, problem=replace(history.problem, task=task))
+
+    def within(self, reference_point: tuple[float, ...]) -> "Run":
+        """The same run, its hypervolume within another box."""
+        return replace(self, reference_point=reference_point)
+
+    @property
+    def _as_it_ran(self) -> bool:
+        return self.reference_point == self.config.reference_point
 
     @property
     def proposer(self) -> Mapping[str, Any]:
@@ -93,6 +129,20 @@ class Contrast:
 
 
 @dataclass(frozen=True)
+class Overall:
+    """A method beside the baseline over all tasks that both ran, each task counting once.
+
+    ratio: of its mean E_hv to the baseline's, averaged over the tasks. test: of the logarithms of these ratios, task by
+        task (Demsar, JMLR 7:1, 2006). p_holm: corrected for the number of methods.
+    """
+
+    method: str
+    ratio: Interval
+    test: PairedTest
+    p_holm: float
+
+
+@dataclass(frozen=True)
 class TimeTo:
     """After how many counted trials a share of the best known hypervolume was there.
 
@@ -113,22 +163,35 @@ class Comparison:
 
     methods, tasks: in the order in which they are shown. baseline: what the other methods are compared with.
     left_out: runs that are flagged, which stand for nothing.
+    widened: the tasks whose runs had reference points of their own; the largest values of these count for all.
     """
 
     def __init__(self, runs: Iterable[Run], methods: Sequence[str], tasks: Sequence[str], baseline: str) -> None:
         runs = list(runs)
+        points: dict[str, tuple[float, ...]] = {}
+        for task in tasks:
+            same = [run for run in runs if run.task == task]
+            if same:
+                _check_same_problem(task, same)
+                points[task] = tuple(np.max([run.reference_point for run in same], axis=0).tolist())
+        self.widened = [
+            task for task in points if any(r.reference_point != points[r.task] for r in runs if r.task == task)
+        ]
+        runs = [run.within(points[run.task]) for run in runs]
         self.left_out = [run for run in runs if run.is_flagged]
         self.runs = [run for run in runs if not run.is_flagged]
         self.methods = [method for method in methods if any(run.method == method for run in self.runs)]
         self.tasks = [task for task in tasks if any(run.task == task for run in self.runs)]
         self.baseline = baseline
-        for task in self.tasks:
-            _check_same_problem(task, [run for run in self.runs if run.task == task])
 
     def of(self, method: str, task: str) -> list[Run]:
         """The runs of a method on a task, by seed."""
         found = [run for run in self.runs if (run.method, run.task) == (method, task)]
         return sorted(found, key=lambda run: run.seed)
+
+    def marked(self, method: str) -> str:
+        """A method's name; with a mark where what answered was no model, but a stand-in."""
+        return f"{method} [scripted]" if any(run.is_scripted for run in self.runs if run.method == method) else method
 
     def curves(self, method: str, task: str) -> Array:
         """(S, I) their hypervolumes over the counted trials; (0, 0) where there are none."""
@@ -137,9 +200,7 @@ class Comparison:
 
     def reference_point(self, task: str) -> tuple[float, ...]:
         """Of all runs on a task."""
-        found = next(run for run in self.runs if run.task == task).config.reference_point
-        assert found is not None, "a finished run has one"
-        return found
+        return next(run for run in self.runs if run.task == task).reference_point
 
     def best_known(self, task: str) -> float | None:
         """The best known hypervolume of a task, within the runs' reference point."""
@@ -165,6 +226,23 @@ class Comparison:
                     found.append((method, task, test))
         corrected = holm([test.p for _, _, test in found])
         return [Contrast(*contrast, float(p)) for contrast, p in zip(found, corrected, strict=True)]
+
+    @cached_property
+    def overall(self) -> list[Overall]:
+        """Every other method beside the baseline over the tasks; none where fewer than six tasks could say anything."""
+        e_hv = {(row.method, row.task): row.e_hv.mean for row in self.rows if row.e_hv is not None}
+        found: list[tuple[str, Interval, PairedTest]] = []
+        for method in self.methods:
+            pairs = [
+                (e_hv[method, task], e_hv[self.baseline, task])
+                for task in self.tasks
+                if method != self.baseline and {(method, task), (self.baseline, task)} <= e_hv.keys()
+            ]
+            ours, theirs = np.array([pair for pair in pairs if min(pair) > 0.0]).reshape(-1, 2).T
+            if can_reject(len(ours)):
+                found.append((method, interval(ours / theirs), paired_test(np.log(ours), np.log(theirs))))
+        corrected = holm([test.p for *_, test in found])
+        return [Overall(*over, float(p)) for over, p in zip(found, corrected, strict=True)]
 
     @property
     def is_undecidable(self) -> bool:
@@ -220,7 +298,8 @@ def read_run_record(folder: Path, method: str | None = None) -> Run:
     config, summary = read_config(folder), read_summary(folder)
     if summary is None:
         raise RunFolderError(f"{folder} is not finished; give the command that began it once more")
-    return Run(folder, method or method_words(config), config.task.name, config.seed, config, summary)
+    words = method or method_words(config)
+    return Run(folder, words, config.task.name, config.seed, config, summary, config.reference_point or ())
 
 
 def method_words(config: RunConfig) -> str:
@@ -284,7 +363,23 @@ def _listed(folder: Path) -> dict[str, Any]:
     return listed | {"trials": n, "state": f"unfinished, {n}{planned} trials"}
 
 
-def compare(runs: Sequence[Run], baseline: str | None = None) -> Comparison:
+def compare_runs(*places: str | Path, baseline: str | None = None) -> Comparison:
+    """The finished runs among these folders and below them, side by side, named after how they searched.
+
+    baseline: the method that the others are compared with; without it, that of the first run.
+    """
+    finished, _ = finished_runs(places)
+    return side_by_side(finished, baseline)
+
+
+def finished_runs(places: Iterable[str | Path]) -> tuple[list[Run], list[Path]]:
+    """The finished runs among these folders and below them, and the folders of those that are not finished."""
+    folders = list(dict.fromkeys(find_runs(map(Path, places))))
+    finished = [folder for folder in folders if read_summary(folder) is not None]
+    return [read_run_record(folder) for folder in finished], [folder for folder in folders if folder not in finished]
+
+
+def side_by_side(runs: Sequence[Run], baseline: str | None = None) -> Comparison:
     """Runs side by side, in the order given; the first method is the baseline, where none is named."""
     if not runs:
         raise SettingsError("there is no finished run to compare")
@@ -306,17 +401,12 @@ def _check_same_problem(task: str, runs: Sequence[Run]) -> None:
     """SettingsError where runs under one task's name cannot be compared."""
     first = runs[0]
     for run in runs[1:]:
-        for what in ("targets", "space", "tolerance", "objectives", "reference_point"):
+        for what in ("targets", "space", "tolerance", "objectives"):
             ours, theirs = (getattr(r.config.task if what == "targets" else r.config, what) for r in (first, run))
             if what == "space":
                 ours, theirs = (space.model_copy(update={"name": ""}) for space in (ours, theirs))
             if ours != theirs:
-                raise SettingsError(
-                    f"{first.folder} and {run.folder} cannot be compared on {task}: {what} differ. "
-                    "A reference point in the task file keeps it the same for all"
-                    if what == "reference_point"
-                    else f"{first.folder} and {run.folder} cannot be compared on {task}: {what} differ"
-                )
+                raise SettingsError(f"{first.folder} and {run.folder} cannot be compared on {task}: {what} differ")
     lengths = {len(run.curve) for run in runs if len(run.curve)}
     if len(lengths) > 1:
         raise SettingsError(

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column, Table
 from rich.text import Text
 
+from armwright.baselines import Baseline, baselines, baselines_of
 from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
@@ -207,23 +208,40 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     """A line for every task."""
+    methods = list(dict.fromkeys(baseline.method for baseline in baselines()))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("task", no_wrap=True)
-    table.add_column("targets", justify="right")
+    for head in ("targets", *methods):
+        table.add_column(head, justify="right")
     table.add_column("")
     for task in tasks:
-        table.add_row(task.name, str(len(task.targets)), Text(task.description))
+        shares = {baseline.method: f"{100 * baseline.share:.0f} %" for baseline in baselines_of(task.name)}
+        shown = (shares.get(method, "") for method in methods)
+        table.add_row(task.name, str(len(task.targets)), *shown, Text(task.description))
     console.print(table)
-    console.print("\narmwright tasks NAME tells all of one task; random-N is one of a seeded family.")
+    console.print(
+        f"\n{' and '.join(methods)}: share of the best known hypervolume after 200 counted trials (mean of "
+        f"{baselines()[0].runs} runs).\narmwright tasks NAME tells all of one task; random-N is one of a seeded family."
+    )
 
 
-def show_task(console: Console, task: DesignTask) -> None:
-    """All of one task: its points, and where they come from."""
+def show_task(console: Console, task: DesignTask, known: float | None, stored: Sequence[Baseline]) -> None:
+    """All of one task: its points, where they come from, and what it can be compared with.
+
+    known: its best known hypervolume. stored: its baselines.
+    """
     reference = "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
     console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
     console.print(f"  reference point: {reference}")
     console.print(f"  provenance: {task.provenance}")
+    if known is not None:
+        console.print(f"  best known hypervolume: {known:.2f}")
+    for baseline in stored:
+        console.print(
+            f"  {baseline.method}, {baseline.runs} runs of 200 counted trials: E_hv {baseline.e_hv:.2f} (σ_hv "
+            f"{baseline.sigma_hv:.2f}), at the end {baseline.final:.2f}, {baseline.share:.1%} of the best known"
+        )
 
 
 def stdout_console() -> Console:

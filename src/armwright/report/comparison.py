@@ -22,11 +22,12 @@ from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.figures import axis_label, draw_arm, draw_samples, frame
 from armwright.report.style import FRONT, MISSED, TARGET, line, look
 from armwright.results import FIGURES
-from armwright.run_folder import RunConfig, read_run
+from armwright.run_folder import RunConfig
 
 MOST_SHOWN = 12  # tasks in a figure of targets
 COLUMNS = 3  # of panels
 MARKERS = 5  # on a curve
+LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # [inch]
 STEPS = ("reasoning", "answer", "parameters")  # where a model's reasons stand, the best place first
 LONGEST_REASONING = 5_200  # characters; its beginning and its end are shown
 LINE_LENGTH = 104  # characters
@@ -80,7 +81,7 @@ def _closer(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[st
         runs = [run for run in comparison.of(shown, task) if len(run.curve)]
         if not runs:
             continue
-        _, history = read_run(runs[0].folder)
+        history = runs[0].history()
         if len(history.problem.objectives) > 1:
             yield f"samples-{task}", draw_samples(history)
         solutions = solution_numbers(history.values, comparison.reference_point(task))
@@ -110,6 +111,8 @@ def draw_targets(comparison: Comparison) -> Figure:
             axes.plot([x, x], [y, y], [floor, z], color="#BBBBBB", linewidth=0.6)
         frame(axes, ((low + high) / 2, half))
         axes.set_title(f"{task}: {len(points)} targets", y=1.0)
+    if len(shown) < len(comparison.tasks):
+        figure.suptitle(f"{len(shown)} of {len(comparison.tasks)} tasks", fontsize=10)
     return figure
 
 
@@ -121,8 +124,8 @@ def draw_area(comparison: Comparison) -> Figure:
         for r in comparison.runs
         if r.method == method and len(r.curve)
     )
-    config, history = read_run(run.folder)
-    reference = comparison.reference_point(run.task)
+    config, history = run.config, run.history()
+    reference = run.reference_point
     values = history.values[: config.study.n_trials, :2]
     figure, axes = one_panel(4.4, 3.8)
     inside = values[[n for n in front_numbers(values) if np.all(values[n] < reference[:2])]]
@@ -178,6 +181,7 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
             axes.axhline(known, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)))
         axes.set_title(task)
         axes.set_xlabel("Iteration")
+        axes.margins(y=0.08)
         axes.set_ylim(bottom=0)
         axes.set_xlim(left=0)
     for axes in panels[:: _columns(comparison.tasks)]:
@@ -185,10 +189,11 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
     handles = [_handle(comparison, method) for method in methods]
     if any(comparison.best_known(task) is not None for task in comparison.tasks):
         handles.append(Line2D([], [], color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label="best known"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)))
+    _legend(figure, handles)
     seeds = {len(comparison.of(method, task)) for method in methods for task in comparison.tasks} - {0}
     runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
-    figure.suptitle(f"{title + ': ' if title else ''}mean and standard deviation of {runs} runs", fontsize=10)
+    words = f"mean and standard deviation of {runs} runs"
+    figure.suptitle(f"{title}: {words}" if title else words.capitalize(), fontsize=10)
     return figure
 
 
@@ -221,7 +226,7 @@ def draw_attainment(comparison: Comparison, task: str) -> Figure:
     axes.set_ylim(0, 1.1 * reference[1])
     _name_axes(axes, next(run for run in comparison.runs if run.task == task).config)
     axes.set_title(f"{task}: attained by half of the runs (lines), by one and by all (areas)")
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(3, max(1, len(handles))))
+    _legend(figure, handles)
     return figure
 
 
@@ -246,9 +251,7 @@ def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     panels[0].set_ylabel("Runs that are there")
-    figure.legend(
-        handles=[_handle(comparison, method, marked=False) for method in methods], loc="outside lower center", ncols=4
-    )
+    _legend(figure, [_handle(comparison, method, marked=False) for method in methods])
     return figure
 
 
@@ -278,8 +281,8 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
             )
             left += share
             sources[source] = None
-    axes.set_yticks(range(len(pairs)), [f"{task}, {method}" for task, method in pairs])
-    axes.invert_yaxis()
+    axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.marked(method)}" for task, method in pairs])
+    axes.set_ylim(len(pairs) - 0.4, -0.6)
     axes.set_xlim(0, 1)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0))
     axes.set_xlabel("Share of the final hypervolume, by who enlarged it")
@@ -287,17 +290,15 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
     patches = [
         Patch(facecolor=look(s).colour, hatch=look(s).hatch, edgecolor="white", label=look(s).label) for s in sources
     ]
-    figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
+    _legend(figure, patches)
     return figure
 
 
 def _gained_shares(runs: Sequence[Run]) -> Mapping[str, float]:
     gained: dict[str, list[float]] = {RANDOM: [], BBO: []}
     for run in runs:
-        credit = run.summary["credit"]
-        whole = sum(c["hypervolume_gained"] or 0.0 for c in credit.values()) or 1.0
-        for source, found in credit.items():
-            gained.setdefault(source, []).append((found["hypervolume_gained"] or 0.0) / whole)
+        for source, share in run.gained.items():
+            gained.setdefault(source, []).append(share)
     return {source: sum(shares) / len(runs) for source, shares in gained.items() if shares}
 
 
@@ -362,8 +363,8 @@ def _name_axes(axes: Any, config: RunConfig) -> None:
 
 def _front(run: Run) -> np.ndarray:
     """(K, 2) the front of a run, in the first two objectives."""
-    _, history = read_run(run.folder)
-    return history.values[front_numbers(history.values)][:, :2]
+    values = run.history().values
+    return values[front_numbers(values)][:, :2]
 
 
 def _stairs(surface: np.ndarray, reference: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
@@ -401,9 +402,22 @@ def _panels(tasks: Sequence[str], height: float) -> tuple[Figure, Sequence[Any]]
 
 def _handle(comparison: Comparison, method: str, marked: bool = True) -> Line2D:
     style = line(comparison.methods.index(method))
-    scripted = any(run.is_scripted for run in comparison.runs if run.method == method)
-    label = f"{method} [scripted]" if scripted else method
     marker = style.marker if marked else None
     return Line2D(
-        [], [], color=style.colour, linestyle=style.pattern, linewidth=1.5, marker=marker, markersize=4, label=label
+        [],
+        [],
+        color=style.colour,
+        linestyle=style.pattern,
+        linewidth=1.5,
+        marker=marker,
+        markersize=4,
+        label=comparison.marked(method),
     )
+
+
+def _legend(figure: Figure, handles: Sequence[Any]) -> None:
+    """Below the panels, in as many columns as there is room for."""
+    if handles:
+        widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
+        columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
+        figure.legend(handles=handles, loc="outside lower center", ncols=columns)

@@ -21,9 +21,9 @@ _LOOKS = {
     "polish": Look("polish", "#009E73", "D", 28, "...."),
     "front": Look("front search", "#0072B2", "o", 14),
     "rules": Look("rules", "#D55E00", "^", 44, "////"),
-    "llm": Look("language model", "#D55E00", "^", 44, "////"),
-    "scripted": Look("scripted stand-in", "#D55E00", "v", 44, "////"),
-    "manual": Look("people", "#D55E00", "s", 36, "////"),
+    "llm": Look("language model", "#CC79A7", "^", 44, "\\\\\\\\"),
+    "scripted": Look("scripted stand-in", "#CC79A7", "v", 44, "\\\\\\\\"),
+    "manual": Look("people", "#E69F00", "s", 36, "xxxx"),
 }
 FRONT = "#111111"
 MISSED = "#CC0000"

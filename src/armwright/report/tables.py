@@ -35,6 +35,7 @@ def write_tables(
         "table.csv": as_csv(_row_records(comparison, published)),
         "table.tex": latex(comparison, published, published_in),
         "contrasts.csv": as_csv(_contrast_records(comparison)),
+        "overall.csv": as_csv(_overall_records(comparison)),
         "time-to.csv": as_csv(_time_records(comparison)),
         "proposers.csv": as_csv(_proposer_records(comparison)),
         "runs.csv": as_csv(_run_records(comparison)),
@@ -60,7 +61,8 @@ def markdown(
 ) -> str:
     """All of it in words and tables."""
     parts = [f"# {title}", *_summary_part(comparison, published or {}, published_in), _final_part(comparison)]
-    parts += [_contrast_part(comparison), _time_part(comparison), _proposer_part(comparison)]
+    parts += [_overall_part(comparison), _contrast_part(comparison)]
+    parts += [_time_part(comparison), _proposer_part(comparison)]
     said = [*_marks(comparison), *notes]
     if said:
         parts.append("## Notes\n\n" + "\n".join(f"- {note}" for note in said))
@@ -88,14 +90,14 @@ def _summary_part(comparison: Comparison, published: Published, published_in: st
     if len(comparison.tasks) <= WIDE:
         head = ["method", *comparison.tasks]
         for method in methods:
-            lines.append([_marked(comparison, method), *(cell(method, task) for task in comparison.tasks)])
+            lines.append([comparison.marked(method), *(cell(method, task) for task in comparison.tasks)])
             theirs = [published.get((method, task)) for task in comparison.tasks]
             if any(theirs):
                 lines.append(
                     [f"{method}, published", *("–" if t is None else f"{t[0]:.2f} ({t[1]:.2f})" for t in theirs)]
                 )
     else:
-        head = ["task", *(_marked(comparison, method) for method in methods)]
+        head = ["task", *(comparison.marked(method) for method in methods)]
         lines = [[task, *(cell(method, task) for method in methods)] for task in comparison.tasks]
     source = f" Published: {published_in}." if published_in and published else ""
     return [f"## Hypervolume over the trials\n\n{words}{source}", _table(head, lines)]
@@ -107,7 +109,7 @@ def _final_part(comparison: Comparison) -> str:
     lines = [
         [
             row.task,
-            _marked(comparison, row.method),
+            comparison.marked(row.method),
             str(row.runs),
             _interval(row.final),
             "–" if row.share is None else _interval(row.share, scale=100.0, unit=" %", decimals=1),
@@ -124,6 +126,29 @@ def _final_part(comparison: Comparison) -> str:
     return f"## At the end\n\n{words}\n\n{_table(head, lines, right=(2, 5))}"
 
 
+def _overall_part(comparison: Comparison) -> str:
+    """All tasks together, where there are enough."""
+    if not comparison.overall:
+        return ""
+    words = (
+        f"E_hv of each method as a ratio to that of {comparison.baseline}, each task counting once: mean with its 95 % "
+        "bootstrap interval over the tasks; two-sided Wilcoxon signed-rank test of the logarithms over the tasks, "
+        "corrected for the number of methods (Holm)."
+    )
+    lines = [
+        [
+            comparison.marked(over.method),
+            _interval(over.ratio, decimals=3),
+            f"{over.test.better} of {over.test.n}",
+            f"{over.test.effect:+.2f}",
+            _p(over.test.p),
+            _p(over.p_holm),
+        ]
+        for over in comparison.overall
+    ]
+    return f"## Over all tasks\n\n{words}\n\n{_table(['method', 'ratio', 'better', 'effect', 'p', 'p (Holm)'], lines)}"
+
+
 def _contrast_part(comparison: Comparison) -> str:
     """Tests against the baseline."""
     if not comparison.contrasts:
@@ -137,7 +162,7 @@ def _contrast_part(comparison: Comparison) -> str:
     lines = [
         [
             contrast.task,
-            _marked(comparison, contrast.method),
+            comparison.marked(contrast.method),
             _interval(contrast.test.difference, sign=True),
             f"{contrast.test.better} of {contrast.test.n}",
             f"{contrast.test.effect:+.2f}",
@@ -177,7 +202,7 @@ def _time_part(comparison: Comparison) -> str:
         return f"{median} ({time.reached} of {time.runs})"
 
     lines = [
-        [task, _marked(comparison, method), *(cell(task, method, level) for level in levels)] for task, method in places
+        [task, comparison.marked(method), *(cell(task, method, level) for level in levels)] for task, method in places
     ]
     head = ["task", "method", *(f"{level:.0%}" for level in levels)]
     return f"## Trials to a hypervolume\n\n{words}\n\n{_table(head, lines)}"
@@ -191,13 +216,14 @@ def _proposer_part(comparison: Comparison) -> str:
     words = (
         "Means over the runs. Gained: the share of the final hypervolume by which the proposer's designs enlarged it "
         "when they came. Round: designs all of whose lengths are multiples of 5 cm; in plane: bases on a plane of "
-        "symmetry of the targets; repeats: designs within 1 cm of an earlier one (in brackets: the black box's)."
+        "symmetry of the targets; repeats: designs with the joints of an earlier one and no number more than 1 mm from "
+        "its (in brackets: the black box's)."
     )
     head = ["task", "method", "proposals", "on the front", "gained", "round", "in plane", "repeats", "calls", "USD"]
     lines = [
         [
             record["task"],
-            _marked(comparison, record["method"]),
+            comparison.marked(record["method"]),
             _number(record["proposals"], 0),
             _share(record["front_share"]),
             _share(record["gained_share"]),
@@ -239,7 +265,7 @@ def latex(comparison: Comparison, published: Published | None = None, published_
     for method in comparison.methods:
         if not any((method, task) in ours for task in tasks):
             continue
-        lines.append(f"{_tex(_marked(comparison, method))} & {' & '.join(numbers(method, t) for t in tasks)} " + r"\\")
+        lines.append(f"{_tex(comparison.marked(method))} & {' & '.join(numbers(method, t) for t in tasks)} " + r"\\")
         theirs = [published.get((method, task)) for task in tasks]
         if any(theirs):
             cells = " & ".join("-- & --" if t is None else f"{t[0]:.2f} & {t[1]:.2f}" for t in theirs)
@@ -260,14 +286,14 @@ def _best(comparison: Comparison) -> dict[str, str]:
     return best
 
 
-def _marked(comparison: Comparison, method: str) -> str:
-    """A method's name; with a mark where what answered was no model."""
-    return f"{method} [scripted]" if any(run.is_scripted for run in comparison.runs if run.method == method) else method
-
-
 def _marks(comparison: Comparison) -> list[str]:
     """What must be said of the runs in the tables."""
     notes = [f"{run.method} on {run.task}, seed {run.seed}: {_flag(run)}" for run in comparison.left_out]
+    notes += [
+        f"{task}: its runs had reference points of their own; the largest values of these, "
+        f"({', '.join(f'{value:.4g}' for value in comparison.reference_point(task))}), count for all"
+        for task in comparison.widened
+    ]
     if any(run.is_scripted for run in comparison.runs):
         notes.append("[scripted]: no language model answered, but a stand-in; these rows say nothing about models")
     models: dict[str, set[str]] = {}
@@ -318,6 +344,20 @@ def _contrast_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
         }
 
 
+def _overall_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
+    for over in comparison.overall:
+        yield {
+            "method": over.method,
+            "baseline": comparison.baseline,
+            "tasks": over.test.n,
+            **_flat("ratio", over.ratio),
+            "better": over.test.better,
+            "effect": over.test.effect,
+            "p": over.test.p,
+            "p_holm": over.p_holm,
+        }
+
+
 def _time_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
     for time in comparison.times:
         yield {
@@ -346,12 +386,11 @@ def _proposer_means(runs: Sequence[Run]) -> dict[str, Any]:
     each: list[dict[str, Any]] = []
     for run in runs:
         summary, name = run.summary, run.proposer["name"]
-        credit = summary["credit"].get(name, {"trials": 0, "front": 0, "hypervolume_gained": 0.0})
-        whole = sum(c["hypervolume_gained"] or 0.0 for c in summary["credit"].values())
+        credit = summary["credit"].get(name, {"trials": 0, "front": 0})
         found: dict[str, Any] = {
             "proposals": credit["trials"],
             "front_share": credit["front"] / max(1, summary["front_size"]),
-            "gained_share": (credit["hypervolume_gained"] or 0.0) / whole if whole else None,
+            "gained_share": run.gained.get(name, 0.0),
             "calls": run.proposer["calls"],
             "failures": sum(run.proposer["failures"].values()),
             "tokens": run.proposer["tokens"],
@@ -365,15 +404,16 @@ def _proposer_means(runs: Sequence[Run]) -> dict[str, Any]:
 
 
 def _run_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
+    best = {task: comparison.best_known(task) for task in comparison.tasks}
     for run in [*comparison.runs, *comparison.left_out]:
-        known = run.summary["best_known"]
+        known = best.get(run.task)
         yield {
             "task": run.task,
             "method": run.method,
             "seed": run.seed,
             "e_hv": float(run.curve.mean()) if len(run.curve) else None,
             "final": run.final,
-            "share_of_best_known": None if known is None else known["share"],
+            "share_of_best_known": run.final / known if known else None,
             "flagged": run.is_flagged,
             "origin": run.proposer.get("origin"),
             "folder": str(run.folder),

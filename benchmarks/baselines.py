@@ -1,0 +1,80 @@
+"""The stored baselines of the built-in tasks (src/armwright/baselines.csv), and their page (docs/suite.md).
+
+armwright experiment suite --no-figures      # 31 tasks x 2 methods x 5 seeds: some 20 minutes on two idle cores
+python benchmarks/baselines.py experiments/suite
+"""
+
+import csv
+import platform
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import armwright
+from armwright.baselines import BASELINES, baselines, baselines_of
+from armwright.best_known import best_known_hypervolume
+from armwright.results import as_csv
+from armwright.task import builtin_tasks
+
+PACKAGE = Path(armwright.__file__).parent
+PAGE = PACKAGE.parents[1] / "docs" / "suite.md"
+LIBRARIES = ("armwright", "optuna", "warp-lang", "numpy")
+NUMBERS = {"e_hv": "e_hv", "sigma_hv": "sigma_hv", "final": "final", "share": "share_of_best_known"}
+
+
+def main(folder: Path) -> None:
+    rows = list(csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines()))
+    missing = set(builtin_tasks()) - {row["task"] for row in rows}
+    if missing:
+        sys.exit(f"{folder} holds no finished runs of {', '.join(sorted(missing))}")
+    records = [
+        {"task": row["task"], "method": row["method"], "runs": row["runs"]}
+        | {ours: f"{float(row[theirs]):.6f}" for ours, theirs in NUMBERS.items()}
+        for row in rows
+    ]
+    made = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
+    head = f"# armwright experiment suite, with {made} on Python {platform.python_version()}; benchmarks/baselines.py\n"
+    (PACKAGE / BASELINES).write_text(head + as_csv(records), encoding="utf-8")
+    baselines.cache_clear()
+    PAGE.write_text(page(), encoding="utf-8")
+
+
+def page() -> str:
+    """docs/suite.md."""
+    runs = baselines()[0].runs
+    methods = list(dict.fromkeys(baseline.method for baseline in baselines()))
+    head = ["task", "targets", "what for", "best known", *(f"{m}: E_hv (σ_hv)" for m in methods)]
+    head += [f"{m}: at the end" for m in methods]
+    lines = [f"| {' | '.join(head)} |", "|---|--:|---|" + "--:|" * (1 + 2 * len(methods))]
+    for name, task in builtin_tasks().items():
+        by_method = {baseline.method: baseline for baseline in baselines_of(name)}
+        cells = [f"`{name}`", str(len(task.targets)), task.description]
+        cells += [f"{best_known_hypervolume(task):.2f}"]
+        cells += [f"{by_method[m].e_hv:.2f} ({by_method[m].sigma_hv:.2f})" for m in methods]
+        cells += [f"{by_method[m].share:.1%}" for m in methods]
+        lines.append(f"| {' | '.join(cells)} |")
+    return f"""\
+# The benchmark suite
+
+{len(builtin_tasks())} tasks, each with its points, a reference point, the best known front and baselines.
+`armwright tasks NAME` tells all of one task, its points and where they come from included; `random-N` is one of a
+seeded family.
+
+Hypervolume within the task's reference point, {runs} runs (seeds 0 to {runs - 1}) of 10 random and 200 counted trials
+in the paper's design space. At the end: the mean share of the best known hypervolume. `armwright front` comes to 97 to
+100 % of it ([benchmarks](benchmarks.md)). This page and the stored numbers are made by
+
+    armwright experiment suite
+    python benchmarks/baselines.py experiments/suite
+
+To place a method of your own beside them, copy the experiment (`armwright experiment suite --print > mine.yaml`), add
+the method and run it ([experiments](experiments.md)).
+
+{chr(10).join(lines)}
+"""
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(Path(sys.argv[1]))
