@@ -37,7 +37,7 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 	@touch $@
 
 .venv/.run: .venv/.python pyproject.toml constraints.txt
-	$(PIP) --editable '.[llm]'
+	$(PIP) --editable '.[live,llm]'
 	@touch $@
 
 .venv/.test: .venv/.run
@@ -49,7 +49,7 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 	@touch $@
 
 .venv/.gp: .venv/.run
-	$(PIP) --editable '.[gp,llm]'
+	$(PIP) --editable '.[gp,live,llm]'
 	@touch $@
 
 clean:

@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
+from tests import browser as browsers
 from tests.chat_server import ChatServer
 from tests.postgres import PostgresServer, binaries
 
@@ -35,6 +37,16 @@ def postgres() -> Iterator[PostgresServer]:
     yield server
     server.stop()
     server.remove()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """A real browser."""
+    program = browsers.program()
+    if program is None:
+        pytest.skip("chromium is not installed (on Debian: sudo apt install chromium)")
+    with browsers.browser(program) as started:
+        yield started
 
 
 @pytest.fixture

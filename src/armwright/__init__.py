@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from armwright.comparison import Comparison, compare_runs
     from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
+    from armwright.export.mjcf import to_mjcf
     from armwright.export.urdf import to_urdf
     from armwright.front import FrontRun, find_front
     from armwright.history import FinishedTrial, FrontMember, History
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from armwright.proposers.replay import ReplayProposer
     from armwright.proposers.rules import RulesProposer
     from armwright.report.figures import write_figures
+    from armwright.report.page import write_report
     from armwright.results import verify_run
     from armwright.run_folder import read_run
     from armwright.space import Design, DesignSpace, load_space, paper_space
@@ -79,10 +81,12 @@ _PLACES = {
     "polish_run": "polish",
     "random_task": "task",
     "read_run": "run_folder",
+    "to_mjcf": "export.mjcf",
     "to_urdf": "export.urdf",
     "uniform_link": "arm",
     "verify_run": "results",
     "write_figures": "report.figures",
+    "write_report": "report.page",
 }
 
 __all__ = [
@@ -126,10 +130,12 @@ __all__ = [
     "polish_run",
     "random_task",
     "read_run",
+    "to_mjcf",
     "to_urdf",
     "uniform_link",
     "verify_run",
     "write_figures",
+    "write_report",
 ]
 
 

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from armwright.exceptions import AnswerPendingError, ArmwrightError, FailureError, SettingsError, TaskError
+from armwright.exceptions import (
+    AnswerPendingError,
+    ArmwrightError,
+    FailureError,
+    SettingsError,
+    StoppedError,
+    TaskError,
+)
 
 if TYPE_CHECKING:
     from armwright.problem import Problem
@@ -70,7 +77,9 @@ Robust = Annotated[
     bool, typer.Option("--robust", help="Count a design by its worst case with the base or a link 1 mm off.")
 ]
 DeviceName = Annotated[str, typer.Option(help="Where arms are evaluated: auto, cpu or cuda.")]
-Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures of a finished run.")]
+Figures = Annotated[
+    bool, typer.Option("--figures/--no-figures", help="Make the page (report.html) and the figures of a finished run.")
+]
 BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")]
 
 
@@ -142,6 +151,9 @@ def optimize(
     ] = True,
     device: DeviceName = "auto",
     figures: Figures = True,
+    live: Annotated[
+        bool, typer.Option("--live", help="Serve the page of the run on 127.0.0.1 while it goes on (extra live).")
+    ] = False,
     n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.")] = 10,
     n_step: Annotated[int, typer.Option(help="Trials in a block; the first is the proposer's.")] = 10,
     n_total: Annotated[int, typer.Option(help="Counted trials.")] = 200,
@@ -165,6 +177,10 @@ def optimize(
     choice = choose_proposer(wishes)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     words.print(choice.reason)
+    if live:
+        from armwright.live import begin_server
+
+        words.print(f"live: {begin_server(folder)}")
     try:
         with view.watching(words) as watch:
             run = run_study(
@@ -184,9 +200,9 @@ def optimize(
             )
         finished_before = run.resumed == len(run.trials)
         if figures and not finished_before:
-            words.print("drawing the figures")
+            words.print("drawing the page and the figures")
         drawn = _figures(folder) if figures else []
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, StoppedError):
         kept = f"every finished trial is in {folder}/" if folder.exists() else "nothing was begun"
         words.print(f"\nstopped; {kept}. Go on with:\n  {_same_command()}")
         sys.exit(INTERRUPTED)
@@ -466,6 +482,35 @@ def runs(
 
 
 @app.command()
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
+) -> None:
+    """Write report.html into each RUN: one file that shows it in any browser, without a network."""
+    from armwright.report.page import write_report
+
+    for run in runs:
+        print(write_report(run))
+
+
+@app.command()
+def live(
+    run: Annotated[Path, typer.Argument(help="A run folder, of a run that goes on elsewhere or is over.")],
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; any other than this one opens it to a network.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on; 0: any that is free.")] = 0,
+    follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
+) -> None:
+    """Serve the page of RUN to browsers on this machine, live, until Ctrl-C."""
+    from armwright.live import serve
+    from armwright.run_folder import read_config
+
+    if not follow:
+        read_config(run)  # a folder that holds no run is said at once
+    serve(run, lambda address: print(address, flush=True), host, port, sys.stdin.buffer if follow else None)
+
+
+@app.command()
 def polish(
     run: Annotated[Path, typer.Argument(help="A finished run folder.")],
     evaluations: Annotated[int, typer.Option(help="Evaluations for each design of the front.")] = 1000,
@@ -490,9 +535,12 @@ def verify(
 ) -> None:
     """Compute RUN's Pareto designs again, exactly and a little off, and mark each solid or fragile."""
     from armwright import console as view
-    from armwright.results import verify_run
+    from armwright.report.page import write_report
+    from armwright.results import REPORT, verify_run
 
     history, summary = verify_run(run)
+    if (run / REPORT).is_file():
+        write_report(run)
     if json_:
         _print_json({"folder": str(run), **summary})
         return
@@ -586,11 +634,14 @@ def init(
 
 
 def _figures(folder: Path) -> list[Path]:
-    """The figures of a finished run, drawn where they are missing."""
+    """The figures of a finished run, and its page; drawn where they are missing."""
     from armwright.report.figures import write_figures
-    from armwright.results import FIGURES
+    from armwright.report.page import write_report
+    from armwright.results import FIGURES, REPORT
 
     there = sorted((folder / FIGURES).glob("*.png"))
+    if not (folder / REPORT).is_file():
+        write_report(folder)
     return there or write_figures(folder)
 
 

@@ -21,6 +21,7 @@ from armwright.front import FrontProgress, FrontRun
 from armwright.history import History
 from armwright.objectives import TORQUE_SCALE
 from armwright.polish import Polished
+from armwright.results import REPORT
 from armwright.study import Progress as StudyProgress
 from armwright.study import Run
 from armwright.task import Task as DesignTask
@@ -133,6 +134,7 @@ def _show_places(console: Console, folder: Path | None, figures: Sequence[Path])
     console.print(f"results: {folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
     if figures:
         console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+        console.print(f"page, for any browser: {folder / REPORT}")
 
 
 def show_plan(
@@ -437,7 +439,8 @@ def _live(console: Console) -> Generator[Watch]:
         def watch(progress: StudyProgress) -> None:
             if note := _note(progress):
                 console.print(note)
-            doing = f"asking {progress.source} …" if progress.doing == "proposing" else progress.source
+            asking = f"asking {progress.source} …"
+            doing = {"proposing": asking, "paused": "paused"}.get(progress.doing, progress.source)
             if progress.under_way:
                 doing += f"  {progress.under_way} asked"
             bar.update(

@@ -9,6 +9,7 @@
     │   ├── SettingsError       the settings of a run
     │   └── RunConflictError    the run folder holds a run with other settings
     ├── AnswerPendingError      a question waits for people (--proposer manual:DIR --once)   (exit code 0)
+    ├── StoppedError            a study ended because its watcher asked for it      (exit code 130, as after Ctrl-C)
     └── FailureError            something broke on the way                  (exit code 1)
         ├── RunFolderError      a run folder that cannot be written, or whose content is damaged
         ├── ModelError          a language model that cannot be used
@@ -114,6 +115,15 @@ class AnswerPendingError(ArmwrightError):
         self.question = question
         self.answer = answer
         self.refusal = refusal
+
+
+class StoppedError(ArmwrightError):
+    """A study ended because whoever watches it asked for that."""
+
+    exit_code = 130
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(f"stopped as asked; every finished trial is in {folder}/, and the same command goes on")
 
 
 class MissingExtraError(FailureError):

@@ -70,12 +70,13 @@ def preview_after(
     asker = Asker(proposer, config.seed)
     if number is not None:
         then = _then(run, config, history, proposer.asked(), number)
-        return _preview(proposer, history.problem, number, proposer.prompt_for(then, asker.seed(number)))
+        text = proposer.prompt_for(then, asker.seed(number), proposer.past_hints(number))
+        return _preview(proposer, history.problem, number, text)
     turns = asking_turns(asker, _schedule(config), lambda: history, config.study.in_flight)
     number, finished = turns.upcoming(len(history))
     # What is to be otherwise than in the run is to be seen, even where the run's own answer waits for its second call.
     if wishes:
-        text = proposer.prompt_for(history, asker.seed(number))
+        text = proposer.prompt_for(history, asker.seed(number), proposer.next_hints(number))
     else:
         text = proposer.question(history, asker.seed(number), number).prompt
     note = _note(finished - len(history), len(proposer.unused(history)))

@@ -31,6 +31,7 @@ from armwright.verification import Verification, verify_front
 SUMMARY = "summary.json"
 DESIGNS = "designs"
 FIGURES = "figures"  # drawn by report/figures.py
+REPORT = "report.html"  # made by report/page.py
 TABLES = ("trials.csv", "front.csv")
 MOST_FALLBACKS = 0.1  # of a proposer's turns, beyond which its run is flagged and kept out of its row in tables
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
@@ -75,9 +76,10 @@ def results_are_there(path: Path, history: History) -> bool:
 
 
 def discard_results(path: Path) -> None:
-    """Takes away what says that a run is finished: its summary and its figures."""
+    """Takes away what says that a run is finished: its summary, its page and its figures."""
     try:
         (path / SUMMARY).unlink(missing_ok=True)
+        (path / REPORT).unlink(missing_ok=True)
         if (path / FIGURES).exists():
             shutil.rmtree(path / FIGURES)
     except OSError as fault:

@@ -3,6 +3,7 @@
     config.yaml        everything needed to repeat the run
     trials.jsonl       one line a finished trial, written before the next begins: the truth
     transcripts.jsonl  every call to a language model (llm/transcript.py)
+    control.json, status.json  between a running study and whoever watches it (control.py)
     search.npz, proposals/  where a search for the whole front stands, and what it began with (front.py)
     trials.csv, front.csv, summary.json, designs/NNNN/ (results.py) and figures/ (report/figures.py)
 
@@ -24,9 +25,11 @@ import yaml
 from filelock import FileLock, Timeout
 from pydantic import BaseModel, Field, ValidationError
 
+from armwright.control import CHANNEL_FILES
 from armwright.documents import parse_document
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
+from armwright.files import replace_file
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.devices import Device, usable_device
 from armwright.objectives import PAPER_OBJECTIVES, Objective
@@ -38,7 +41,9 @@ CONFIG = "config.yaml"
 TRIALS = "trials.jsonl"
 PROPOSALS = "proposals"
 SEARCH = "search.npz"
-BEFORE_TRIALS = {".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", f"{SEARCH}.part", PROPOSALS}
+BEFORE_TRIALS = {
+    ".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
+}  # fmt: skip
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 
@@ -262,11 +267,9 @@ class RunFolder:
     def write_bytes(self, name: str, content: bytes) -> None:
         """The same for a file that is no text."""
         target = self.path / name
-        part = target.with_name(target.name + ".part")
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            part.write_bytes(content)
-            os.replace(part, target)
+            replace_file(target, content)
         except OSError as fault:
             raise _write_error(target, fault) from fault
 
@@ -350,9 +353,16 @@ def _read_trials(path: Path, space: DesignSpace, n_objectives: int) -> tuple[lis
         return [], 0
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
+    return _parse_trials(content, 0, path, space, n_objectives)
+
+
+def _parse_trials(
+    content: bytes, first: int, path: Path, space: DesignSpace, n_objectives: int
+) -> tuple[list[FinishedTrial], int]:
+    """The trials from number `first` on in a part of a file, and its length [bytes] without a cut last line."""
     end = content.rfind(b"\n") + 1
     trials: list[FinishedTrial] = []
-    for number, line in enumerate(content[:end].split(b"\n")[:-1]):
+    for number, line in enumerate(content[:end].split(b"\n")[:-1], start=first):
         try:
             trials.append(_parse_trial(line, number, space, n_objectives))
         except (ValueError, DesignError) as fault:
@@ -361,6 +371,38 @@ def _read_trials(path: Path, space: DesignSpace, n_objectives: int) -> tuple[lis
                 "all after it: the same command then goes on from there"
             ) from fault
     return trials, end
+
+
+class TrialsReader:
+    """Reads the finished trials of a run that may go on elsewhere; a line that was read is not read again."""
+
+    def __init__(self, folder: Path, config: RunConfig) -> None:
+        self._path = folder / TRIALS
+        self._config = config
+        self.trials: list[FinishedTrial] = []
+        self._at = 0  # [bytes] read
+        self._file = 0  # which file it was
+
+    def read_on(self) -> bool:
+        """Reads what has come; whether it is another file than before (the run was polished), read from its start."""
+        try:
+            with self._path.open("rb") as file:
+                there = os.fstat(file.fileno())
+                is_other = there.st_ino != self._file or there.st_size < self._at
+                file.seek(0 if is_other else self._at)
+                content = file.read()
+        except FileNotFoundError:
+            there, is_other, content = None, bool(self.trials), b""
+        except OSError as fault:
+            raise RunFolderError(f"cannot read {self._path}: {fault.strerror or fault}") from fault
+        if is_other:
+            self.trials, self._at = [], 0
+            self._file = 0 if there is None else there.st_ino
+        config = self._config
+        new, length = _parse_trials(content, len(self.trials), self._path, config.space, len(config.objectives))
+        self.trials = [*self.trials, *new]
+        self._at += length
+        return is_other
 
 
 def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int) -> FinishedTrial:

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from armwright.exceptions import ModelError, SettingsError
+from armwright.control import Channel
+from armwright.exceptions import ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, FinishedTrial, FrontMember, History
 from armwright.pareto import Array, FrontTracker, default_reference_point
 from armwright.problem import Problem
@@ -29,11 +30,12 @@ from armwright.verification import verify_front
 
 LARGEST = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
+PAUSE_SECONDS = 0.1  # between two looks at what is asked of a paused study
 
 
 @dataclass(frozen=True)
 class Progress:
-    """What a study does now: it begins, asks its proposer, or has finished a trial.
+    """What a study does now: it begins, asks its proposer, is paused by its watcher, or has finished a trial.
 
     iteration: counted trials finished (0 while the random ones run).
     under_way: questions that wait for their answers while trials go on.
@@ -41,7 +43,7 @@ class Progress:
     note: what the user should be told, once.
     """
 
-    doing: Literal["beginning", "proposing", "finished"]
+    doing: Literal["beginning", "proposing", "paused", "finished"]
     number: int
     iteration: int
     n_total: int
@@ -142,6 +144,7 @@ class Study:
         self.proposer = proposer
         self.folder = folder
         self.watch = watch
+        self._channel = Channel(None if folder is None else folder.path)
         overlap = self.method.in_flight is not None
         self._asker = None if proposer is None else Asker(proposer, config.seed, None if overlap else self._asking)
         self.black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives))
@@ -160,16 +163,43 @@ class Study:
     def run(self, on_model_failure: str = "stop", verify: bool = True) -> Run:
         """All trials that are still due, then the results."""
         resumed = len(self.trials)
-        if self.proposer is not None:
-            self.proposer.open(None if self.folder is None else self.folder.path)
+        try:
+            if self.proposer is not None:
+                self.proposer.open(None if self.folder is None else self.folder.path)
             if resumed < self.n_trials:
-                self._check(on_model_failure)
-        if resumed < self.n_trials:
-            self._begin()
-            with closing(self._turns()) as turns:
-                for number in range(resumed, self.n_trials):
-                    self._step(number, turns)
-        return self._finish(resumed, verify)
+                self._search(on_model_failure)
+            run = self._finish(resumed, verify)
+        except BaseException as end:
+            meant = isinstance(end, (KeyboardInterrupt, StoppedError))
+            self._channel.say("stopped", len(self.trials), None if meant else str(end) or type(end).__name__)
+            raise
+        self._channel.finish(len(self.trials))
+        return run
+
+    def _search(self, on_model_failure: str) -> None:
+        first = len(self.trials)
+        self._channel.begin(first)
+        if self.proposer is not None:
+            self._check(on_model_failure)
+        self._begin()
+        with closing(self._turns()) as turns:
+            for number in range(first, self.n_trials):
+                self._obey(number)
+                self._step(number, turns)
+
+    def _obey(self, number: int) -> None:
+        """Waits as long as the watcher wants the study paused; StoppedError where it is to end."""
+        asked = self._channel.asked()
+        if asked.paused and not asked.stop:
+            self._channel.say("paused", number)
+            self._report("paused", number, "", note="paused by its watcher, who can let it go on; Ctrl-C ends it")
+        while asked.paused and not asked.stop:
+            time.sleep(PAUSE_SECONDS)
+            asked = self._channel.asked()
+        if asked.stop:
+            assert self.folder is not None
+            raise StoppedError(self.folder.path)
+        self._channel.say("evaluating", number)
 
     def _check(self, on_model_failure: str) -> None:
         """Says what the proposals will take, and makes sure that they are to be had."""
@@ -181,6 +211,7 @@ class Study:
         forecast = self.proposer.forecast(self.problem, due)
         if forecast:
             self._report("beginning", len(self.trials), self.proposer.name, note=forecast)
+        self._channel.say("asking", len(self.trials))
         try:
             self.proposer.check()
         except ModelError as fault:
@@ -191,9 +222,11 @@ class Study:
                 self._asker.give_up(fault.final)
                 words = "no questions are asked in this session"
             self._report("beginning", len(self.trials), self.proposer.name, note=f"{fault}; {words}")
+            self._channel.say("evaluating", len(self.trials), str(fault))
 
     def _asking(self, number: int) -> None:
         assert self.proposer is not None
+        self._channel.say("asking", number)
         self._report("proposing", number, self.proposer.name, note=self.proposer.announce(number))
 
     @property
@@ -218,6 +251,7 @@ class Study:
     def _step(self, number: int, turns: Turns) -> None:
         started = time.perf_counter()
         turn = turns.next(number)
+        self._channel.say("evaluating", number, _fault_words(turn))
         proposed = time.perf_counter()
         refinement = self._refinement(number) if turn is None else None
         trial, design, source = self._ask(number, turn, refinement)
@@ -277,7 +311,7 @@ class Study:
 
     def _report(
         self,
-        doing: Literal["beginning", "proposing", "finished"],
+        doing: Literal["beginning", "proposing", "paused", "finished"],
         number: int,
         source: str,
         turns: Turns | None = None,
@@ -352,6 +386,13 @@ def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
         seed=whole("seed", seed, 0),
         versions=versions(),
     )
+
+
+def _fault_words(turn: Turn | None) -> str | None:
+    """Why a turn came to nothing; empty where it has a design, None where there is nothing new to say."""
+    if turn is None:
+        return None
+    return "" if turn.proposal is not None else turn.note or None
 
 
 def _finished(

@@ -15,6 +15,7 @@ from armwright.documents import parse_document, read_document
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.llm.configuration import configured_model
 from armwright.llm.prompt import PROMPTS
+from armwright.llm.transcript import TRANSCRIPTS
 from armwright.proposers.choice import PROPOSERS, Wishes
 from armwright.task import builtin_names, load_task
 
@@ -294,7 +295,7 @@ def _source_of_model(cell: Cell, replay: Path | None) -> tuple[Cell, str]:
         return cell, ""
     if replay is not None:
         recorded = replay.resolve() / RUNS / cell.method / cell.task_name / f"seed{cell.seed}"
-        if (recorded / "transcripts.jsonl").is_file():
+        if (recorded / TRANSCRIPTS).is_file():
             return replace(cell, replay=recorded), ""
         return cell, f"{replay} holds no record of it"
     if cell.plan.model is None:

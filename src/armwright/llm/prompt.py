@@ -13,6 +13,7 @@ import numpy as np
 from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 
 from armwright.arm import GRAVITY
+from armwright.control import LONGEST_HINT
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.history import History
 from armwright.kinematics.solve import UPDATES
@@ -59,6 +60,7 @@ VARIABLES = {
     "n_proposed": "how many proposals there were",
     "proposals": "how many designs to propose",
     "expected": "whether the expected objectives are asked for",
+    "hints": "notes of an engineer who watches the search, for this prompt alone, each on one line; as a rule none",
     "form": 'of the answer: "schema", "then-schema" (free text, a second call extracts it) or "text" (free text alone)',
 }
 
@@ -103,25 +105,33 @@ class Prompt:
         name: str = "llm",
         proposals: int = 1,
         form: Form = "then-schema",
+        hints: Sequence[str] = (),
     ) -> str:
         """The prompt for the next design after `history`; which designs it shows is drawn from `seed`.
 
         memory: "own" shows the earlier proposals of the proposer `name`, too.
         proposals: how many designs are asked for.
+        hints: what the template makes nothing of stands at the end.
 
-        At most about MOST_TOKENS long, unless a template's own words are longer: of more targets, designs and
-        proposals fewer are shown.
+        At most about MOST_TOKENS long, unless hints and a template's own words are longer: of more targets, designs
+        and proposals fewer are shown.
         """
         proposed = proposal_records(history, name) if memory == "own" else []
         feedback = Feedback(history, seed)
-        common = _common(history, memory, proposals, form) | {"n_proposed": len(proposed)}
+        common = _common(history, memory, proposals, form) | {"n_proposed": len(proposed), "hints": _lines(hints)}
         most = MOST_TARGETS, max(len(feedback.front), len(feedback.others)), MOST_PROPOSED
         while True:
-            text = self._render({**common, **_shown(history, feedback, proposed, *most)})
+            text = self._with_hints({**common, **_shown(history, feedback, proposed, *most)})
             fewer = _fewer(*most)
             if estimated_tokens(text) <= MOST_TOKENS or fewer == most:
                 return text
             most = fewer
+
+    def _with_hints(self, values: Mapping[str, Any]) -> str:
+        text = self._render(values)
+        if not values["hints"] or text != self._render({**values, "hints": []}):
+            return text
+        return text + "\n" + rendered("hints.md.j2", values)
 
     def _render(self, values: Mapping[str, Any]) -> str:
         sandbox = _sandbox()
@@ -235,6 +245,11 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "expected": memory == "own",
         "form": form,
     }
+
+
+def _lines(hints: Sequence[str]) -> list[str]:
+    """Each hint on one line; one in which nothing is to be seen is left out."""
+    return [line for hint in hints if (line := one_line(hint, LONGEST_HINT))]
 
 
 def _shown(

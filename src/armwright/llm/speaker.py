@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from armwright.control import Hint
 from armwright.exceptions import ProposalError
 
 # Turns an answer's JSON into the text that is kept of it; DesignError, in the design space's words, refuses it.
@@ -21,6 +22,7 @@ class Question:
     proposal: the id of the proposal it is for.  step: its part of the dialogue.
     known: how many finished trials it was made from.
     most_requests: how often the server may be asked, answers that are refused included; None for no bound.
+    hints: that stand in the prompt.
     """
 
     proposal: str
@@ -28,6 +30,7 @@ class Question:
     prompt: str
     known: int = 0
     most_requests: int | None = None
+    hints: tuple[Hint, ...] = ()
 
 
 CHECK = Question("", "check", "Answer with one word: ready")

@@ -3,13 +3,19 @@
 import json
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from armwright.control import Hint
 from armwright.exceptions import RunFolderError
+
+TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
+FIRST_STEPS = ("reasoning", "answer")  # the steps whose questions are made from the history, and go with hints
+READ = (None, "answer", "limit", "refused", "rejected", "context")  # how calls end whose question was read
 
 
 @dataclass(frozen=True)
@@ -23,6 +29,7 @@ class Call:
     origin: who answered: `model`, `manual` (people) or `scripted` (a stand-in, in tests and examples).
     requests: requests sent to the server; above 1 where an answer was refused and asked for again.
     fault, error: the fault's kind and words, where there was one; then the answer may be empty.
+    hints: of the engineer who watches the run, that stand in the prompt.
     """
 
     proposal: str
@@ -39,6 +46,7 @@ class Call:
     seconds: float
     fault: str | None = None
     error: str | None = None
+    hints: tuple[Hint, ...] = ()
 
 
 class Transcript:
@@ -65,7 +73,7 @@ class Transcript:
                 return
             try:
                 with open(self._path, "ab") as file:
-                    file.write((json.dumps(asdict(call)) + "\n").encode())
+                    file.write((json.dumps(_record(call)) + "\n").encode())
                     file.flush()
                     os.fsync(file.fileno())
             except OSError as fault:
@@ -75,6 +83,28 @@ class Transcript:
         """The call that answered this step of a proposal, if one did."""
         found = [c for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.fault is None]
         return found[-1] if found else None
+
+
+def used_hints(calls: Iterable[Call]) -> dict[Hint, str]:
+    """The hints that were used, and for which proposals.
+
+    A hint is used by the call that carried it to the model, whatever came back. Where nothing was read (no connection,
+    no answer in time, Ctrl-C), it goes with the next question.
+    """
+    return {hint: call.proposal for call in calls if call.fault in READ for hint in call.hints}
+
+
+def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
+    """The hints that the question for a proposal went with; where it was asked again, the last time."""
+    asked = (call for call in reversed(calls) if call.proposal == proposal and call.step in FIRST_STEPS)
+    return next((call.hints for call in asked), ())
+
+
+def _record(call: Call) -> dict[str, Any]:
+    record = asdict(call)
+    if not call.hints:
+        del record["hints"]
+    return record
 
 
 def _read(path: Path, mend: bool) -> Iterator[Call]:

@@ -6,17 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from armwright.control import Hint
 from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError, did_you_mean
 from armwright.history import History
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.llm.prompt import MEMORIES, Form, Prompt, load_prompt, parameters_prompt
 from armwright.llm.speaker import CHECK, Question, Reply, Speaker
-from armwright.llm.transcript import Transcript
+from armwright.llm.transcript import TRANSCRIPTS, Transcript, hints_of
 from armwright.problem import Problem
 from armwright.proposers.dialogue import Dialogue
+from armwright.proposers.hints import Hints
 from armwright.proposers.proposer import Proposal, Proposer
 
-TRANSCRIPTS = "transcripts.jsonl"
 ANSWERS: Mapping[str, Form] = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
 LAST_STEPS = ("parameters", "answer")  # the steps whose answers are designs
 MOST_PROPOSALS = 100  # a call
@@ -69,6 +70,7 @@ class AskingProposer(Dialogue, Proposer):
         self.per_call = asking.proposals
         self.prompt = prompt or load_prompt(asking.prompt)
         self._form: Form = ANSWERS[asking.answer]
+        self._hints = Hints(None)
 
     def settings(self) -> Mapping[str, Any]:
         """Prompt, memory and form of the answer; of a prompt of one's own the whole template."""
@@ -84,10 +86,12 @@ class AskingProposer(Dialogue, Proposer):
     def open(self, folder: Path | None) -> None:
         """Reads what was said before in this run."""
         self._begin(None if folder is None else folder / TRANSCRIPTS)
+        self._hints = Hints(folder)
 
     def look(self, folder: Path) -> None:
         """Reads what was said before in a run, and changes nothing there."""
         self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
+        self._hints = Hints(folder)
 
     def asked(self) -> Mapping[int, int]:
         """The trials that were asked for so far, and how many finished trials were known then."""
@@ -124,9 +128,14 @@ class AskingProposer(Dialogue, Proposer):
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """The next designs. An answer that was paid for in a run that was killed is used, not asked again."""
-        over = self._over
-        problem = history.problem
         question = self.question(history, seed, number)
+        try:
+            return self._answered(question, history.problem)
+        finally:
+            self._hints.give_back(question.hints)
+
+    def _answered(self, question: Question, problem: Problem) -> Sequence[Proposal]:
+        over = self._over
         try:
             if question.step == "reasoning":
                 said = self._call(question, self.speaker.ask, over)
@@ -140,19 +149,35 @@ class AskingProposer(Dialogue, Proposer):
 
     def question(self, history: History, seed: int, number: int) -> Question:
         """What is asked first for trial `number`; where free thoughts have come already, for their parameters."""
-        identity = f"{self.name}-{number:04d}"
-        if self._form != "then-schema":
-            return Question(identity, "answer", self.prompt_for(history, seed), len(history))
-        thoughts = self._transcript.answered(identity, "reasoning")
+        identity = self.identity(number)
+        in_steps = self._form == "then-schema"
+        thoughts = self._transcript.answered(identity, "reasoning") if in_steps else None
         if thoughts is not None:
             return self._extracting(history.problem, identity, thoughts.answer, thoughts.known)
-        return Question(identity, "reasoning", self.prompt_for(history, seed), len(history))
+        hints = self.next_hints(number)
+        prompt = self.prompt_for(history, seed, hints)
+        return Question(identity, "reasoning" if in_steps else "answer", prompt, len(history), hints=hints)
+
+    def identity(self, number: int) -> str:
+        """Of the question for trial `number`, and of the proposal that comes of it."""
+        return f"{self.name}-{number:04d}"
+
+    def next_hints(self, number: int) -> tuple[Hint, ...]:
+        """Those that go with a question for trial `number` if it is asked now.
+
+        People who answer by files get none: their question has to stay the same until it is answered.
+        """
+        return () if self._form == "text" else self._hints.take(self._transcript)
+
+    def past_hints(self, number: int) -> tuple[Hint, ...]:
+        """Those that the question for trial `number` went with."""
+        return hints_of(self._transcript.calls, self.identity(number))
 
     def _extracting(self, problem: Problem, identity: str, said: str, known: int) -> Question:
         prompt = parameters_prompt(problem, said, proposals=self.asking.proposals, expected=self._expects)
         return Question(identity, "parameters", prompt, known)
 
-    def prompt_for(self, history: History, seed: int) -> str:
+    def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
         """What is asked after `history`."""
         return self.prompt.render(
             history,
@@ -161,6 +186,7 @@ class AskingProposer(Dialogue, Proposer):
             name=self.name,
             proposals=self.asking.proposals,
             form=self._form,
+            hints=[hint.text for hint in hints],
         )
 
     def schema(self, problem: Problem) -> dict[str, Any]:

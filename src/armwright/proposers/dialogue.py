@@ -91,4 +91,5 @@ class Dialogue:
             seconds=round(reply.seconds, 3),
             fault=None if error is None else error.kind,
             error=None if error is None else str(error),
+            hints=question.hints,
         )

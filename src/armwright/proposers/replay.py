@@ -8,12 +8,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from armwright.control import Hint
 from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError
 from armwright.history import FinishedTrial, History
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import Recording
-from armwright.llm.transcript import Call, Transcript
-from armwright.proposers.asking import LAST_STEPS, TRANSCRIPTS, Asking, AskingProposer
+from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of
+from armwright.proposers.asking import LAST_STEPS, Asking, AskingProposer
 from armwright.proposers.proposer import Proposal, ProposerSummary, Record, RecordedTurn
 from armwright.run_folder import CONFIG, TRIALS, RunConfig, read_config, read_run
 
@@ -72,7 +73,7 @@ class ReplayProposer(AskingProposer):
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """The recorded designs; the recorded fault where there was one."""
-        identity = f"{self.name}-{number:04d}"
+        identity = self.identity(number)
         try:
             proposals = super().propose(history, seed, number)
         except DesignError as refusal:
@@ -87,6 +88,10 @@ class ReplayProposer(AskingProposer):
             return proposals
         note = f"the prompt for {identity} differs from the recorded one"
         return [replace(proposals[0], note=note), *proposals[1:]]
+
+    def next_hints(self, number: int) -> tuple[Hint, ...]:
+        """Those that the recorded question went with; none are new."""
+        return hints_of(self.recording.calls, self.identity(number))
 
     def _why_missing(self, number: int) -> tuple[str, str]:
         recorded = next((t for t in self._trials if t.fault and number == (t.asked or t.number)), None)

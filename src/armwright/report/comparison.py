@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from armwright.comparison import Comparison, Run
 from armwright.history import BBO, RANDOM, History
-from armwright.llm.transcript import Call, Transcript
+from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
 from armwright.pareto import front_numbers, hypervolume, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.figures import axis_label, draw_arm, draw_samples, frame
@@ -312,7 +312,7 @@ def _reasons(run: Run, history: History, solutions: tuple[int, int] | None) -> F
         return None
     number = within[0]
     trial = history.trials[number]
-    calls = Transcript(run.folder / "transcripts.jsonl", read_only=True).calls
+    calls = Transcript(run.folder / TRANSCRIPTS, read_only=True).calls
     spoken = _spoken([call for call in calls if call.proposal == trial.proposal and call.fault is None])
     words = spoken.answer if spoken is not None else trial.reason
     if not words.strip():

@@ -1,0 +1,68 @@
+"""The page: how large it is, how long it takes to make and to open, and how soon a selection answers.
+
+    python benchmarks/page.py      # needs chromium on the path; some minute
+
+A selection is timed from the call to the end of all that the page does for it, and to the next frame; without a
+graphics card that frame is drawn in software, which is most of it.
+"""
+
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import armwright as aw
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.browser import Tab, browser, program
+
+SELECT = """async () => {
+  const { content, set } = armwright, front = content.head.front, found = [];
+  for (let k = 0; k < 30; k++) {
+    const began = performance.now();
+    set({ design: front[(7 * k) % front.length] });
+    const done = performance.now() - began;
+    await new Promise((told) => requestAnimationFrame(() => setTimeout(told, 0)));
+    found.push([done, performance.now() - began]);
+    await new Promise((told) => setTimeout(told, 100));
+  }
+  return found;
+}"""
+
+
+def main() -> None:
+    path = program()
+    if path is None:
+        sys.exit("chromium is not on the path")
+    rng = np.random.default_rng(1)
+    points = np.round(rng.uniform([-0.6, -0.6, 0.0], [0.6, 0.6, 0.8], (20, 3)), 3)
+    twenty = aw.Task(name="twenty", targets=tuple(map(tuple, points.tolist())), reference_point=(12.5, 12.5))
+    with tempfile.TemporaryDirectory() as place, browser(path) as started:
+        small, large = Path(place, "small"), Path(place, "large")
+        aw.optimize(aw.Problem(task=aw.load_task("target-2")), proposer="rules", out=small)
+        aw.optimize(aw.Problem(task=twenty), proposer="none", sampler="random", n_total=9_990, out=large, verify=False)
+        print("| run | size | made in | opens in | a selection is done, shown after |\n|---|---|---|---|---|")
+        for name, folder in (("210 designs, 9 targets", small), ("10,000 designs, 20 targets", large)):
+            began = time.perf_counter()
+            page = aw.write_report(folder)
+            made = time.perf_counter() - began
+            opened = []
+            for _ in range(3):
+                tab = Tab(started, offline=True)
+                began = time.perf_counter()
+                tab.open(page)
+                opened.append(time.perf_counter() - began)
+                found = np.array(tab.page.evaluate(SELECT))
+                tab.close()
+            done, shown = np.median(found, axis=0)
+            print(
+                f"| {name} | {page.stat().st_size / 1e6:.2f} MB | {made:.2f} s | {statistics.median(opened):.2f} s | "
+                f"{done:.0f} ms, {shown:.0f} ms |"
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""What the formats share: the bodies of an arm, their colours, and numbers as text."""
+
+import math
+from xml.etree import ElementTree
+
+from armwright.arm import Link, Vector
+
+AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+COLOURS = {
+    "link": "0.75 0.75 0.78 1",
+    "joint_x": "0.84 0.37 0.00 1",
+    "joint_y": "0.00 0.45 0.70 1",
+    "joint_z": "0.00 0.62 0.45 1",
+}
+
+# MuJoCo refuses a moving body without mass: it is to take these where a link has less.
+BOUNDS = {"boundmass": "1e-12", "boundinertia": "1e-14"}  # [kg], [kg m²]
+
+
+def cylinder_inertia(link: Link) -> tuple[str, str]:
+    """(across, around): the moments of a solid cylinder from joint to joint, about its centre of mass [kg m²].
+
+    m (3 r² + l²) / 12 across its axis and m r² / 2 around it. A cylinder without length is a disc, 2 across = around:
+    all digits, as MuJoCo refuses what is a rounding below it.
+    """
+    around = link.mass * link.radius**2 / 2.0
+    across = around / 2.0 + link.mass * link.length**2 / 12.0
+    return f"{across:.17g}", f"{around:.17g}"
+
+
+def along(offset: Vector) -> Vector:
+    """Roll, pitch, yaw [rad] of the frame whose z points along `offset`."""
+    x, y, z = offset
+    return (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))
+
+
+def middle(link: Link) -> Vector:
+    """Half way to the next joint [m]."""
+    x, y, z = link.offset
+    return (x / 2, y / 2, z / 2)
+
+
+def marker_radius(link: Link) -> float:
+    """Of the sphere that shows a joint: a little more than its link [m]."""
+    return 1.4 * link.radius
+
+
+def number(value: float) -> str:
+    """Ten digits."""
+    return f"{value:.10g}"
+
+
+def numbers(values: Vector) -> str:
+    """Ten digits each."""
+    return " ".join(number(value) for value in values)
+
+
+def text_of(root: ElementTree.Element) -> str:
+    """The XML of the whole file, indented."""
+    ElementTree.indent(root)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

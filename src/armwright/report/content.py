@@ -1,0 +1,242 @@
+"""What the page shows of a run folder, packed as one piece of bytes that its script takes apart.
+
+The same bytes stand in report.html and come from the live server, which sends only what is new.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arm import AXES, Arm
+from armwright.best_known import known_front
+from armwright.comparison import method_words
+from armwright.export.mjcf import to_mjcf
+from armwright.export.urdf import to_urdf
+from armwright.history import History
+from armwright.llm.transcript import TRANSCRIPTS, Transcript
+from armwright.objectives import TORQUE, TORQUE_SCALE
+from armwright.pareto import front_numbers, hypervolume, hypervolume_history
+from armwright.report.repeat import repeat_command
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, MISSED, TARGET, look
+from armwright.results import read_summary
+from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
+from armwright.space import FloatParameter
+
+KINDS = ("revolute", "prismatic", "fixed")
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+class RunContent:
+    """A run folder as the page shows it. `refresh` reads what has come since; what was read is kept."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.config: RunConfig = read_config(folder)
+        self._reader = TrialsReader(folder, self.config)
+        self._chunks: list[tuple[int, Arrays]] = []  # designs by the number of their first
+        self._n = 0
+        self.refresh()
+
+    def refresh(self) -> bool:
+        """Reads on; whether there was anything new."""
+        self.config = read_config(self.folder)  # the reference point may have been found
+        if self._reader.read_on():
+            self._chunks, self._n = [], 0  # another file than before: all of it is new
+        self.summary = read_summary(self.folder)
+        self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
+        self.history = History(
+            self.config.problem, self._reader.trials, self.config.method.n_init, self.config.reference_point
+        )
+        new = len(self.history) - self._n
+        if new:
+            self._chunks.append((self._n, _designs(self.history, range(self._n, len(self.history)))))
+            self._n = len(self.history)
+        return new > 0
+
+    @property
+    def study(self) -> Method | None:
+        """How its study searches; None for a search for the whole front."""
+        return None if isinstance(self.config.method, FrontMethod) else self.config.method
+
+    def packed(self, designs_from: int = 0, calls_from: int = 0, with_files: bool = True) -> bytes:
+        """The whole run, or what is new from a design and a call on.
+
+        with_files: URDF and MJCF of the front's designs, too.
+        """
+        if designs_from not in {self._n, *(first for first, _ in self._chunks)}:
+            designs_from = 0  # the page knows another state of the run than any that was sent: all of it anew
+        arrays = _joined([arrays for first, arrays in self._chunks if first >= designs_from])
+        curve = np.zeros(0)
+        if self.history.reference_point is not None and len(self.history):
+            curve = hypervolume_history(self.history.values, self.history.reference_point)
+        front = front_numbers(self.history.values) if len(self.history) else []
+        head = {
+            **_about(self.config, self.folder, self.history),
+            "n": self._n,
+            "designs_from": designs_from,
+            "front": front,
+            "proposals": _proposals(self.history, designs_from),
+            "sources": list(dict.fromkeys(trial.source for trial in self.history)),
+            "looks": {trial.source: _look(trial.source) for trial in self.history},
+            "result": _result(self.config, self.history, self.summary),
+            "calls_from": calls_from,
+            "calls": [asdict(call) for call in self.calls[calls_from:]],
+            "files": {number: design_files(self.history, number) for number in front} if with_files else {},
+        }
+        return pack(head, {**arrays, "curve": curve})
+
+
+def design_files(history: History, number: int) -> dict[str, str]:
+    """A design as text for simulators, by format."""
+    name, arm = f"{history.problem.task.name}-{number}", history.member(number).arm
+    return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}
+
+
+def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
+    """A JSON head and arrays as bytes: the head's length (uint32, little-endian), the head, then the arrays.
+
+    The head's "arrays" says of each its type, where it begins after the head [bytes], and its shape. All begin at
+    multiples of 8, so that a script can look at them where they lie.
+    """
+    places: dict[str, Any] = {}
+    parts: list[bytes] = []
+    at = 0
+    for name, array in arrays.items():
+        data = np.ascontiguousarray(array.astype(array.dtype.newbyteorder("<"))).tobytes()
+        places[name] = [array.dtype.name, at, list(array.shape)]
+        parts.append(data + b"\0" * (-len(data) % 8))
+        at += len(parts[-1])
+    text = json.dumps({**head, "arrays": places}, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-(len(text) + 4) % 8)
+    return len(text).to_bytes(4, "little") + text + b"".join(parts)
+
+
+def _designs(history: History, numbers: range) -> Arrays:
+    """What the page knows of these designs, one row each; `q` is (n, T, J) joint angles [rad] or strokes [m]."""
+    space = history.problem.space
+    trials = [history.trials[number] for number in numbers]
+    arms = [history.problem.arm(trial.design) for trial in trials]
+    evaluation = history.evaluation(numbers)
+    sources = list(dict.fromkeys(trial.source for trial in history))
+    return {
+        "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
+        "values": history.values[numbers.start : numbers.stop],
+        "params": space.matrix([trial.design for trial in trials]),
+        "q": evaluation.q.astype(np.float32),
+        **_arm_arrays(arms),
+    }
+
+
+def _arm_arrays(arms: Sequence[Arm]) -> Arrays:
+    """The arms, joint by joint, as `Arm` has them."""
+    joints, links = [arm.joints for arm in arms], [arm.links for arm in arms]
+
+    def floats(rows: Any) -> NDArray[np.float32]:
+        return np.array(rows, dtype=np.float32)
+
+    return {
+        "base": floats([arm.base for arm in arms]),
+        "kind": np.array([[KINDS.index(j.kind) for j in row] for row in joints], dtype=np.uint8),
+        "axis": np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.uint8),
+        "lower": floats([[j.lower for j in row] for row in joints]),
+        "upper": floats([[j.upper for j in row] for row in joints]),
+        "offset": floats([[link.offset for link in row] for row in links]),
+        "com": floats([[link.com for link in row] for row in links]),
+        "mass": floats([[link.mass for link in row] for row in links]),
+        "radius": floats([[link.radius for link in row] for row in links]),
+    }
+
+
+def _joined(chunks: Sequence[Arrays]) -> dict[str, NDArray[Any]]:
+    if not chunks:
+        return {}
+    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+
+
+def _about(config: RunConfig, folder: Path, history: History) -> dict[str, Any]:
+    """What does not change while the run goes on."""
+    task, method, space = config.task, config.method, config.space
+    study = None if isinstance(method, FrontMethod) else method
+    known = known_front(config.problem)
+    reference = history.reference_point
+    return {
+        "folder": folder.resolve().name,
+        "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
+        "targets": [list(target) for target in task.targets],
+        "reference_point": None if reference is None else list(reference),
+        "objectives": [objective.model_dump() for objective in config.objectives],
+        "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
+        "parameters": [
+            {"name": p.name, "low": p.low, "high": p.high, "unit": p.unit}
+            if isinstance(p, FloatParameter)
+            else {"name": p.name, "choices": list(p.choices)}
+            for p in space.parameters
+        ],
+        "masses": space.mass_note,
+        "is_toy": space.is_toy,
+        "seed": config.seed,
+        "method": method_words(config),
+        "study": None if study is None else study.model_dump(mode="json"),
+        "n_init": method.n_init,
+        "planned": None if study is None else study.n_trials,
+        "command": repeat_command(config),
+        "config": config.model_dump(mode="json"),
+        "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
+        "colours": {"front": FRONT, "missed": MISSED, "target": TARGET, "joint": JOINT},
+        "joint_words": JOINT_LABEL,
+    }
+
+
+def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
+    """What the run has come to."""
+    reference = history.reference_point
+    final = hypervolume(history.values, reference) if reference is not None and len(history) else None
+    found: dict[str, Any] = {
+        "finished": summary is not None,
+        "hypervolume": final,
+        "by_source": dict(Counter(trial.source for trial in history)),
+        "seconds": sum(trial.seconds.get("total", 0.0) for trial in history),
+        "evaluations": sum(trial.evaluations for trial in history),
+        "solid": None,
+        "cost_usd": None,
+        "search": None,
+    }
+    if summary is None:
+        return found
+    verification = cast("Mapping[str, Any] | None", summary["verification"])
+    proposer = cast("Mapping[str, Any]", summary.get("proposer") or {})
+    found["hypervolume"] = summary["hypervolume"]["final"]
+    found["solid"] = None if verification is None else verification["solid_numbers"]
+    found["cost_usd"] = proposer.get("cost_usd")
+    if isinstance(config.method, FrontMethod):
+        search = summary["search"]
+        found |= {"seconds": search["seconds"], "evaluations": search["evaluations"]}
+        found["search"] = search["hypervolume_history"]
+    return found
+
+
+def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
+    """Of the designs from `first` on, what was proposed and why, and what went wrong where a proposal was due."""
+    return {
+        trial.number: {
+            "id": trial.proposal,
+            "reason": trial.reason,
+            "expected": None if trial.expected is None else list(trial.expected),
+            "fault": trial.fault,
+            "refines": trial.refines,
+        }
+        for trial in history.trials[first:]
+        if trial.proposal is not None or trial.fault is not None or trial.refines is not None
+    }
+
+
+def _look(source: str) -> dict[str, str]:
+    style = look(source)
+    return {"label": style.label, "colour": style.colour, "marker": style.marker}

@@ -1,0 +1,337 @@
+// The selected arm in space, in one posture for each target.
+
+import { postures, REACHED } from "./design.js";
+import { chain } from "./kinematics.js";
+import { listen, set, state } from "./state.js";
+import { $, colour, millimetres, number, onTheme, shown } from "./words.js";
+
+const CELLS = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // m, sides of the grid's cells
+const MOST_CELLS = 16; // along one side
+const MOVE = 700; // ms from one posture to the next
+const REST = 500; // ms at a target, when playing
+const VIEW = [0.55, -1, 0.42]; // from where one looks at first
+const SLACK = 0.2; // of the frame's radius, by which an arm may leave it before it grows
+
+let content = null;
+let scene = null, camera = null, controls = null, renderer = null;
+const groups = {}; // what is drawn anew by itself
+let materials = {};
+let frame = null; // { centre, radius } of what there is to see
+let moving = null; // { from, to, began } in joint space
+let playing = false;
+let unit = {}; // shapes of size 1, which all parts share
+
+export function openArm(shownContent) {
+  content = shownContent;
+  $("arm-box").hidden = false;
+  $("previous").addEventListener("click", () => step(-1));
+  $("next").addEventListener("click", () => step(1));
+  $("play").addEventListener("click", () => play(!playing));
+  $("ghost").addEventListener("change", drawArm);
+  $("reset").addEventListener("click", () => { frame = null; drawArm(); });
+  $("compare").addEventListener("click", () => set({ compared: state.compared === null ? state.design : null }));
+  addEventListener("keydown", (event) => {
+    if (event.target.closest("input, select, textarea, table, .plot") || event.altKey || event.ctrlKey || event.metaKey) return;
+    if (event.key === "ArrowLeft" || event.key === "ArrowRight") {
+      step(event.key === "ArrowLeft" ? -1 : 1);
+      event.preventDefault();
+    }
+  });
+  try {
+    begin();
+  } catch {
+    scene = null;
+    const note = document.createElement("p");
+    note.className = "note";
+    note.textContent = "This browser shows no 3D graphics (WebGL). Everything else on this page works without.";
+    $("arm").replaceChildren(note);
+    for (const id of ["ghost", "reset", "play"]) $(id).disabled = true;
+  }
+  listen((changed) => {
+    if (changed.has("target") && !changed.has("design")) move();
+    else if (changed.has("design") || changed.has("target") || changed.has("compared")) drawArm();
+    if (changed.size) words();
+  });
+  drawArm();
+  words();
+}
+
+export function growArm() {
+  if (state.design !== null) drawArm();
+}
+
+// Where the joints of the drawn arm are, from what is drawn; for tests.
+export function drawnJoints() {
+  return groups.arm.children.filter((mesh) => mesh.userData.joint !== undefined)
+    .map((mesh) => mesh.position.toArray());
+}
+
+function begin() {
+  unit = { rod: new THREE.CylinderGeometry(1, 1, 1, 20), ball: new THREE.SphereGeometry(1, 20, 14) };
+  renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+  scene = new THREE.Scene();
+  camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1e5);
+  camera.up.set(0, 0, 1);
+  scene.add(new THREE.HemisphereLight(0xffffff, 0x8890a0, 2.2));
+  const sun = new THREE.DirectionalLight(0xffffff, 1.6);
+  sun.position.set(3, -5, 8);
+  scene.add(sun);
+  for (const name of ["floor", "targets", "ghost", "compared", "arm"]) {
+    groups[name] = new THREE.Group();
+    scene.add(groups[name]);
+  }
+  $("arm").append(renderer.domElement);
+  controls = new THREE.OrbitControls(camera, renderer.domElement);
+  controls.addEventListener("change", render);
+  new ResizeObserver(fit).observe($("arm"));
+  paint();
+  onTheme(() => { paint(); frame = null; drawArm(); });
+  fit();
+}
+
+function paint() {
+  const { joint, target, missed } = content.head.colours;
+  const solid = (paint_) => new THREE.MeshLambertMaterial({ color: paint_ });
+  const faint = (paint_, opacity) => new THREE.MeshLambertMaterial({ color: paint_, transparent: true, opacity, depthWrite: false });
+  materials = {
+    link: solid(colour("arm")), base: solid(shown("#111111")), joints: ["x", "y", "z"].map((axis) => solid(joint[axis])),
+    ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45),
+    reached: solid("#009E73"), missed: solid(target), now: solid("#E69F00"),
+    gap: new THREE.LineDashedMaterial({ color: missed, dashSize: 0.02, gapSize: 0.012 }),
+  };
+}
+
+function fit() {
+  const box = $("arm");
+  if (!renderer || !box.clientWidth) return;
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  renderer.setSize(box.clientWidth, box.clientHeight);
+  camera.aspect = box.clientWidth / box.clientHeight;
+  camera.updateProjectionMatrix();
+  render();
+}
+
+function render() {
+  if (renderer) renderer.render(scene, camera);
+}
+
+function empty(group) {
+  for (const { geometry } of group.children) if (geometry !== unit.rod && geometry !== unit.ball) geometry?.dispose();
+  group.clear();
+}
+
+function ball(place, radius, material) {
+  const mesh = new THREE.Mesh(unit.ball, material);
+  mesh.position.set(...place);
+  mesh.scale.setScalar(radius);
+  return mesh;
+}
+
+// What there is to see of the selected design: the targets, and the arm in all postures.
+function extent() {
+  const arm = content.arm(state.design), points = [...content.targets];
+  content.targets.forEach((_, t) => points.push(...chain(arm, content.q(state.design, t)).joints));
+  const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
+  const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
+  return { low, high };
+}
+
+// Makes a frame that holds it; one that is there already stays, unless the arm leaves it.
+function reframe() {
+  let { low, high } = extent();
+  if (frame !== null) {
+    const slack = SLACK * frame.radius;
+    const holds = low.every((v, k) => v >= frame.low[k] - slack) && high.every((v, k) => v <= frame.high[k] + slack);
+    if (holds) return;
+    [low, high] = [low.map((v, k) => Math.min(v, frame.low[k])), high.map((v, k) => Math.max(v, frame.high[k]))];
+  }
+  const centre = low.map((v, k) => (v + high[k]) / 2);
+  frame = { centre, low, high, radius: Math.max(0.05, Math.hypot(...high.map((v, k) => v - low[k])) / 2) };
+  drawFloor();
+  drawTargets();
+  look();
+}
+
+function look() {
+  const far = (1.02 * frame.radius) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
+  const size = Math.hypot(...VIEW);
+  controls.target.set(...frame.centre);
+  camera.position.set(...VIEW.map((v, k) => frame.centre[k] + (v / size) * far));
+  camera.near = far / 100;
+  camera.far = 10 * far;
+  camera.updateProjectionMatrix();
+  controls.update();
+  render();
+}
+
+function drawFloor() {
+  empty(groups.floor);
+  const { low, high } = frame, span = Math.max(high[0] - low[0], high[1] - low[1], 0.1);
+  const cell = CELLS.find((size) => span / size <= MOST_CELLS) ?? 100;
+  const [x0, x1, y0, y1] = [low[0], high[0], low[1], high[1]].map((v, k) => (k % 2 ? Math.ceil(v / cell) : Math.floor(v / cell)) * cell);
+  const z = low[2] - 0.02 * frame.radius, points = [];
+  for (let x = x0; x <= x1 + cell / 2; x += cell) points.push(x, y0, z, x, y1, z);
+  for (let y = y0; y <= y1 + cell / 2; y += cell) points.push(x0, y, z, x1, y, z);
+  groups.floor.add(segments(points, new THREE.LineBasicMaterial({ color: colour("line") })));
+  for (const [k, axis] of ["x", "y", "z"].entries()) { // the world's axes, at the grid's corner
+    const end = [x0, y0, z];
+    end[k] += 0.45 * frame.radius;
+    groups.floor.add(segments([x0, y0, z, ...end], new THREE.LineBasicMaterial({ color: colour("soft") })));
+    groups.floor.add(label(axis, end));
+  }
+  $("arm-note").textContent = `Grid of ${number(cell)} m; z is up. Drag turns, wheel or two fingers zoom, arrow keys step through the targets.`;
+}
+
+function segments(points, material) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+  return new THREE.LineSegments(geometry, material);
+}
+
+function label(text, place) {
+  const canvas = document.createElement("canvas"), size = 64;
+  canvas.width = canvas.height = size;
+  const brush = canvas.getContext("2d");
+  brush.font = "44px system-ui, sans-serif";
+  brush.textAlign = "center";
+  brush.textBaseline = "middle";
+  brush.fillStyle = colour("soft");
+  brush.fillText(text, size / 2, size / 2);
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), transparent: true, depthTest: false }));
+  sprite.position.set(...place);
+  sprite.scale.setScalar(0.13 * frame.radius);
+  return sprite;
+}
+
+function drawTargets() {
+  empty(groups.targets);
+  for (const target of content.targets) groups.targets.add(ball(target, ballSize(), materials.missed));
+}
+
+const ballSize = () => 0.028 * frame.radius;
+
+// A cylinder from one place to another.
+function rod(from, to, radius, material) {
+  const [a, b] = [new THREE.Vector3(...from), new THREE.Vector3(...to)], way = b.clone().sub(a);
+  const mesh = new THREE.Mesh(unit.rod, material);
+  mesh.scale.set(radius, Math.max(way.length(), 1e-6), radius);
+  mesh.position.copy(a.add(b).multiplyScalar(0.5));
+  if (way.length() > 0) mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), way.normalize());
+  return mesh;
+}
+
+function drawPosture(group, arm, q, paints) {
+  empty(group);
+  const { joints, axes } = chain(arm, q);
+  for (let j = 0; j < q.length; j++) {
+    const radius = Math.max(arm.radius[j], 0.008 * frame.radius), wide = 1.45 * radius;
+    group.add(rod(joints[j], joints[j + 1], radius, paints.link));
+    const along = axes[j].map((v) => v * 1.25 * wide);
+    const joint = rod(joints[j].map((v, k) => v - along[k]), joints[j].map((v, k) => v + along[k]), wide, paints.joints[arm.axis[j]]);
+    joint.userData.joint = j;
+    joint.position.set(...joints[j]);
+    group.add(joint);
+  }
+  const radius = Math.max(arm.radius[0], 0.008 * frame.radius);
+  const [bx, by, bz] = joints[0];
+  group.add(rod([bx, by, bz - 2.05 * radius], [bx, by, bz - 1.15 * radius], 2.4 * radius, paints.base));
+  const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
+  tip.userData.joint = q.length;
+  group.add(tip);
+  return joints.at(-1);
+}
+
+export function drawArm() {
+  moving = null;
+  if (!scene || state.design === null) return;
+  reframe();
+  const arm = content.arm(state.design), posed = postures(state.design);
+  const shape = { link: materials.link, joints: materials.joints, base: materials.base };
+  const tip = drawPosture(groups.arm, arm, content.q(state.design, state.target), shape);
+  gap(tip);
+  groups.targets.children.forEach((mesh, t) => {
+    mesh.material = t === state.target ? materials.now : posed[t].error < REACHED ? materials.reached : materials.missed;
+    mesh.scale.setScalar((t === state.target ? 1.35 : 1) * ballSize());
+  });
+  empty(groups.ghost);
+  if ($("ghost").checked) {
+    posed.forEach((one, t) => {
+      if (t === state.target) return;
+      for (let j = 0; j < one.q.length; j++) {
+        groups.ghost.add(rod(one.joints[j], one.joints[j + 1], 0.55 * Math.max(arm.radius[j], 0.008 * frame.radius), materials.ghost));
+      }
+    });
+  }
+  empty(groups.compared);
+  if (state.compared !== null && state.compared !== state.design) {
+    const pale = { link: materials.compared, joints: [0, 1, 2].map(() => materials.compared), base: materials.compared };
+    drawPosture(groups.compared, content.arm(state.compared), content.q(state.compared, state.target), pale);
+  }
+  render();
+}
+
+// The line from the tip to a target that is missed.
+function gap(tip) {
+  const target = content.targets[state.target];
+  const line = segments([...tip, ...target], materials.gap);
+  line.computeLineDistances();
+  groups.arm.add(line);
+}
+
+// Turns the joints from the posture that is drawn to the one of the selected target.
+function move() {
+  if (!scene || state.design === null) return;
+  const to = Array.from(content.q(state.design, state.target));
+  const from = moving?.now ?? moving?.to ?? lastPosture ?? to;
+  lastPosture = to;
+  if (matchMedia("(prefers-reduced-motion: reduce)").matches) {
+    drawArm();
+    return;
+  }
+  moving = { from, to, began: performance.now(), now: from };
+  requestAnimationFrame(tick);
+}
+
+let lastPosture = null;
+
+function tick(now) {
+  if (moving === null) return;
+  const share = Math.min(1, Math.max(0, (now - moving.began) / MOVE)), eased = share * share * (3 - 2 * share);
+  moving.now = moving.from.map((v, j) => v + eased * (moving.to[j] - v));
+  if (share >= 1) {
+    drawArm();
+    if (playing) setTimeout(() => playing && step(1), REST);
+    return;
+  }
+  const shape = { link: materials.link, joints: materials.joints, base: materials.base };
+  gap(drawPosture(groups.arm, content.arm(state.design), moving.now, shape));
+  render();
+  requestAnimationFrame(tick);
+}
+
+function step(by) {
+  if (state.design === null) return;
+  const n = content.targets.length;
+  lastPosture = Array.from(content.q(state.design, state.target));
+  set({ target: (state.target + by + n) % n });
+  if (n === 1) move();
+}
+
+function play(on) {
+  playing = on;
+  $("play").setAttribute("aria-pressed", on);
+  $("play").textContent = on ? "Stop" : "Play";
+  if (on) step(1);
+}
+
+function words() {
+  const i = state.design;
+  if (i === null) return;
+  const one = postures(i)[state.target], n = content.targets.length;
+  $("arm-title").textContent = `#${i} ${content.joints(i)}`;
+  const verdict = one.error < REACHED ? "reached" : `missed by ${millimetres(one.error)}`;
+  $("target-words").textContent = `Target ${state.target + 1} of ${n}: ${verdict}`;
+  $("target-words").className = one.error < REACHED ? "" : "missed";
+  $("compare").setAttribute("aria-pressed", state.compared !== null);
+  $("compare").textContent = state.compared === null ? "Compare" : `Beside #${state.compared} ✕`;
+}

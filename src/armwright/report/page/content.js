@@ -1,0 +1,108 @@
+// The run as the page knows it: taken apart from the packed bytes, grown where the run goes on.
+
+const VIEWS = {
+  uint8: Uint8Array, int32: Int32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
+};
+
+// A JSON head, and arrays that are views of the bytes (see report/content.py, pack).
+export function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const arrays = {};
+  for (const [name, [type, at, shape]] of Object.entries(head.arrays)) {
+    const size = shape.reduce((product, n) => product * n, 1);
+    arrays[name] = { data: new VIEWS[type](buffer, 4 + length + at, size), shape };
+  }
+  return { head, arrays };
+}
+
+// The bytes of a page that opens without a server.
+export async function embedded(text) {
+  const binary = atob(text.trim());
+  const bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = binary.charCodeAt(i);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(stream).arrayBuffer();
+}
+
+export class Content {
+  constructor() {
+    this.head = null;
+    this.calls = [];
+    this.proposals = {};
+    this._clear();
+  }
+
+  _clear() {
+    this.n = 0;
+    this._chunks = [];
+    this._chunk = []; // of each design
+    this._row = [];
+    this.proposals = {};
+  }
+
+  // Takes what was sent: the whole run, or what is new in it.
+  add(buffer) {
+    const { head, arrays } = unpack(buffer);
+    if (head.designs_from === 0) this._clear();
+    if (head.designs_from !== this.n) throw new Error("designs are missing in between");
+    this.head = head;
+    this.curve = arrays.curve.data;
+    Object.assign(this.proposals, head.proposals);
+    this.calls = [...this.calls.slice(0, head.calls_from), ...head.calls];
+    if (arrays.values) {
+      const rows = arrays.values.shape[0];
+      for (let row = 0; row < rows; row++) {
+        this._chunk.push(this._chunks.length);
+        this._row.push(row);
+      }
+      this._chunks.push(arrays);
+      this.n += rows;
+    }
+  }
+
+  // One design's part of an array: a view, not a copy.
+  _part(name, i) {
+    const { data, shape } = this._chunks[this._chunk[i]][name];
+    const size = data.length / shape[0];
+    return data.subarray(this._row[i] * size, (this._row[i] + 1) * size);
+  }
+
+  get objectives() { return this.head.objectives; }
+  get targets() { return this.head.targets; }
+  source(i) { return this.head.sources[this._part("source", i)[0]]; }
+  look(i) { return this.head.looks[this.source(i)]; }
+  values(i) { return this._part("values", i); }
+
+  params(i) {
+    const numbers = this._part("params", i);
+    return this.head.parameters.map((p, k) => ({ ...p, value: p.choices ? p.choices[numbers[k]] : numbers[k] }));
+  }
+
+  // Joint types in order, as one word.
+  joints(i) {
+    return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
+  }
+
+  arm(i) {
+    const arm = {};
+    for (const name of ["base", "kind", "axis", "lower", "upper", "offset", "com", "mass", "radius"]) {
+      arm[name] = this._part(name, i);
+    }
+    return arm;
+  }
+
+  // Joint values [rad] or [m] at a target.
+  q(i, target) {
+    const all = this._part("q", i), size = all.length / this.targets.length;
+    return all.subarray(target * size, (target + 1) * size);
+  }
+
+  isSolid(i) { return this.head.result.solid === null ? null : this.head.result.solid.includes(i); }
+  callsOf(i) {
+    const id = this.proposals[i]?.id;
+    if (!id) return [];
+    // Of several designs of one call, each is NAME-0042.1, .2, …
+    return this.calls.filter((call) => call.proposal && (call.proposal === id || id.startsWith(call.proposal + ".")));
+  }
+}

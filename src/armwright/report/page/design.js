@@ -1,0 +1,120 @@
+// The selected design in numbers, and as files.
+
+import { chain, distance, holding, length, linkLength } from "./kinematics.js";
+import { listen, set, state } from "./state.js";
+import { $, element, millimetres, number, save } from "./words.js";
+
+export const REACHED = 1e-3; // m
+const AT_LIMIT = 1e-3; // rad or m
+const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv" };
+const ENDINGS = { urdf: "urdf", mjcf: "xml", csv: "csv" };
+
+let content = null;
+let fetchFile = null; // where a server has what the page lacks
+
+// fetched: (design, format) => Promise of a text, with a live server.
+export function openDesign(shownContent, fetched) {
+  content = shownContent;
+  fetchFile = fetched;
+  for (const button of document.querySelectorAll(".download")) {
+    button.addEventListener("click", () => download(button.dataset.format));
+  }
+  listen((changed) => {
+    if (changed.has("design")) drawDesign();
+    else if (changed.has("target")) mark();
+  });
+  drawDesign();
+}
+
+// A design at every target: error [m], joint values, what holds each joint.
+export function postures(i) {
+  const arm = content.arm(i);
+  return content.targets.map((target, t) => {
+    const q = content.q(i, t), posed = chain(arm, q);
+    return { target, q, ...posed, error: distance(posed.joints.at(-1), target), torques: holding(arm, posed) };
+  });
+}
+
+function at(arm, q, j) {
+  if (q[j] >= arm.upper[j] - AT_LIMIT) return "upper";
+  return q[j] <= arm.lower[j] + AT_LIMIT ? "lower" : "";
+}
+
+export function drawDesign() {
+  const i = state.design;
+  $("design-box").hidden = i === null;
+  if (i === null) return;
+  const { head } = content, arm = content.arm(i), posed = postures(i), values = content.values(i);
+  const solid = content.isSolid(i);
+  const verdict = solid === null || !head.front.includes(i) ? "" : solid ? ", solid" : ", fragile";
+  $("design-title").textContent = `#${i} ${content.joints(i)}, ${content.look(i).label}${verdict}`;
+  const iteration = head.study && i >= head.n_init ? ` Iteration ${i - head.n_init + 1}.` : "";
+  const objectives = head.objectives.map((o, k) => `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}`);
+  const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
+  const base = Array.from(arm.base, (v) => number(v, 3)).join(", ");
+  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m. ${onFront}${iteration}`;
+  drawLinks(arm);
+  drawPostures(arm, posed);
+  const hasFiles = head.files[i] !== undefined || fetchFile !== null;
+  for (const button of document.querySelectorAll(".download")) {
+    button.disabled = button.dataset.format !== "csv" && !hasFiles;
+    button.title = button.disabled ? "Files are kept for the designs of the front" : `Download #${i} as ${button.textContent}`;
+  }
+  const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
+  $("design-note").textContent = `Angles q in rad; underlined: at a joint's limit. Torques hold the posture against gravity.${scale} ${head.masses}.`;
+}
+
+function drawLinks(arm) {
+  const { joint } = content.head.colours;
+  $("links").replaceChildren(...Array.from(arm.axis, (axis, j) => {
+    const long = linkLength(arm, j);
+    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${"xyz"[axis]})` },
+      `${"xyz"[axis].toUpperCase()} ${millimetres(long)}`);
+    bar.style.flex = `${Math.max(long, 1e-3)} 1 0`;
+    bar.style.background = joint["xyz"[axis]];
+    return bar;
+  }));
+}
+
+function drawPostures(arm, posed) {
+  const joints = [...arm.axis.keys()];
+  const head = element("tr", {}, ...["", "target [m]", "missed by", "torque [N m]"].map((name, k) =>
+    element("th", { scope: "col", class: k === 1 ? "text" : "" }, name)),
+  ...joints.map((j) => element("th", { scope: "col" }, arm.kind[j] === 1 ? `q${j + 1} [m]` : `q${j + 1}`)));
+  const rows = posed.map((one, t) => element("tr", {
+    "data-target": t, tabindex: "0", onclick: () => set({ target: t }),
+    onkeydown: (event) => { if (event.key === "Enter") set({ target: t }); },
+  },
+  element("td", {}, String(t + 1)),
+  element("td", { class: "text" }, one.target.map((v) => number(v, 3)).join(", ")),
+  element("td", { class: one.error < REACHED ? "" : "missed" }, one.error < REACHED ? "reached" : millimetres(one.error)),
+  element("td", { title: one.torques.map((v, j) => `joint ${j + 1}: ${number(v, 3)} N m`).join("\n") }, number(length(one.torques), 3)),
+  ...joints.map((j) => {
+    const side = at(arm, one.q, j);
+    return element("td", {}, element("span", { class: side ? "limit" : "", title: side ? `at its ${side} limit` : null }, one.q[j].toFixed(3).replace(/^-(?=[0.]+$)/, "")));
+  })));
+  const limits = element("tr", {}, element("td", { class: "text", colspan: "4" }, "limits"),
+    ...joints.map((j) => element("td", {}, `${number(arm.lower[j], 3)} … ${number(arm.upper[j], 3)}`)));
+  $("postures").replaceChildren(element("thead", {}, head), element("tbody", {}, ...rows), element("tfoot", {}, limits));
+  mark();
+}
+
+function mark() {
+  for (const row of $("postures").querySelectorAll("tbody tr")) {
+    row.classList.toggle("chosen", Number(row.dataset.target) === state.target);
+  }
+}
+
+async function download(format) {
+  const i = state.design, name = `${content.head.task.name}-${i}.${ENDINGS[format]}`;
+  if (format === "csv") save(name, asCsv(i), TYPES.csv);
+  else save(name, content.head.files[i]?.[format] ?? (await fetchFile(i, format)), TYPES[format]);
+}
+
+function asCsv(i) {
+  const arm = content.arm(i), joints = [...arm.axis.keys()].map((j) => j + 1);
+  const head = ["target", "x", "y", "z", "position_error", "torque_norm",
+    ...joints.map((j) => `q_${j}`), ...joints.map((j) => `torque_${j}`)];
+  const rows = postures(i).map((one, t) => [t + 1, ...one.target, one.error, length(one.torques), ...one.q, ...one.torques]);
+  return [head, ...rows].map((row) => row.join(",")).join("\n") + "\n";
+}

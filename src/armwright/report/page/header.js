@@ -1,0 +1,67 @@
+// What run this is, and what it came to.
+
+import { $, duration, element, number, percent } from "./words.js";
+
+let content = null;
+
+export function openHeader(shownContent) {
+  content = shownContent;
+  const { head } = content;
+  $("title").textContent = `${head.task.name}: ${head.method}, seed ${head.seed}`;
+  $("description").textContent = head.task.description;
+  $("repeat").hidden = head.command === "";
+  $("repeat").querySelector("code").textContent = head.command;
+  const copy = $("repeat").querySelector("button");
+  copy.hidden = navigator.clipboard === undefined;
+  copy.addEventListener("click", async () => {
+    await navigator.clipboard.writeText(head.command);
+    copy.textContent = "Copied";
+  });
+  drawHeader();
+}
+
+function fact(name, value, paint) {
+  const item = element("li", {}, paint ? element("span", { class: "dot" }) : null, `${name} `, element("b", {}, value));
+  if (paint) item.querySelector(".dot").style.background = paint;
+  return item;
+}
+
+export function drawHeader() {
+  const { head } = content, { result } = head, facts = [];
+  if (!result.finished) facts.push(fact("state", "unfinished"));
+  if (result.hypervolume !== null) {
+    const share = head.best_known ? ` (${percent(result.hypervolume / head.best_known)} of the best known)` : "";
+    facts.push(fact("hypervolume", `${number(result.hypervolume)}${share}`));
+    facts.push(fact("reference point", `(${head.reference_point.map((v) => number(v)).join(", ")})`));
+  }
+  const solid = result.solid === null ? "" : `, ${result.solid.length} solid`;
+  facts.push(fact("front", `${head.front.length} designs${solid}`));
+  for (const [source, n] of Object.entries(result.by_source)) {
+    facts.push(fact(head.looks[source].label, `${n}`, head.looks[source].colour));
+  }
+  if (result.evaluations > content.n) facts.push(fact("evaluations", result.evaluations.toLocaleString("en")));
+  facts.push(fact("time", duration(result.seconds)));
+  if (content.calls.length) {
+    const calls = content.calls.reduce((sum, call) => sum + Math.max(1, call.requests), 0);
+    const costs = content.calls.map((call) => call.cost_usd).filter((cost) => cost !== null);
+    const cost = costs.length ? `, ${number(costs.reduce((a, b) => a + b, 0), 3)} USD` : "";
+    const stand_in = content.calls.some((call) => call.origin === "scripted") ? ", by a scripted stand-in" : "";
+    facts.push(fact("calls to the model", `${calls}${cost}${stand_in}`));
+  }
+  $("facts").replaceChildren(...facts);
+}
+
+export function drawConfiguration() {
+  const { head } = content, list = element("dl");
+  const tell = (name, value) => list.append(element("dt", {}, name), element("dd", {}, value));
+  const walk = (name, value) => {
+    if (value !== null && typeof value === "object" && !Array.isArray(value)) {
+      for (const [key, inner] of Object.entries(value)) walk(name ? `${name}.${key}` : key, inner);
+    } else tell(name, Array.isArray(value) ? JSON.stringify(value) : String(value));
+  };
+  walk("", head.config);
+  $("configuration-box").hidden = false;
+  $("configuration").replaceChildren(element("p", { class: "note" }, `Run folder ${head.folder}. ${head.masses}.`), list);
+  const how = $("content") ? "One file, which needs no network." : "Live; report.html in the run folder shows the same without a server.";
+  $("footer").textContent = `Made by armwright ${head.config.versions.armwright ?? ""} from the run folder ${head.folder}. ${how}`;
+}

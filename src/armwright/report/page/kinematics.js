@@ -1,0 +1,54 @@
+// Where an arm is in a posture, and what holds it up: the formulas of armwright/kinematics, in double precision.
+
+const GRAVITY = 9.81; // m/s², along -z
+const [REVOLUTE, PRISMATIC] = [0, 1];
+
+const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const at = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
+const column = (m, k) => [m[k], m[3 + k], m[6 + k]];
+const turned = (m, v) => [0, 3, 6].map((r) => m[r] * v[0] + m[r + 1] * v[1] + m[r + 2] * v[2]);
+
+// m, 3 x 3 by rows, turned about its own axis k by an angle.
+function rotated(m, k, angle) {
+  const [i, j] = [(k + 1) % 3, (k + 2) % 3], [s, c] = [Math.sin(angle), Math.cos(angle)];
+  const out = m.slice();
+  for (const r of [0, 3, 6]) {
+    out[r + i] = m[r + i] * c + m[r + j] * s;
+    out[r + j] = m[r + j] * c - m[r + i] * s;
+  }
+  return out;
+}
+
+// joints: positions of the joints and, last, of the tip [m]; axes: of the joints, in the world; centres: of mass.
+export function chain(arm, q) {
+  let frame = [1, 0, 0, 0, 1, 0, 0, 0, 1], place = Array.from(arm.base);
+  const joints = [], axes = [], centres = [];
+  for (let j = 0; j < q.length; j++) {
+    const axis = column(frame, arm.axis[j]);
+    axes.push(axis);
+    if (arm.kind[j] === PRISMATIC) place = add(place, axis.map((v) => v * q[j]));
+    joints.push(place);
+    if (arm.kind[j] === REVOLUTE) frame = rotated(frame, arm.axis[j], q[j]);
+    centres.push(add(place, turned(frame, at(arm.com, j))));
+    place = add(place, turned(frame, at(arm.offset, j)));
+  }
+  return { joints: [...joints, place], axes, centres };
+}
+
+// Torques [N m], of sliding joints forces [N], that hold the arm up against gravity.
+export function holding(arm, posed) {
+  const { joints, axes, centres } = posed;
+  return axes.map((a, i) => {
+    if (arm.kind[i] > PRISMATIC) return 0;
+    let sum = 0;
+    for (let k = i; k < axes.length; k++) {
+      const [x, y] = [centres[k][0] - joints[i][0], centres[k][1] - joints[i][1]];
+      sum += arm.mass[k] * GRAVITY * (arm.kind[i] === REVOLUTE ? a[0] * y - a[1] * x : a[2]);
+    }
+    return sum;
+  });
+}
+
+export const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+export const length = (v) => Math.hypot(...v);
+export const linkLength = (arm, j) => length(at(arm.offset, j));

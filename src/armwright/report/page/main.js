@@ -1,0 +1,82 @@
+// Opens the page: with what it holds, or with what its server sends.
+
+import { drawArm, drawnJoints, growArm, openArm } from "./arm.js";
+import { Content, embedded } from "./content.js";
+import { drawCurve, openCurve } from "./curve.js";
+import { drawDesign, openDesign, postures } from "./design.js";
+import { drawConfiguration, drawHeader, openHeader } from "./header.js";
+import { fileFetcher, openLive } from "./live.js";
+import { growPareto, openPareto } from "./pareto.js";
+import { fromAddress, keepAddress, set, state } from "./state.js";
+import { drawTable, openTable } from "./table.js";
+import { drawTranscript, openTranscript } from "./transcript.js";
+import { $ } from "./words.js";
+
+const content = new Content();
+let isOpen = false;
+
+// The design to begin with: of the address, else the knee of the front, nearest to its best corner.
+function begin() {
+  const asked = fromAddress(content);
+  if (asked.design === undefined) asked.design = knee();
+  set(asked);
+}
+
+function knee() {
+  const { front, reference_point: reference } = content.head;
+  if (!front.length) return content.n ? 0 : null;
+  const scale = (i) => Array.from(content.values(i), (v, k) => (reference === null ? v : v / reference[k]));
+  const far = (i) => Math.hypot(...scale(i));
+  return front.reduce((best, i) => (far(i) < far(best) ? i : best));
+}
+
+function open() {
+  isOpen = true;
+  openHeader(content);
+  openCurve(content);
+  openDesign(content, fileFetcher(content));
+  openPareto(content);
+  openTable(content);
+  openTranscript(content);
+  keepAddress();
+  begin();
+  openArm(content);
+  drawConfiguration();
+  addEventListener("hashchange", () => set(fromAddress(content)));
+  $("loading").hidden = true;
+}
+
+// After more was added.
+function grow() {
+  drawHeader();
+  drawCurve();
+  growPareto();
+  drawTable();
+  drawTranscript();
+  drawDesign();
+  growArm();
+  drawConfiguration();
+}
+
+function take(buffer) {
+  content.add(buffer);
+  if (content.n === 0) return;
+  if (isOpen) grow();
+  else open();
+}
+
+async function start() {
+  const data = $("content");
+  try {
+    if (data) take(await embedded(data.textContent));
+    else openLive(content, take);
+  } catch (fault) {
+    $("loading").textContent = `This page cannot be shown: ${fault.message}`;
+    throw fault;
+  }
+  if (data && content.n === 0) $("loading").textContent = "The run has no finished design yet.";
+}
+
+// For whoever opens the console, and for tests.
+window.armwright = { content, state, set, postures, drawnJoints, drawArm };
+start();

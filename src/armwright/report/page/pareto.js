@@ -1,0 +1,192 @@
+// The designs in the plane of two objectives: who found them, their front, and which one is selected.
+
+import { listen, set, state } from "./state.js";
+import { $, colour, element, number, onTheme, plain, title } from "./words.js";
+
+const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
+const VIEW = 1.35; // of the reference point, the part of the plane that is shown first
+const PRECISE = 0.02; // of the reference point
+const FLOOR = 1e-4; // m; on a logarithmic axis smaller errors are drawn here
+const MARKS = [0.05, 0.35, 0.65, 1]; // of the iterations: 10, 70, 130, 200 of 200
+const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+
+let content = null;
+let x = 0, y = 1, log = false;
+
+export function openPareto(shownContent) {
+  content = shownContent;
+  if (content.objectives.length < 2) return;
+  $("front-box").hidden = false;
+  for (const [id, chosen] of [["x-axis", 0], ["y-axis", 1]]) {
+    content.objectives.forEach((o, k) => $(id).append(new Option(o.label, k, false, k === chosen)));
+    $(id).parentElement.hidden = content.objectives.length < 3;
+    $(id).addEventListener("change", () => {
+      [x, y] = [Number($("x-axis").value), Number($("y-axis").value)];
+      draw();
+    });
+  }
+  log = isPrecise();
+  $("log").checked = log;
+  $("log").addEventListener("change", () => { log = $("log").checked; draw(); });
+  $("iteration").addEventListener("input", () => {
+    const value = Number($("iteration").value);
+    set({ iteration: value >= Number($("iteration").max) ? null : value });
+  });
+  draw();
+  for (const id of ["ring-selected", "ring-compared"]) {
+    $("pareto").append(element("div", { class: "ring", id }));
+  }
+  $("ring-compared").style.borderColor = content.head.colours.target;
+  mark();
+  for (const event of ["plotly_relayout", "plotly_relayouting", "plotly_afterplot"]) $("pareto").on(event, mark);
+  $("pareto").on("plotly_click", ({ points }) => {
+    const hit = points.find((point) => point.customdata !== undefined);
+    if (hit) set({ design: hit.customdata });
+  });
+  listen((changed) => {
+    if (changed.has("iteration")) draw();
+    else if (changed.has("design") || changed.has("compared")) mark();
+  });
+  onTheme(draw);
+}
+
+export function growPareto() {
+  if (content.objectives.length > 1) draw();
+}
+
+// Whether the front comes so near to the targets that only a logarithmic axis tells its designs apart.
+function isPrecise() {
+  const reference = content.head.reference_point;
+  if (reference === null) return false;
+  const near = insideBox(content.head.front).filter((i) => content.values(i)[0] < PRECISE * reference[0]);
+  return near.length > content.head.front.length / 4;
+}
+
+const insideBox = (numbers) => numbers.filter((i) => content.values(i).every((v, k) => v < content.head.reference_point[k]));
+
+const isProposer = (source) => source === content.head.study?.proposer?.name;
+const counted = () => Math.max(0, content.n - content.head.n_init);
+const until = () => (state.iteration === null ? content.n : content.head.n_init + state.iteration);
+const placed = (value, axis) => (log && axis === 0 ? Math.max(value, FLOOR) : value);
+
+// Numbers of the non-dominated designs among the first n in the two objectives that are shown, by rising x.
+export function frontUntil(n) {
+  const order = [...Array(n).keys()].sort((a, b) => {
+    const [u, v] = [content.values(a), content.values(b)];
+    return u[x] - v[x] || u[y] - v[y] || a - b;
+  });
+  let least = Infinity;
+  return order.filter((i) => content.values(i)[y] < least && ((least = content.values(i)[y]), true));
+}
+
+function slider() {
+  const total = counted();
+  $("iterations").hidden = content.head.study === null || total < 2;
+  const range = $("iteration");
+  range.max = total;
+  range.value = state.iteration ?? total;
+  $("iteration-value").textContent = state.iteration ?? total;
+  const planned = content.head.planned - content.head.n_init;
+  const marks = MARKS.map((share) => Math.max(1, Math.round(share * planned))).filter((mark) => mark <= total);
+  $("marks").replaceChildren(...[...new Set(marks)].map((mark) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = mark;
+    button.title = `After ${mark} iterations`;
+    button.addEventListener("click", () => set({ iteration: mark >= total ? null : mark }));
+    return button;
+  }));
+}
+
+function draw() {
+  slider();
+  const n = until(), reference = content.head.reference_point, traces = [];
+  const front = frontUntil(n);
+  const inside = reference === null ? front
+    : front.filter((i) => content.values(i)[x] < reference[x] && content.values(i)[y] < reference[y]);
+  if (inside.length && reference !== null) {
+    const xs = [], ys = [];
+    inside.forEach((i, k) => {
+      const [u, v] = [placed(content.values(i)[x], 0), content.values(i)[y]];
+      xs.push(u, u);
+      ys.push(k ? content.values(inside[k - 1])[y] : reference[y], v);
+    });
+    xs.push(reference[x]);
+    ys.push(ys.at(-1));
+    traces.push({
+      x: [...xs, reference[x]], y: [...ys, reference[y]], mode: "none", fill: "toself", fillcolor: colour("area"),
+      hoverinfo: "skip", showlegend: false,
+    });
+    traces.push({
+      x: xs, y: ys, mode: "lines", line: { color: colour("ink"), width: 1.5 }, name: "Pareto front", hoverinfo: "skip",
+    });
+  }
+  const onFront = new Set(front);
+  for (const source of content.head.sources) {
+    const look = content.head.looks[source], rows = [];
+    for (let i = 0; i < n; i++) if (content.source(i) === source) rows.push(i);
+    if (!rows.length) continue;
+    traces.push({
+      x: rows.map((i) => placed(content.values(i)[x], 0)),
+      y: rows.map((i) => content.values(i)[y]),
+      customdata: rows,
+      text: rows.map((i) => plain(`#${i} ${content.joints(i)}`)),
+      hovertemplate: `%{text}<br>%{x:.4g}, %{y:.4g}<extra>${plain(look.label)}</extra>`,
+      mode: "markers",
+      name: plain(look.label),
+      marker: {
+        symbol: SYMBOLS[look.marker] ?? "circle", color: look.colour,
+        size: rows.map((i) => (onFront.has(i) ? 10 : isProposer(source) ? 9 : 7)),
+        opacity: rows.map((i) => (onFront.has(i) ? 1 : isProposer(source) ? 0.9 : 0.55)),
+        line: { width: look.marker === "x" ? 1.5 : 0.6, color: look.marker === "x" ? look.colour : colour("paper") },
+      },
+    });
+  }
+  if (reference !== null) {
+    traces.push({
+      x: [reference[x]], y: [reference[y]], mode: "markers", name: "reference point", hoverinfo: "name",
+      marker: { symbol: "cross-thin", size: 12, line: { width: 2, color: colour("ink") } },
+    });
+  }
+  const high = (k) => (reference === null ? undefined : VIEW * reference[k]);
+  const low = Math.max(FLOOR, Math.min(...inside.map((i) => content.values(i)[x]), high(x) ?? 1));
+  const layout = {
+    xaxis: axis(content.objectives[x], log ? [Math.log10(low / 1.5), Math.log10(high(x) ?? 10)] : high(x) && [0, high(x)], log),
+    yaxis: axis(content.objectives[y], high(y) && [0, high(y)], false),
+    margin: { l: 58, r: 12, t: 8, b: 46 },
+    legend: { orientation: "h", y: -64 / Math.max(100, $("pareto").clientHeight - 54), font: { size: 12 } },
+    paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
+    hovermode: "closest", uirevision: `${x} ${y} ${log}`, dragmode: "pan",
+  };
+  Plotly.react($("pareto"), traces, layout, CONFIG);
+  const outside = reference === null ? 0
+    : [...Array(n).keys()].filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
+  const notes = ["Click a design to see its arm."];
+  if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
+  if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
+  if (content.head.is_toy) notes.push("Toy masses: torques compare designs, and say nothing of motors.");
+  $("pareto-note").textContent = notes.join(" ");
+}
+
+function axis(objective, range, isLog) {
+  return {
+    title: { text: title(objective), standoff: 8 }, type: isLog ? "log" : "linear", range, gridcolor: colour("grid"),
+    zeroline: false, linecolor: colour("line"), showline: true,
+    ...(isLog ? { dtick: range[1] - range[0] > 2 ? 1 : "D2", exponentformat: "power" } : {}),
+  };
+}
+
+// The rings around the selected and the compared design lie on the plot, so that to move them draws nothing anew,
+// however many designs there are.
+function mark() {
+  const { xaxis, yaxis } = $("pareto")._fullLayout, [width, height] = [xaxis._length, yaxis._length];
+  for (const [id, i] of [["ring-selected", state.design], ["ring-compared", state.compared]]) {
+    const ring = $(id);
+    ring.hidden = i === null || i >= until();
+    if (ring.hidden) continue;
+    const values = content.values(i);
+    const [left, top] = [xaxis.d2p(placed(values[x], 0)), yaxis.d2p(values[y])];
+    ring.hidden = left < 0 || left > width || top < 0 || top > height;
+    ring.style.transform = `translate(${left + xaxis._offset}px, ${top + yaxis._offset}px)`;
+  }
+}

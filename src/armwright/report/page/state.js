@@ -1,0 +1,38 @@
+// What the user looks at, and who wants to know when it changes.
+
+const listeners = [];
+
+export const state = {
+  design: null, // number of the selected design
+  compared: null, // of one that stays in sight
+  target: 0,
+  iteration: null, // how far the Pareto plot shows; null: to the end
+};
+
+export function listen(told) {
+  listeners.push(told);
+}
+
+export function set(change) {
+  const before = { ...state };
+  Object.assign(state, change);
+  const changed = new Set(Object.keys(change).filter((key) => state[key] !== before[key]));
+  if (changed.size) for (const told of listeners) told(changed);
+}
+
+// The address says what is selected: #design=42&target=3, targets counted from 1.
+export function fromAddress(content) {
+  const said = new URLSearchParams(location.hash.slice(1)), found = {};
+  const design = Number.parseInt(said.get("design"), 10), target = Number.parseInt(said.get("target"), 10);
+  if (design >= 0 && design < content.n) found.design = design;
+  if (target >= 1 && target <= content.targets.length) found.target = target - 1;
+  return found;
+}
+
+export function keepAddress() {
+  listen((changed) => {
+    if ((changed.has("design") || changed.has("target")) && state.design !== null) {
+      history.replaceState(null, "", `#design=${state.design}&target=${state.target + 1}`);
+    }
+  });
+}

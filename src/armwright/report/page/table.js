@@ -1,0 +1,81 @@
+// The Pareto front as a table: sorted by any column, linked to what is selected.
+
+import { listen, set, state } from "./state.js";
+import { $, element, number } from "./words.js";
+
+let content = null;
+let sorted = { key: "0", up: true };
+
+export function openTable(shownContent) {
+  content = shownContent;
+  $("table-box").hidden = false;
+  drawTable();
+  listen((changed) => { if (changed.has("design")) mark(); });
+}
+
+function columns() {
+  const { head } = content;
+  const made = [
+    { key: "number", name: "#", value: (i) => i },
+    { key: "source", name: "source", text: true, value: (i) => content.look(i).label },
+    ...head.objectives.map((o, k) => ({
+      key: String(k), name: `${o.label} [${o.unit.replace(" x ", " × ")}]`, value: (i) => content.values(i)[k],
+    })),
+  ];
+  if (head.result.solid !== null) {
+    made.push({ key: "solid", name: "verdict", text: true, value: (i) => (content.isSolid(i) ? "solid" : "fragile") });
+  }
+  made.push({ key: "joints", name: "joints", text: true, value: (i) => content.joints(i) });
+  head.parameters.forEach((p, k) => {
+    if (!p.choices) made.push({ key: p.name, name: `${p.name.replace("_", " ")} [${p.unit}]`, value: (i) => content.params(i)[k].value });
+  });
+  return made;
+}
+
+export function drawTable() {
+  const all = columns(), by = all.find((column) => column.key === sorted.key) ?? all[0];
+  const rows = [...content.head.front].sort((a, b) => {
+    const [u, v] = [by.value(a), by.value(b)];
+    return (sorted.up ? 1 : -1) * (by.text ? String(u).localeCompare(String(v)) : u - v) || a - b;
+  });
+  const head = element("tr", {}, ...all.map((column) => {
+    const arrow = column === by ? (sorted.up ? " ▲" : " ▼") : "";
+    const sort = () => {
+      sorted = { key: column.key, up: column === by ? !sorted.up : true };
+      drawTable();
+      $("table").querySelectorAll("th button")[all.indexOf(column)].focus();
+    };
+    const order = column === by ? (sorted.up ? "ascending" : "descending") : null;
+    return element("th", { class: column.text ? "text" : "", scope: "col", "aria-sort": order },
+      element("button", { type: "button", onclick: sort }, column.name + arrow));
+  }));
+  const body = rows.map((i) => element("tr", { "data-design": i, tabindex: "0", onclick: () => set({ design: i }), onkeydown: step },
+    ...all.map((column) => {
+      const value = column.value(i);
+      return element("td", { class: column.text ? "text" : "" }, column.text || column.key === "number" ? String(value) : number(value));
+    })));
+  $("table").replaceChildren(element("thead", {}, head), element("tbody", {}, ...body));
+  $("table-title").textContent = `Pareto front: ${rows.length} design${rows.length === 1 ? "" : "s"}`;
+  mark();
+}
+
+function step(event) {
+  const row = event.currentTarget;
+  if (event.key === "Enter" || event.key === " ") set({ design: Number(row.dataset.design) });
+  else if (event.key === "ArrowDown" || event.key === "ArrowUp") {
+    const other = event.key === "ArrowDown" ? row.nextElementSibling : row.previousElementSibling;
+    if (other) {
+      other.focus();
+      set({ design: Number(other.dataset.design) });
+    }
+  } else return;
+  event.preventDefault();
+}
+
+function mark() {
+  for (const row of $("table").querySelectorAll("tbody tr")) {
+    const chosen = Number(row.dataset.design) === state.design;
+    row.classList.toggle("chosen", chosen);
+    row.setAttribute("aria-selected", chosen);
+  }
+}

@@ -1,0 +1,53 @@
+// What was asked and answered for the selected design, or for all.
+
+import { listen, state } from "./state.js";
+import { $, duration, element, number } from "./words.js";
+
+const STEPS = { reasoning: "thoughts", parameters: "thoughts into parameters", answer: "answer", check: "check" };
+const FAULTS = { true: "failed", false: "" };
+
+let content = null;
+
+export function openTranscript(shownContent) {
+  content = shownContent;
+  $("all-calls").addEventListener("change", drawTranscript);
+  listen((changed) => { if (changed.has("design")) drawTranscript(); });
+  drawTranscript();
+}
+
+export function drawTranscript() {
+  const all = $("all-calls").checked, proposed = Object.keys(content.proposals).length;
+  $("transcript-box").hidden = proposed === 0 && content.calls.length === 0;
+  $("all-calls").parentElement.hidden = content.calls.length === 0;
+  const calls = all ? content.calls : state.design === null ? [] : content.callsOf(state.design);
+  const parts = [];
+  if (!all) parts.push(element("p", {}, words()));
+  parts.push(...calls.map(told));
+  $("transcript").replaceChildren(...parts);
+}
+
+function words() {
+  const i = state.design, said = content.proposals[i];
+  if (i === null) return "Select a design.";
+  if (said?.refines !== null && said?.refines !== undefined) return `#${i} is design #${said.refines}, refined.`;
+  if (said?.fault) return `At #${i} a proposal was due and failed (${said.fault}); the black box took its place.`;
+  if (!said) return `#${i} is by ${content.look(i).label}; nobody gave words for it.`;
+  const expected = said.expected ? ` Expected: ${said.expected.map((value) => number(value)).join(", ")}.` : "";
+  return `#${i}, by ${content.look(i).label}: ${said.reason || "no reason was given"}.${expected}`.replace("..", ".");
+}
+
+function told(call) {
+  const cost = call.cost_usd ? `, ${number(call.cost_usd, 2)} USD` : "";
+  const head = [
+    `${call.proposal || "before the first trial"}, ${STEPS[call.step] ?? call.step}: ${call.model || call.origin}`,
+    call.origin === "model" ? "" : ` (${call.origin})`,
+    `, ${duration(call.seconds)}, ${call.input_tokens} tokens in, ${call.output_tokens} out${cost}`,
+    call.fault ? `; ${FAULTS[true]}: ${call.fault}` : "",
+  ].join("");
+  const made = element("div", { class: "call" }, element("strong", {}, head));
+  if (call.error) made.append(element("p", { class: "missed" }, call.error));
+  for (const [name, text, open] of [["Answer", call.answer, true], ["Prompt", call.prompt, false]]) {
+    if (text) made.append(element("details", { open }, element("summary", {}, name), element("pre", {}, text)));
+  }
+  return made;
+}

@@ -1,0 +1,68 @@
+"""The command that repeats a run, from its settings."""
+
+import re
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from armwright.run_folder import FrontMethod, Method, RunConfig
+from armwright.space import paper_space
+from armwright.task import builtin_names, load_task
+
+OWN_TASK, OWN_SPACE = "TASK.yaml", "SPACE.yaml"  # where they are files of the user's
+OF_PROPOSER = (
+    "model", "base_url", "prompt", "memory", "answer", "proposals", "temperature", "model_seed", "output",
+)  # fmt: skip
+USUAL = {
+    "sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200, "prompt": "plus", "memory": "none",
+    "answer": "two-step", "proposals": 1, "output": "auto",
+}  # fmt: skip
+
+
+def repeat_command(config: RunConfig) -> str:
+    """The command for a shell; what is as usual is left out.
+
+    A task or a space of the user's is named TASK.yaml or SPACE.yaml: both stand in the run's config.yaml. Objectives,
+    samplers and proposers that are code of the user's cannot be named: then it is empty.
+    """
+    name, task = config.task.name, config.task
+    builtin = name in builtin_names() or name.startswith("random-")
+    words = [name if builtin and load_task(name).targets == task.targets else OWN_TASK]
+    said: dict[str, Any] = {}
+    paper = paper_space(config.space.joints).model_dump(exclude={"name"})
+    if config.space.model_dump(exclude={"name"}) != paper or config.space.joints != paper_space().joints:
+        said["space"] = OWN_SPACE
+    if isinstance(config.method, FrontMethod):
+        begun = (config.method.begin_with or {}).get("run")
+        said["from"] = begun
+        command = "front"
+    else:
+        command = "optimize"
+        if not _is_known(config.method):
+            return ""
+        said |= _study_options(config.method)
+    given = {key: value for key, value in said.items() if value is not None and value != USUAL.get(key)}
+    options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
+    options += ["--robust"] * (config.tolerance > 0.0)
+    options += ["--overlap"] * ("in_flight" in given)
+    return shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])
+
+
+def _study_options(method: Method) -> dict[str, Any]:
+    proposer: Mapping[str, Any] = method.proposer or {"name": "none"}
+    return {
+        "proposer": proposer["name"],
+        **{key: proposer.get(key) for key in OF_PROPOSER},
+        "sampler": method.sampler,
+        "n_init": method.n_init,
+        "n_step": method.n_step,
+        "n_total": method.n_total,
+        "in_flight": method.in_flight,
+        "polish_every": method.polish_every,
+    }
+
+
+def _is_known(method: Method) -> bool:
+    """Whether the command line has names for its proposer and sampler."""
+    proposer = (method.proposer or {}).get("name", "none")
+    return proposer in ("none", "rules", "llm") and re.fullmatch("[a-z0-9-]+", method.sampler) is not None
