@@ -6,6 +6,7 @@ import numpy as np
 
 from armwright.evaluation import Evaluation
 from armwright.history import FinishedTrial, History
+from armwright.kinematics.arrays import arrays_of
 from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
 from armwright.pareto import default_reference_point
 from armwright.problem import Problem
@@ -31,11 +32,9 @@ class FixedProblem(Problem):
         mass = self.space.joints * self.space.mass.mass(self.space.link[1])
         lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
-        return Evaluation(targets, q, reached, np.linalg.norm(reached - targets, axis=-1), torques)
-
-
-class OneObjective(FixedProblem):
-    objectives = (POSITION_ERROR,)
+        arms = arrays_of(self.space, self.space.matrix(designs))
+        error = np.linalg.norm(reached - targets, axis=-1)
+        return Evaluation(arms, targets, self.task.payloads, q, reached, error, torques)
 
 
 LENGTH = Objective(
@@ -48,8 +47,8 @@ LENGTH = Objective(
 )
 
 
-class ThreeObjectives(FixedProblem):
-    objectives = (*PAPER_OBJECTIVES, LENGTH)
+ONE_OBJECTIVE = (POSITION_ERROR,)
+THREE_OBJECTIVES = (*PAPER_OBJECTIVES, LENGTH)
 
 
 def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Sequence[FinishedTrial] = ()) -> History:

@@ -29,8 +29,7 @@ from armwright.task import Task, builtin_tasks, load_task
 PROBLEM = Problem(load_task("target-1"))
 
 
-class OthersObjectives(Problem):
-    objectives = (POSITION_ERROR, dataclasses.replace(TORQUE, name="effort"))
+OTHERS = (POSITION_ERROR, dataclasses.replace(TORQUE, name="effort"))
 
 
 OPEN = Task(name="open", targets=((0.3, 0.0, 0.3), (0.2, 0.1, 0.4)))
@@ -302,7 +301,7 @@ def test_standing_beside_the_best_known() -> None:
         Problem(PROBLEM.task, paper_space(5)),
         Problem(PROBLEM.task, paper_space().model_copy(update={"link": (0.03, 0.31)})),
         Problem(PROBLEM.task, tolerance=1e-3),
-        OthersObjectives(PROBLEM.task),
+        Problem(PROBLEM.task, objectives=OTHERS),
     ],
 )
 def test_other_problems_have_no_best_known_front(problem: Problem) -> None:

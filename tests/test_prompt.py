@@ -35,12 +35,12 @@ from armwright.space import DesignSpace, MassPerLink, exact, paper_space
 from armwright.task import Task, load_task
 from tests.fixed import (
     ONE_JOINT,
+    ONE_OBJECTIVE,
     SIX_AXIS,
     SMALL,
+    THREE_OBJECTIVES,
     TWO_JOINTS,
     FixedProblem,
-    OneObjective,
-    ThreeObjectives,
     fixed_history,
     grid_task,
     proposal,
@@ -81,8 +81,8 @@ CASES: dict[str, Callable[[], str]] = {
     "text": lambda: rendered(fixed_history(PAPER), "minus", form="text"),
     "no-reference-point": lambda: rendered(fixed_history(FixedProblem(grid_task(3)), n=4), "minus"),
     "many-targets": lambda: rendered(fixed_history(FixedProblem(grid_task(200))), "minus"),
-    "one-objective": lambda: rendered(fixed_history(OneObjective(OPEN))),
-    "three-objectives": lambda: rendered(fixed_history(ThreeObjectives(OPEN))),
+    "one-objective": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=ONE_OBJECTIVE))),
+    "three-objectives": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES))),
     "one-target-one-joint": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
     "two-joints-two-designs": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
     "nothing-yet": lambda: rendered(fixed_history(PAPER, n=0), "minus"),
@@ -241,7 +241,7 @@ def test_five_others_are_shown_however_small_the_front(n_front: int, n_others: i
 
 
 def test_designs_are_drawn_by_the_seed_alone_and_each_once() -> None:
-    history = fixed_history(ThreeObjectives(OPEN), 120)
+    history = fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES), 120)
     draws = [Feedback(history, seed) for seed in (1, 1, 2)]
     assert (draws[0].front, draws[0].others) == (draws[1].front, draws[1].others)
     assert (draws[0].front, draws[0].others) != (draws[2].front, draws[2].others)

@@ -43,8 +43,11 @@ def test_the_python_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFi
     assert {"hypervolume.png", "front.png"} <= {path.name for path in aw.write_figures(Path("runs/mine"))}
 
 
-def test_the_space_file_of_the_readme_loads(in_folder: Path) -> None:
+def test_the_files_of_the_readme_load(in_folder: Path) -> None:
     readme = (Path(__file__).parents[1] / "README.md").read_text()
-    (text,) = re.findall(r"```yaml\n(.*?)```", readme, re.DOTALL)
-    (in_folder / "space.yaml").write_text(text)
+    task, space = re.findall(r"```yaml\n(.*?)```", readme, re.DOTALL)
+    (in_folder / "task.yaml").write_text(task)
+    problem = aw.Problem(aw.load_task("task.yaml"))
+    assert problem.evaluate(problem.space.sample(2, 0)).shape == (2, 3)
+    (in_folder / "space.yaml").write_text(space)
     assert aw.load_space("space.yaml").joints == 6

@@ -12,6 +12,7 @@ from importlib import resources
 import numpy as np
 
 from armwright.evaluation import Array
+from armwright.objectives import PAPER_OBJECTIVES
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem import Problem
 from armwright.space import Design, FloatParameter, paper_space
@@ -48,7 +49,8 @@ def known_front(problem: Problem) -> KnownFront | None:
     """The best known front of a problem: of a built-in task's targets in the paper's design space, else None."""
     paper = paper_space()
     same_space = problem.space.model_copy(update={"name": paper.name}) == paper
-    if not same_space or problem.tolerance or problem.objectives != Problem.objectives:
+    as_the_paper = problem.objectives == PAPER_OBJECTIVES and not problem.task.payloads.any()
+    if not same_space or problem.tolerance or not as_the_paper:
         return None
     own = problem.task.name
     for name in sorted(builtin_names(), key=lambda name: name != own):  # nearly always it is the first
@@ -95,5 +97,5 @@ def _read(task: str) -> KnownFront | None:
         space.design({p.name: float(row[p.name]) if p.name in real else row[p.name] for p in space.parameters})
         for row in rows
     ]
-    values = [[float(row[objective.name]) for objective in Problem.objectives] for row in rows]
+    values = [[float(row[objective.name]) for objective in PAPER_OBJECTIVES] for row in rows]
     return KnownFront(tuple(designs), np.array(values))

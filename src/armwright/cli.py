@@ -73,6 +73,9 @@ def options(
 TaskName = Annotated[str, typer.Argument(help="A built-in task (see `armwright tasks`) or a YAML file.")]
 SpaceFile = Annotated[Path | None, typer.Option(help="Design space as a YAML file; without it, the paper's.")]
 ModelName = Annotated[str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.")]
+Objectives = Annotated[
+    str | None, typer.Option(help="What is minimised, instead of the task's: names with commas, see docs/method.md, 3.")
+]
 Robust = Annotated[
     bool, typer.Option("--robust", help="Count a design by its worst case with the base or a link 1 mm off.")
 ]
@@ -87,6 +90,7 @@ BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compati
 def optimize(
     task: TaskName,
     space: SpaceFile = None,
+    objectives: Objectives = None,
     sampler: Annotated[
         str, typer.Option(help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.")
     ] = "tpe",
@@ -167,7 +171,7 @@ def optimize(
     from armwright.study import optimize as run_study
 
     words = view.stderr_console() if json_ else view.stdout_console()
-    problem = _problem(task, space, robust, device)
+    problem = _problem(task, space, robust, device, objectives=objectives)
     wishes = Wishes(
         proposer, model, base_url, prompt, memory, answer, proposals, temperature, model_seed, output, origin,
         max_calls, max_cost, replay_strict, once,
@@ -303,6 +307,7 @@ def front(
         str, typer.Option(help="What the search may spend: a time (5s, 2min, 1h), or evaluations (100000, 1e6).")
     ] = "5s",
     space: SpaceFile = None,
+    objectives: Objectives = None,
     from_: Annotated[
         Path | None, typer.Option("--from", help="A run folder, all of whose designs the search begins with.")
     ] = None,
@@ -327,7 +332,7 @@ def front(
     if from_ is not None and proposer is not None:
         raise SettingsError("--from and --proposer both give the first designs; choose one")
     words = view.stderr_console() if json_ else view.stdout_console()
-    problem = _problem(task, space, robust, device, many=True)
+    problem = _problem(task, space, robust, device, many=True, objectives=objectives)
     begin_with = from_
     if proposer is not None:
         choice = choose_proposer(proposer)
@@ -645,15 +650,30 @@ def _figures(folder: Path) -> list[Path]:
     return there or write_figures(folder)
 
 
-def _problem(task: str, space: Path | None, robust: bool = False, device: str = "cpu", many: bool = False) -> "Problem":
+def _problem(
+    task: str,
+    space: Path | None,
+    robust: bool = False,
+    device: str = "cpu",
+    many: bool = False,
+    objectives: str | None = None,
+) -> "Problem":
     from armwright.kinematics.devices import resolve_device
+    from armwright.objectives import PAPER_OBJECTIVES
     from armwright.problem import Problem
     from armwright.space import load_space, paper_space
     from armwright.task import load_task
     from armwright.tolerance import TOLERANCE
 
+    loaded = load_task(task)
+    if objectives is not None:
+        names = tuple(name.strip() for name in objectives.split(","))
+        if names != (
+            loaded.objectives or tuple(o.name for o in PAPER_OBJECTIVES)
+        ):  # a reference point is for other ones
+            loaded = loaded.model_copy(update={"objectives": names, "reference_point": None})
     return Problem(
-        load_task(task),
+        loaded,
         paper_space() if space is None else load_space(space),
         tolerance=TOLERANCE if robust else 0.0,
         device=resolve_device(device, many),

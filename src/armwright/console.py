@@ -19,7 +19,7 @@ from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
 from armwright.history import History
-from armwright.objectives import TORQUE_SCALE
+from armwright.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.polish import Polished
 from armwright.results import REPORT
 from armwright.study import Progress as StudyProgress
@@ -27,6 +27,7 @@ from armwright.study import Run
 from armwright.task import Task as DesignTask
 
 EVERY = 10  # counted trials between two plain lines
+SHORT = {POSITION_ERROR: "error [m]", TORQUE: "torque"}  # what the paper's objectives are called in narrow tables
 MOST_ROWS = 16  # of the front; front.csv has all
 
 
@@ -64,9 +65,9 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
     console.print(f"{summary['n_trials']} trials{more}: {sources}; {_seconds(summary['seconds'])}")
     _show_proposer(console, summary["proposer"])
-    console.print(
-        f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; {history.problem.space.mass_note}"
-    )
+    scaled = TORQUE in history.problem.objectives
+    words = f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; " if scaled else ""
+    console.print(f"{words}{history.problem.space.mass_note}{_payload_note(history.problem.task)}")
     _show_places(console, run.folder, figures)
 
 
@@ -235,6 +236,10 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
     reference = "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
     console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
+    if task.objectives is not None:
+        console.print(f"  objectives: {', '.join(task.objectives)}")
+    if task.payloads.any():
+        console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
     console.print(f"  reference point: {reference}")
     console.print(f"  provenance: {task.provenance}")
     if known is not None:
@@ -256,23 +261,32 @@ def stderr_console() -> Console:
     return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
+def _payload_note(task: DesignTask) -> str:
+    """What the tip carries; empty where that is nothing."""
+    payloads = task.payloads
+    if not payloads.any():
+        return ""
+    low, high = payloads.min(), payloads.max()
+    return f"; payload {low:g} kg" if low == high else f"; payloads {low:g} to {high:g} kg"
+
+
 def _front_table(history: History, solid: set[int] | None) -> Table:
     title = f"Pareto front of {history.problem.task.name}"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
     verdict = () if solid is None else ("verdict",)
-    for name in ("#", "source", *verdict, "error [m]", "torque", "base [m]", "joints", "links [m]"):
-        justify = "right" if name in ("#", "error [m]", "torque") else "left"
+    objectives = [SHORT.get(o, f"{o.label.lower()} [{o.unit}]") for o in history.problem.objectives]
+    for name in ("#", "source", *verdict, *objectives, "base [m]", "joints", "links [m]"):
+        justify = "right" if name in ("#", *objectives) else "left"
         table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
-    reference = history.reference_point or (float("inf"), float("inf"))
-    inside = [m for m in history.front if m.values[0] < reference[0] and m.values[1] < reference[1]] or history.front
+    reference = history.reference_point or (math.inf,) * len(objectives)
+    inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
     shown: list[int] = np.unique(np.linspace(0, len(inside) - 1, MOST_ROWS).round().astype(int)).tolist()
     for member in (inside[i] for i in shown):
         table.add_row(
             str(member.number),
             member.source,
             *(() if solid is None else ("solid" if member.number in solid else "fragile",)),
-            _value(member.values[0]),
-            _value(member.values[1]),
+            *map(_value, member.values),
             " ".join(f"{value:5.2f}" for value in member.design.origin),
             member.design.joints,
             " ".join(f"{value:.2f}" for value in member.design.links),

@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 class Evaluation:
     """N arms of J joints at T targets."""
 
+    arms: ArmArrays
     targets: Array  # (T, 3) [m]
+    payload: Array  # (T,) that the tip carries there [kg]
     q: Array  # (N, T, J) kept joint angles [rad]; 0 for a fixed joint
     reached: Array  # (N, T, 3) position of the tip [m]
     position_error: Array  # (N, T) distance from the target [m]
@@ -29,16 +31,20 @@ class Evaluation:
         return len(self.q)
 
 
-def evaluate(arms: Sequence[Arm], targets: ArrayLike, device: Device = "cpu") -> Evaluation:
+def evaluate(arms: Sequence[Arm], targets: ArrayLike, device: Device = "cpu", payload: ArrayLike = 0.0) -> Evaluation:
     """Every arm at every target. Not reaching a target is a result, never an exception.
 
-    targets: (T, 3) [m].
+    targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
     """
-    return evaluate_arrays(stack_arms(arms), targets, device)
+    return evaluate_arrays(stack_arms(arms), targets, device, payload=payload)
 
 
 def evaluate_arrays(
-    arrays: ArmArrays, targets: ArrayLike, device: Device = "cpu", start: ArrayLike | None = None
+    arrays: ArmArrays,
+    targets: ArrayLike,
+    device: Device = "cpu",
+    start: ArrayLike | None = None,
+    payload: ArrayLike = 0.0,
 ) -> Evaluation:
     """The same for arms that are stacked already, in their precision.
 
@@ -47,15 +53,26 @@ def evaluate_arrays(
     targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
-    postures = solve_postures(arrays, targets, start=start, precision=arrays.precision, device=device)
+    loads = _payloads(payload, len(targets))
+    postures = solve_postures(arrays, targets, start=start, payload=loads, precision=arrays.precision, device=device)
     reached = postures.reached.astype(np.float64)
     return Evaluation(
+        arms=arrays,
         targets=targets,
+        payload=loads,
         q=_of_all_joints(postures.q, arrays),
         reached=reached,
         position_error=np.linalg.norm(reached - targets, axis=-1),
         joint_torques=_of_all_joints(postures.torque, arrays),
     )
+
+
+def _payloads(payload: ArrayLike, t: int) -> Array:
+    """(T,) [kg]."""
+    loads = np.asarray(payload, dtype=np.float64)
+    if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
+        raise TaskError(f"payload must be one number >= 0 kg, or one for each of the {t} targets, not {payload}")
+    return np.broadcast_to(loads, (t,)).copy()
 
 
 def _of_all_joints(values: Floats, arrays: ArmArrays) -> Array:

@@ -1,13 +1,19 @@
 """Objectives: functions of an evaluation, all minimised."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from armwright.evaluation import Array, Evaluation
+from armwright.exceptions import SettingsError, did_you_mean
 
 TORQUE_SCALE = 40.0  # α of the paper
+REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
+MOST_OBJECTIVES = 5  # of which the hypervolume is still computed in no time
+
+Over = Literal["sum", "max", "mean square", "arm"]
 
 
 @dataclass(frozen=True)
@@ -15,8 +21,9 @@ class Objective:
     """A number per arm that should be small.
 
     symbol: its name in formulas and prompts.
-    words: what its share of one target is, for a reader who knows nothing of this program.
-    each: its share per target, (N, T); the objective is the sum over the targets.
+    words: what its share of one target is, for a reader who knows nothing of this program; of "arm", what it is.
+    each: its share per target, (N, T); of "arm" what the arm itself is, (N,), whatever the targets.
+    over: what is made of the shares: their sum, the largest, or the root of their mean square.
     """
 
     name: str
@@ -25,18 +32,33 @@ class Objective:
     symbol: str
     words: str
     each: Callable[[Evaluation], Array]
+    over: Over = "sum"
 
     def __call__(self, evaluation: Evaluation) -> Array:
         """One value per arm, (N,)."""
-        return self.each(evaluation).sum(axis=1)
+        each = self.each(evaluation)
+        match self.over:
+            case "sum":
+                return each.sum(axis=1)
+            case "max":
+                return each.max(axis=1)
+            case "mean square":
+                return np.sqrt(np.mean(each**2, axis=1))
+            case "arm":
+                return each
+
+    @property
+    def is_of_targets(self) -> bool:
+        """Whether each target has a share in it."""
+        return self.over != "arm"
 
 
 def _position_error(evaluation: Evaluation) -> Array:
     return evaluation.position_error
 
 
-def _torque(evaluation: Evaluation) -> Array:
-    return TORQUE_SCALE * np.linalg.norm(evaluation.joint_torques, axis=-1)
+def _torque_norm(evaluation: Evaluation) -> Array:
+    return np.linalg.norm(evaluation.joint_torques, axis=-1)
 
 
 POSITION_ERROR = Objective(
@@ -54,6 +76,77 @@ TORQUE = Objective(
     symbol="E_torque",
     words=f"{TORQUE_SCALE:g} times the Euclidean norm of the joint torques [N m] that hold the kept posture up against "
     "gravity",
-    each=_torque,
+    each=lambda evaluation: TORQUE_SCALE * _torque_norm(evaluation),
+)
+WORST_ERROR = Objective(
+    name="worst_error",
+    label="Worst position error",
+    unit="m",
+    symbol="E_worst",
+    words="the distance between the tip and the target in the kept posture",
+    each=_position_error,
+    over="max",
+)
+MISSED = Objective(
+    name="missed",
+    label="Targets missed",
+    unit="targets",
+    symbol="E_missed",
+    words=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
+    each=lambda evaluation: (evaluation.position_error >= REACHED).astype(np.float64),
+)
+PEAK_TORQUE = Objective(
+    name="peak_torque",
+    label="Peak torque",
+    unit="N m",
+    symbol="E_peak",
+    words="the largest of the joint torques' absolute values [N m] that hold the kept posture up against gravity",
+    each=lambda evaluation: np.abs(evaluation.joint_torques).max(axis=-1),
+    over="max",
+)
+RMS_TORQUE = Objective(
+    name="rms_torque",
+    label="RMS torque",
+    unit="N m",
+    symbol="E_rms",
+    words="the Euclidean norm of the joint torques [N m] that hold the kept posture up against gravity",
+    each=_torque_norm,
+    over="mean square",
+)
+MASS = Objective(
+    name="mass",
+    label="Mass",
+    unit="kg",
+    symbol="E_mass",
+    words="the mass of the arm without its payload",
+    each=lambda evaluation: evaluation.arms.mass.sum(axis=1, dtype=np.float64),
+    over="arm",
+)
+LENGTH = Objective(
+    name="length",
+    label="Length",
+    unit="m",
+    symbol="E_length",
+    words="the sum of the lengths of all links",
+    each=lambda evaluation: np.linalg.norm(evaluation.arms.offset.astype(np.float64), axis=-1).sum(axis=1),
+    over="arm",
 )
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
+OBJECTIVES: Mapping[str, Objective] = {
+    objective.name: objective
+    for objective in (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, MASS, LENGTH)
+}
+
+
+def named_objectives(names: Sequence[str]) -> tuple[Objective, ...]:
+    """The objectives of these names; SettingsError where one does not exist, or they are too many or named twice."""
+    for name in names:
+        if name not in OBJECTIVES:
+            raise SettingsError(
+                f'unknown objective "{name}".{did_you_mean(name, OBJECTIVES)} Objectives: {", ".join(OBJECTIVES)}'
+            )
+    if not 1 <= len(names) <= MOST_OBJECTIVES or len(set(names)) < len(names):
+        raise SettingsError(
+            f"objectives: {', '.join(names) or 'none'}; 1 to {MOST_OBJECTIVES} different ones are needed"
+        )
+    return tuple(OBJECTIVES[name] for name in names)

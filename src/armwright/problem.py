@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation, evaluate_arrays
 from armwright.exceptions import SettingsError, TaskError
-from armwright.kinematics.arrays import arrays_of
+from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.objectives import PAPER_OBJECTIVES, Objective
+from armwright.objectives import PAPER_OBJECTIVES, Objective, named_objectives
 from armwright.space import Design, DesignSpace, paper_space
 from armwright.task import Task
 from armwright.tolerance import moved
@@ -26,16 +25,20 @@ class Problem:
     tolerance: [m] of a workshop; above 0, a design counts by the worst that comes of it, in each objective, when it is
         built exactly or with its base or one link off by so much (`armwright.tolerance`).
     device: where arms are evaluated; `resolve_device` says which there are.
+    objectives: what is minimised, of one's own too; without them, the task's, else the paper's.
     """
 
     task: Task
     space: DesignSpace = field(default_factory=paper_space)
     tolerance: float = 0.0
     device: Device = "cpu"
-    objectives: ClassVar[tuple[Objective, ...]] = PAPER_OBJECTIVES
+    objectives: tuple[Objective, ...] = ()
 
     def __post_init__(self) -> None:
-        """Settles which device "auto" is; TaskError where the task's reference point is for other objectives."""
+        """Settles device and objectives; TaskError where the task's reference point is for other objectives."""
+        if not self.objectives:
+            names = self.task.objectives
+            object.__setattr__(self, "objectives", PAPER_OBJECTIVES if names is None else named_objectives(names))
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
         point, names = self.reference_point, [objective.name for objective in self.objectives]
@@ -58,7 +61,11 @@ class Problem:
 
     def evaluation(self, designs: Sequence[Design]) -> Evaluation:
         """The physics of N designs at all targets."""
-        return evaluate_arrays(arrays_of(self.space, self.space.matrix(designs)), self.task.points, self.device)
+        return self.evaluate_arrays(arrays_of(self.space, self.space.matrix(designs)))
+
+    def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
+        """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
+        return evaluate_arrays(arms, self.task.points, self.device, start, self.task.payloads)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
@@ -96,4 +103,4 @@ class Problem:
 
     def _as_built(self, rows: Array) -> Array:
         """(n, M) of designs as rows, each built exactly as it stands there."""
-        return self.values(evaluate_arrays(arrays_of(self.space, rows), self.task.points, self.device))
+        return self.values(self.evaluate_arrays(arrays_of(self.space, rows)))

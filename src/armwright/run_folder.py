@@ -32,7 +32,7 @@ from armwright.exceptions import DesignError, RunConflictError, RunFolderError
 from armwright.files import replace_file
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.devices import Device, usable_device
-from armwright.objectives import PAPER_OBJECTIVES, Objective
+from armwright.objectives import OBJECTIVES, PAPER_OBJECTIVES, Objective
 from armwright.problem import Problem
 from armwright.space import DesignSpace
 from armwright.task import Task
@@ -120,11 +120,8 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
 
         Objectives of one's own have their names and values here; to compute them again needs the problem itself.
         """
-        if self.objectives == record_objectives(PAPER_OBJECTIVES):
-            return Problem(self.task, self.space, self.tolerance, usable_device(self.device))
-        told = tuple(_told(objective) for objective in self.objectives)
-        recorded = cast("type[Problem]", type("RecordedProblem", (Problem,), {"objectives": told}))
-        return recorded(self.task, self.space, self.tolerance, usable_device(self.device))
+        objectives = tuple(map(_recorded, self.objectives))
+        return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives)
 
     @property
     def study(self) -> Method:
@@ -137,7 +134,12 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
         return self.method
 
 
-def _told(record: ObjectiveRecord) -> Objective:
+def _recorded(record: ObjectiveRecord) -> Objective:
+    """The objective of a record: ours by its name; of one that is none of ours, only what was written down."""
+    known = OBJECTIVES.get(record.name)
+    if known is not None and record_objectives((known,)) == (record,):
+        return known
+
     def each(evaluation: Evaluation) -> Array:
         raise RunFolderError(
             f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
@@ -463,7 +465,7 @@ def _brief(value: Any) -> str:
 def _identity(config: RunConfig) -> dict[str, Any]:
     """What makes a run this run and no other, flat."""
     content = config.model_dump(mode="json")
-    content["task"] = {key: content["task"][key] for key in ("name", "targets", "reference_point")}
+    content["task"] = {key: content["task"][key] for key in ("name", "targets", "payload", "reference_point")}
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)

@@ -20,6 +20,7 @@ from armwright.exceptions import TaskError, did_you_mean
 Point = tuple[float, float, float]
 
 LARGEST_COORDINATE = 1000.0  # [m]
+LARGEST_PAYLOAD = 1e4  # [kg]
 MOST_TARGETS = 10_000
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 _FOLDER = resources.files("armwright") / "tasks"
@@ -27,10 +28,16 @@ _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 
 
 class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from."""
+    """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from.
+
+    payload: what the tip carries at all targets, or at each [kg].
+    objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two.
+    """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     targets: tuple[Point, ...]
+    payload: float | tuple[float, ...] = 0.0
+    objectives: tuple[str, ...] | None = None
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
     description: str = Field(default="", max_length=10_000)
@@ -48,6 +55,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
                     f"target {number} = {list(point)} m is more than {LARGEST_COORDINATE:g} m away; "
                     "coordinates are in metres (armwright init --from FILE --unit mm converts)"
                 )
+        payloads = self.payload if isinstance(self.payload, tuple) else (self.payload,)
+        if isinstance(self.payload, tuple) and len(self.payload) != len(self.targets):
+            raise ValueError(f"payload has {len(self.payload)} values for {len(self.targets)} targets; give one or all")
+        if not all(0.0 <= kg <= LARGEST_PAYLOAD for kg in payloads):
+            raise ValueError(f"payload = {self.payload} kg is outside 0 <= payload <= {LARGEST_PAYLOAD:g} kg")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
             raise ValueError(f"reference_point = {list(self.reference_point)} must be above 0 in each objective")
         return self
@@ -56,6 +68,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def points(self) -> np.ndarray:
         """The targets as an array (T, 3) [m]."""
         return np.array(self.targets, dtype=np.float64)
+
+    @property
+    def payloads(self) -> np.ndarray:
+        """What the tip carries at each target, (T,) [kg]."""
+        return np.broadcast_to(np.array(self.payload, dtype=np.float64), (len(self.targets),)).copy()
 
 
 def builtin_names() -> list[str]:
@@ -159,9 +176,16 @@ name: {json.dumps(_safe_name(file.stem))}    # names the run folder: letters, di
 targets:
 {rows}
 
+# What the tip carries: at every target, or a list with a value for each [kg].
+# payload: 0.5
+
+# What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
+# rms_torque, mass, length.
+# objectives: [worst_error, peak_torque, mass]
+
 # Worst values that still count, for the hypervolume: [position error summed over the targets in m,
-# torque summed over the targets in N m, times 40]. Without it, 1.1 x the worst non-dominated values of the
-# first random trials is taken and kept for the run.
+# torque summed over the targets in N m, times 40], or one for each of the objectives. Without it, 1.1 x the worst
+# non-dominated values of the first random trials is taken and kept for the run.
 # reference_point: [5.0, 5.0]
 
 # description: What the arm has to do there.

@@ -189,7 +189,8 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     ):
         """Inverse kinematics of an arm at a group of targets.
 
-        targets: (G, 3) [m].  q_last: (N, G, D), the start's angles, then those after the last update [rad].
+        targets: (G, 4) [m], last the payload [kg], which is not read.
+        q_last: (N, G, D), the start's angles, then those after the last update [rad].
         h_last: (N, G, D), the limit gradients H before the first, then of the last update.
         q_kept: (N, G, D), the angles nearest to the target of all but the last.
 
@@ -339,7 +340,8 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     ):
         """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
 
-        targets: (G, 3) [m].  q_last, q_kept: (N, G, D) [rad].  reached: (N, G, 3) [m].
+        targets: (G, 4) [m], last the payload at the tip [kg].  q_last, q_kept: (N, G, D) [rad].
+        reached: (N, G, 3) [m].
         torque: (N, G, D), +dV/dq [N m].
         """
         arm, group = wp.tid()
@@ -378,15 +380,16 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
             px += offset[0] * xx + offset[1] * yx + offset[2] * zx
             py += offset[0] * xy + offset[1] * yy + offset[2] * zy
 
-        mass_beyond = real(0.0)
-        beyond_x, beyond_y = Lane(), Lane()  # and its mass times position
+        mass_beyond = targets[group, 3]
+        beyond_x = wp.cw_mul(mass_beyond, px)  # its mass times position
+        beyond_y = wp.cw_mul(mass_beyond, py)
         for step in range(arms.dof):
             j = arms.dof - 1 - step
-            mass_beyond += arms.mass[arm, j]
+            mass_beyond += Lane(arms.mass[arm, j])
             beyond_x += mx[j]
             beyond_y += my[j]
-            lever_x = beyond_x - mass_beyond * ox[j]
-            lever_y = beyond_y - mass_beyond * oy[j]
+            lever_x = beyond_x - wp.cw_mul(mass_beyond, ox[j])
+            lever_y = beyond_y - wp.cw_mul(mass_beyond, oy[j])
             torque[arm, group, j] = gravity * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x))
 
     return Kernels(lanes, Lane, Arms, descend, hold)

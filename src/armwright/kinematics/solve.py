@@ -45,6 +45,7 @@ def solve_postures(
     updates: int = UPDATES,
     *,
     start: ArrayLike | None = None,
+    payload: NDArray[np.float64] | None = None,
     precision: Precision = "float32",
     device: Device = "cpu",
 ) -> Postures:
@@ -53,6 +54,7 @@ def solve_postures(
     targets: (T, 3) [m]; how many is a question of memory alone.
     start: angles [rad] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without it
     all arms start straight, at 0.
+    payload: (T,) point masses that the tip carries at the targets [kg]; without it none.
     precision: of the results. "float64" takes arms of either precision, "float32" only its own.
     The same arm, target and start give the same bits on the same device, whatever is solved beside them.
     """
@@ -62,6 +64,7 @@ def solve_postures(
     device = resolve_device(device, many=True)
     n, t, dof = len(arms), len(targets), arms.dof
     starts = None if start is None else _broadcast(start, (n, t, dof))
+    loaded = np.column_stack([targets, np.zeros(t) if payload is None else payload])
     solved = Postures(*(np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof)))
     parts = _parts(n, t, LANES[device])
 
@@ -69,7 +72,7 @@ def solve_postures(
         chunk = arms[rows]
         for some, lanes in parts:
             begin = None if starts is None else starts[rows, some]
-            q, reached, torque = _solve(chunk, targets[some], updates, begin, lanes, device)
+            q, reached, torque = _solve(chunk, loaded[some], updates, begin, lanes, device)
             solved.q[rows, some], solved.reached[rows, some], solved.torque[rows, some] = q, reached, torque
 
     groups = -(-t // LANES[device])
@@ -92,7 +95,7 @@ def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_befo
     wp, kernels = load(arms.precision, lanes, "cpu")
     at, q_last, h_last = (
         wp.array(_in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
-        for values in (np.zeros((1, 1, 3)), q[:, None], h_before[:, None])
+        for values in (np.zeros((1, 1, 4)), q[:, None], h_before[:, None])
     )
     _launch(moved, at[0], 1, q_last, h_last, wp, kernels)
     return _from_lanes(q_last.numpy())[:, 0], _from_lanes(h_last.numpy())[:, 0]
@@ -115,7 +118,10 @@ def _solve(
     lanes: int,
     device: Device,
 ) -> list[NDArray[Any]]:
-    """Kept angles, reached points and torques of a chunk of arms, (N, T, ...)."""
+    """Kept angles, reached points and torques of a chunk of arms, (N, T, ...).
+
+    targets: (T, 4), the payload last.
+    """
     at = _in_lanes(targets[None], lanes)[0]
     begin = None
     if start is not None:
@@ -196,7 +202,7 @@ def _bytes_of_one(arms: ArmArrays, groups: int, lanes: int) -> int:
 def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, wp: Any, kernels: Any) -> list[Any]:
     """Kept angles, reached points and torques, (N, G, ...) in lanes, on the device of the other arrays.
 
-    at: (G, 3) targets in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
+    at: (G, 4) targets and payloads in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
     """
     device, dim = q_last.device, (len(arms), len(at))
     on_device = _on_device(arms, wp, kernels, device)

@@ -30,19 +30,24 @@ class Digits:
     length: int
     torque: int
     objectives: tuple[int, ...]
+    shares: tuple[int, ...]  # of those objectives of which each target has a share
 
     @classmethod
     def of(cls, history: History) -> "Digits":
         """By the space's longest arm, and by the largest objectives so far."""
         space = history.problem.space
         reach = space.joints * space.link[1]
-        heaviest = GRAVITY * reach * space.joints * space.mass.mass(space.link[1])  # [N m], more than any torque
+        weight = space.joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
+        heaviest = GRAVITY * reach * weight  # [N m], more than any torque
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres
+        objectives = tuple(max(3, _decimals(v)) for v in rough)
+        with_shares = [objective.is_of_targets for objective in history.problem.objectives]
         return cls(
             max(3, _decimals(space.link[1])),
             max(2, _decimals(heaviest / 2)),
-            tuple(max(3, _decimals(v)) for v in rough),
+            objectives,
+            tuple(decimals for decimals, shared in zip(objectives, with_shares, strict=True) if shared),
         )
 
 
@@ -64,8 +69,9 @@ class Feedback:
         numbers = [*self.front, *self.others]
         if numbers:
             self._evaluation = history.evaluation(numbers)
-            objectives = history.problem.objectives
-            self._each = np.stack([objective.each(self._evaluation) for objective in objectives], axis=-1)  # (n, T, M)
+            shares = [o.each(self._evaluation) for o in history.problem.objectives if o.is_of_targets]
+            shape = (*self._evaluation.position_error.shape, 0)
+            self._each = np.stack(shares, axis=-1) if shares else np.empty(shape)  # (n, T, those that have shares)
 
     def records(self, numbers: Sequence[int], targets: Sequence[int]) -> list[Record]:
         """For each of these designs its parameters, and what came of it at `targets` (places in the task's list)."""
@@ -76,7 +82,7 @@ class Feedback:
         evaluation, at = self._evaluation, self.digits
         return {
             **_parameters(self._history, number, at.length),
-            "e_each": points(self._each[row, shown], at.objectives),
+            "e_each": points(self._each[row, shown], at.shares) if at.shares else "",
             "p_ik": points(evaluation.reached[row, shown], at.length),
             "tau_ik": points(evaluation.joint_torques[row, shown], at.torque),
             "limits": _limits(self._history, evaluation, row),

@@ -22,6 +22,7 @@ from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.problem import Problem
 from armwright.space import JOINT_WORDS
+from armwright.task import Task
 
 PROMPTS = ("plus", "minus")
 Memory = Literal["none", "own"]
@@ -43,12 +44,13 @@ VARIABLES = {
     "task": "the task: name, and more",
     "description": "what the task says of itself, on one line",
     "targets": "the target points as text; n_targets_shown of n_targets",
+    "payload": "what the tip carries at the targets, as text; empty for nothing",
     "n_targets": "how many targets the task has",
     "n_targets_shown": "how many of them are listed",
     "target_low": "the least x, y and z of all targets",
     "target_high": "the largest x, y and z of all targets",
     "updates": "updates of the inverse kinematics",
-    "objectives": "what is minimised, each with symbol, label, unit, words",
+    "objectives": "what is minimised, each with symbol, label, unit, words, over (sum, max, mean square or arm)",
     "tolerance": "[m] by which base and links may be off, the worst case of which counts; 0: designs as they stand",
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
@@ -234,6 +236,7 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "gravity": GRAVITY,
         "task": problem.task,
         "description": one_line(problem.task.description, LONGEST_DESCRIPTION),
+        "payload": _payload_words(problem.task),
         "n_targets": len(problem.task.points),
         "updates": UPDATES,
         "objectives": problem.objectives,
@@ -250,6 +253,19 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
 def _lines(hints: Sequence[str]) -> list[str]:
     """Each hint on one line; one in which nothing is to be seen is left out."""
     return [line for hint in hints if (line := one_line(hint, LONGEST_HINT))]
+
+
+def _payload_words(task: Task) -> str:
+    """What the tip carries; empty where that is nothing."""
+    payloads = task.payloads
+    if not payloads.any():
+        return ""
+    if np.ptp(payloads) == 0.0:
+        return f"At every target the tip carries a payload of {payloads[0]:g} kg, a point mass."
+    shown = spread(len(payloads), MOST_TARGETS)
+    each = "each" if len(shown) == len(payloads) else "some of"
+    listed = ", ".join(f"{payloads[i]:g}" for i in shown)
+    return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
 
 
 def _shown(

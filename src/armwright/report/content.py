@@ -170,6 +170,7 @@ def _about(config: RunConfig, folder: Path, history: History) -> dict[str, Any]:
         "folder": folder.resolve().name,
         "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
         "targets": [list(target) for target in task.targets],
+        "payloads": task.payloads.tolist(),
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
         "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,

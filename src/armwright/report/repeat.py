@@ -29,6 +29,8 @@ def repeat_command(config: RunConfig) -> str:
     builtin = name in builtin_names() or name.startswith("random-")
     words = [name if builtin and load_task(name).targets == task.targets else OWN_TASK]
     said: dict[str, Any] = {}
+    if task.objectives != (load_task(name).objectives if words[0] == name else task.objectives):
+        said["objectives"] = ",".join(task.objectives or ())
     paper = paper_space(config.space.joints).model_dump(exclude={"name"})
     if config.space.model_dump(exclude={"name"}) != paper or config.space.joints != paper_space().joints:
         said["space"] = OWN_SPACE

@@ -31,7 +31,7 @@ export function postures(i) {
   const arm = content.arm(i);
   return content.targets.map((target, t) => {
     const q = content.q(i, t), posed = chain(arm, q);
-    return { target, q, ...posed, error: distance(posed.joints.at(-1), target), torques: holding(arm, posed) };
+    return { target, q, ...posed, error: distance(posed.joints.at(-1), target), torques: holding(arm, posed, content.head.payloads[t]) };
   });
 }
 
@@ -61,7 +61,8 @@ export function drawDesign() {
     button.title = button.disabled ? "Files are kept for the designs of the front" : `Download #${i} as ${button.textContent}`;
   }
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
-  $("design-note").textContent = `Angles q in rad; underlined: at a joint's limit. Torques hold the posture against gravity.${scale} ${head.masses}.`;
+  const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
+  $("design-note").textContent = `Angles q in rad; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.`;
 }
 
 function drawLinks(arm) {

@@ -35,15 +35,16 @@ export function chain(arm, q) {
   return { joints: [...joints, place], axes, centres };
 }
 
-// Torques [N m], of sliding joints forces [N], that hold the arm up against gravity.
-export function holding(arm, posed) {
-  const { joints, axes, centres } = posed;
+// Torques [N m], of sliding joints forces [N], that hold the arm and its payload [kg] up against gravity.
+export function holding(arm, posed, payload) {
+  const { joints, axes } = posed, tip = joints.at(-1);
+  const loads = [...posed.centres.map((place, k) => [arm.mass[k], place]), [payload, tip]];
   return axes.map((a, i) => {
     if (arm.kind[i] > PRISMATIC) return 0;
     let sum = 0;
-    for (let k = i; k < axes.length; k++) {
-      const [x, y] = [centres[k][0] - joints[i][0], centres[k][1] - joints[i][1]];
-      sum += arm.mass[k] * GRAVITY * (arm.kind[i] === REVOLUTE ? a[0] * y - a[1] * x : a[2]);
+    for (const [mass, place] of loads.slice(i)) {
+      const [x, y] = [place[0] - joints[i][0], place[1] - joints[i][1]];
+      sum += mass * GRAVITY * (arm.kind[i] === REVOLUTE ? a[0] * y - a[1] * x : a[2]);
     }
     return sum;
   });
