@@ -486,6 +486,59 @@ def runs(
         view.show_runs(view.stdout_console(), listed)
 
 
+@app.command(name="pick")
+def pick_(
+    run: Annotated[Path, typer.Argument(help="A run folder.")],
+    where: Annotated[
+        list[str] | None, typer.Option(help='A condition such as "position_error<=0.05" (may be repeated).')
+    ] = None,
+    by: Annotated[str | None, typer.Option(help="The number that should be small: torque, mass, link_1, …")] = None,
+    weights: Annotated[
+        str | None,
+        typer.Option(help="Of the objectives, each as a share of its reference point: position_error=2,torque=1."),
+    ] = None,
+    solid: Annotated[bool, typer.Option("--solid", help="Only designs that hold when built 1 mm off.")] = False,
+    most: Annotated[int, typer.Option("-n", help="So many designs, the best first.")] = 1,
+    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """Choose a design of RUN's front: by conditions, by one number or weights; else the knee of the front."""
+    from armwright import console as view
+    from armwright.decision import numbers_of, pick_from, read_condition, read_weights
+
+    if most < 1:
+        raise SettingsError(f"-n {most}: a whole number from 1 is needed")
+    conditions = [read_condition(words) for words in where or ()]
+    weighed = None if weights is None else read_weights(weights)
+    history, picked = pick_from(run, conditions, by, weighed, solid)
+    if json_:
+        _print_json(
+            [
+                {"number": m.number, "source": m.source, "joints": m.design.joints, **numbers_of(history, m)}
+                for m in picked[:most]
+            ]
+        )
+        return
+    view.show_picked(view.stdout_console(), run, history, picked, most)
+
+
+@app.command()
+def export(
+    run: Annotated[Path, typer.Argument(help="A run folder.")],
+    design: Annotated[int | None, typer.Option(help="Its number; without it, the knee of the front.")] = None,
+    format_: Annotated[str, typer.Option("--format", help="urdf, mjcf, sheet (Markdown) or sheet-csv.")] = "urdf",
+    out: Annotated[Path | None, typer.Option(help="File; without it, to stdout.")] = None,
+) -> None:
+    """Write one design of RUN for a simulator or a workshop. Any design of the run, not only those of the front."""
+    from armwright.exporting import export_design
+
+    text = export_design(run, design, format_)
+    if out is None:
+        print(text, end="")
+        return
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(text, encoding="utf-8")
+
+
 @app.command()
 def report(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],

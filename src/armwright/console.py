@@ -1,6 +1,7 @@
 """What the command line shows: progress while a study runs, and its result."""
 
 import math
+import shlex
 import time
 from collections import Counter
 from collections.abc import Callable, Generator, Sequence
@@ -18,7 +19,7 @@ from armwright.baselines import Baseline, baselines, baselines_of
 from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
-from armwright.history import History
+from armwright.history import FrontMember, History
 from armwright.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.polish import Polished
 from armwright.results import REPORT
@@ -207,6 +208,22 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
             Text(str(run["state"])),
         )
     console.print(table)
+
+
+def show_picked(console: Console, run: Path, history: History, picked: Sequence[FrontMember], most: int) -> None:
+    """The chosen designs, and how to get their files."""
+    console.print(f"{len(picked)} of the front's {len(history.front)} designs meet the conditions")
+    for member in picked[:most]:
+        values = ", ".join(
+            f"{o.label.lower()} {value:.4g} {o.unit}"
+            for o, value in zip(history.problem.objectives, member.values, strict=True)
+        )
+        links = ", ".join(f"{length:.3f}" for length in member.design.links)
+        base = ", ".join(f"{value:.3f}" for value in member.design.origin)
+        console.print(Text(f"#{member.number}", style="bold") + Text(f" ({member.source}): {values}"))
+        console.print(f"  joints {member.design.joints}, links {links} m, base ({base}) m")
+    first = picked[0].number
+    console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet")
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:

@@ -1,0 +1,59 @@
+"""A design of a run as a file for a simulator or a workshop."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+from armwright.decision import pick
+from armwright.exceptions import SettingsError, did_you_mean
+from armwright.export.mjcf import to_mjcf
+from armwright.export.sheet import SheetRow, sheet_markdown, sheet_rows
+from armwright.export.urdf import to_urdf
+from armwright.history import FrontMember, History
+from armwright.results import as_csv
+from armwright.run_folder import read_run
+
+
+def export_design(run: Path, number: int | None, kind: str) -> str:
+    """The design with this number of a run, in a format; without a number, the knee of its front."""
+    if kind not in FORMATS:
+        raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, FORMATS)} Formats: {", ".join(FORMATS)}')
+    _, history = read_run(run)
+    if number is not None and not 0 <= number < len(history):
+        raise SettingsError(f"--design {number}: {run} has the designs 0 to {len(history) - 1}")
+    member = pick(history)[0] if number is None else history.member(number)
+    return FORMATS[kind](history, member)
+
+
+def _name(history: History, member: FrontMember) -> str:
+    return f"{history.problem.task.name}-{member.number}"
+
+
+def _rows(history: History, member: FrontMember) -> list[SheetRow]:
+    evaluation = history.evaluation([member.number])
+    return sheet_rows(member.arm, evaluation.q[0], evaluation.joint_torques[0])
+
+
+def _sheet(history: History, member: FrontMember) -> str:
+    task, space = history.problem.task, history.problem.space
+    notes = [f"Masses: {space.mass_note}."]
+    if task.payloads.any():
+        notes.append(f"Torques with the payload of {task.payloads.max():g} kg at most; of the arm alone they are less.")
+    missed = history.evaluation([member.number]).position_error[0]
+    notes.append(f"Targets are missed by {1e3 * missed.max():.2f} mm at most.")
+    return sheet_markdown(_name(history, member), member.arm, _rows(history, member), notes)
+
+
+def _sheet_csv(history: History, member: FrontMember) -> str:
+    rows = [asdict(row) for row in _rows(history, member)]
+    for row in rows:
+        row["used_low"], row["used_high"] = row.pop("used")
+    return as_csv(rows)
+
+
+FORMATS: dict[str, Callable[[History, FrontMember], str]] = {
+    "urdf": lambda history, member: to_urdf(member.arm, _name(history, member)),
+    "mjcf": lambda history, member: to_mjcf(member.arm, _name(history, member)),
+    "sheet": _sheet,
+    "sheet-csv": _sheet_csv,
+}
