@@ -81,6 +81,35 @@ def test_it_opens_without_a_network_and_asks_for_nothing(run: Path, tab: Tab) ->
     assert tab.text("#repeat code") == "armwright optimize target-2 --proposer rules --n-total 40 --seed 1"
 
 
+def test_nothing_on_it_sends_the_run_anywhere(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    names = tab.page.locator("[data-title], [aria-label], button").evaluate_all(
+        "all => all.map((one) => "
+        "`${one.dataset.title ?? ''} ${one.getAttribute('aria-label') ?? ''} ${one.textContent}`)"
+    )
+    assert len(names) > 20
+    assert not [name for name in names if re.search("share|cloud|upload|edit in", name, re.IGNORECASE)]
+
+
+def test_playing_goes_on_whatever_is_selected(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html", "#design=12&target=1")
+    tab.page.locator("#play").click()
+    tab.ask("armwright.set({ design: 20 })")
+    for target in (3, 4):
+        tab.page.get_by_text(f"Target {target} of 9").wait_for()
+    tab.page.locator("#play").click()
+
+
+def test_a_front_beyond_the_reference_box_is_seen(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-1").model_copy(update={"name": "far", "reference_point": (0.01, 0.01)})
+    aw.optimize(aw.Problem(task=task), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    high = tab.ask("[pareto.layout.xaxis.range[1], pareto.layout.yaxis.range[1]]")
+    front = tab.ask("armwright.content.head.front.map((i) => Array.from(armwright.content.values(i)))")
+    assert all(x < high[0] and y < high[1] for x, y in front)
+    assert tab.text("#repeat code").startswith("armwright optimize TASK.yaml ")
+
+
 def test_its_policy_names_its_own_scripts_alone(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html")
     text = (run / "report.html").read_text()
@@ -197,7 +226,7 @@ def test_the_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: H
     first.focus()
     tab.page.keyboard.press("ArrowDown")
     assert tab.ask("armwright.state.design") == int(second.get_attribute("data-design"))
-    assert second.get_attribute("aria-selected") == "true"
+    assert second.get_attribute("aria-current") == "true"
     solid = set(json.loads((run / "summary.json").read_text())["verification"]["solid_numbers"])
     for row in tab.page.locator("#table tbody tr").all():
         verdict = "solid" if int(row.get_attribute("data-design")) in solid else "fragile"
@@ -259,7 +288,7 @@ def test_a_search_for_the_whole_front(tmp_path: Path, tab: Tab) -> None:
     assert "3,000" in tab.text("#facts")
     assert tab.page.locator("#iterations").is_hidden()
     assert tab.page.locator("#table tbody tr").count() == len(run.front)
-    assert tab.text("#repeat code") == "armwright front target-3 --seed 0"
+    assert tab.text("#repeat code") == "armwright front target-3 --budget 3000 --seed 0"
     assert tab.faults == []
 
 

@@ -15,16 +15,38 @@ GRAVITY = 9.81  # [m/s²] along -z
 
 
 @dataclass(frozen=True, slots=True)
+class Actuator:
+    """What turns a joint. It sits there and is carried by the link before.
+
+    mass: [kg]. effort: the torque [N m] or force [N] that may be asked of it. speed: the largest [rad/s] or [m/s], and
+    price: [USD]; None where not known.
+    """
+
+    name: str
+    mass: float
+    effort: float
+    speed: float | None = None
+    price: float | None = None
+
+    def __post_init__(self) -> None:
+        said = [self.mass, self.effort, self.speed or 1.0, self.price or 0.0]
+        if not all(math.isfinite(v) for v in said) or min(self.mass, self.price or 0.0) < 0.0 or self.effort <= 0.0:
+            raise ArmError(f"an actuator needs mass >= 0 kg, effort > 0 and price >= 0, all finite: {self}")
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
     """One joint about (revolute) or along (prismatic) a local axis.
 
     lower, upper: the limits [rad] or [m]; a fixed joint has none and does not move.
+    actuator: what turns it; None where that is not chosen.
     """
 
     kind: JointKind
     axis: Axis
     lower: float = 0.0
     upper: float = 0.0
+    actuator: Actuator | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(JointKind):
@@ -46,19 +68,38 @@ class Link:
 
     offset: from this joint to the next, or to the tip of the arm [m].
     mass: [kg].  com: centre of mass from this joint [m].  radius: of its round section [m].
+    end_mass: of a point at its end that it carries, too, such as the next joint's actuator [kg].
     """
 
     offset: Vector
     mass: float
     com: Vector
     radius: float
+    end_mass: float = 0.0
 
     def __post_init__(self) -> None:
-        values = (*self.offset, *self.com, self.mass, self.radius)
+        values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass)
         if not all(math.isfinite(v) for v in values):
             raise ArmError(f"a link's numbers must be finite: {self}")
-        if self.mass < 0.0 or self.radius <= 0.0:
+        if min(self.mass, self.end_mass) < 0.0 or self.radius <= 0.0:
             raise ArmError(f"a link needs mass >= 0 kg and radius > 0 m, not {self.mass} kg and {self.radius} m")
+
+    @property
+    def total_mass(self) -> float:
+        """With what sits at its end [kg]."""
+        return self.mass + self.end_mass
+
+    @property
+    def total_com(self) -> Vector:
+        """The centre of that mass from this joint [m]."""
+        if self.end_mass == 0.0:
+            return self.com
+        (x, y, z), (u, v, w), total = self.com, self.offset, self.total_mass
+        return (
+            (self.mass * x + self.end_mass * u) / total,
+            (self.mass * y + self.end_mass * v) / total,
+            (self.mass * z + self.end_mass * w) / total,
+        )
 
     @property
     def length(self) -> float:

@@ -659,6 +659,19 @@ def tasks(
 
 
 @app.command()
+def actuators(json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> None:
+    """List the actuators of the catalogue, which a space file may name."""
+    from armwright import console as view
+    from armwright.catalogue import catalogue
+
+    records = list(catalogue().values())
+    if json_:
+        _print_json([record.model_dump(exclude_none=True) for record in records])
+    else:
+        view.show_actuators(view.stdout_console(), records)
+
+
+@app.command()
 def init(
     file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
     points: Annotated[

@@ -16,6 +16,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from armwright.baselines import Baseline, baselines, baselines_of
+from armwright.catalogue import ActuatorRecord
 from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
@@ -245,6 +246,21 @@ def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
     )
 
 
+def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
+    """The catalogue; what a data sheet does not say is empty."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("actuator", no_wrap=True)
+    table.add_column("maker", no_wrap=True)
+    for head in ("V", "g", "stall N m", "rated N m", "peak N m", "rad/s", "USD"):
+        table.add_column(head, justify="right")
+    table.add_column("source", overflow="fold")
+    for record in records:
+        numbers = (record.voltage, 1e3 * record.mass, record.stall_torque, record.rated_torque, record.peak_torque)
+        shown = ("" if n is None else f"{n:.4g}" for n in (*numbers, record.speed, record.price))
+        table.add_row(record.name, Text(record.maker), *shown, Text(record.source))
+    console.print(table)
+
+
 def show_task(console: Console, task: DesignTask, known: float | None, stored: Sequence[Baseline]) -> None:
     """All of one task: its points, where they come from, and what it can be compared with.
 
@@ -291,7 +307,7 @@ def _front_table(history: History, solid: set[int] | None) -> Table:
     title = f"Pareto front of {history.problem.task.name}"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
     verdict = () if solid is None else ("verdict",)
-    objectives = [SHORT.get(o, f"{o.label.lower()} [{o.unit}]") for o in history.problem.objectives]
+    objectives = [SHORT.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
     for name in ("#", "source", *verdict, *objectives, "base [m]", "joints", "links [m]"):
         justify = "right" if name in ("#", *objectives) else "left"
         table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")

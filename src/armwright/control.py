@@ -18,7 +18,7 @@ from filelock import FileLock
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.files import replace_file
+from armwright.files import replace_file, writable
 
 CONTROL = "control.json"
 STATUS = "status.json"
@@ -71,10 +71,10 @@ class Status(BaseModel, frozen=True, extra="forbid", strict=True):
     fault: why the last question, or the session, failed; empty where it did not.
     """
 
-    pid: int
+    pid: int = Field(gt=0, lt=2**31)
     doing: Doing
-    number: int
-    since: float
+    number: int = Field(ge=0, lt=2**31)
+    since: float = Field(ge=0.0, allow_inf_nan=False)
     fault: str = ""
 
 
@@ -108,7 +108,7 @@ def stop_study(folder: Path) -> None:
 
 def add_hint(folder: Path, text: str) -> Hint:
     """Gives the language model a hint for its next prompt; SettingsError where the text cannot be one."""
-    words = _writable(text).strip()
+    words = writable(text).strip()
     if not 1 <= len(words) <= LONGEST_HINT:
         raise SettingsError(f"a hint of {len(words):,} characters: from 1 to {LONGEST_HINT:,} are possible")
 
@@ -171,7 +171,7 @@ class Channel:
         if self._folder is None:
             return
         before = self._said
-        words = before.fault if before is not None and fault is None else _writable(fault or "")
+        words = before.fault if before is not None and fault is None else writable(fault or "")
         if before is not None and (doing, words) == (before.doing, before.fault):
             return
         since = before.since if before is not None and doing == before.doing else time.time()
@@ -195,11 +195,6 @@ def _change(folder: Path, change: Callable[[Control], Control]) -> Control:
     except OSError as fault:
         raise RunFolderError(f"cannot write {folder / CONTROL}: {fault.strerror or fault}") from fault
     return asked
-
-
-def _writable(text: str) -> str:
-    """Without lone surrogates, which JSON and names of files can carry and UTF-8 cannot."""
-    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _read(path: Path, schema: type[Content]) -> Content | None:

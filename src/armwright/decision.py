@@ -60,7 +60,9 @@ def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
     """What a design can be chosen by: its objectives, its real parameters, and the length and mass of its arm."""
     space = history.problem.space
     reals = {p.name: float(member.design.params[p.name]) for p in space.parameters if isinstance(p, FloatParameter)}
-    arm = {"length": sum(link.length for link in member.arm.links), "mass": sum(link.mass for link in member.arm.links)}
+    links, first = member.arm.links, member.arm.joints[0].actuator
+    mass = sum(link.total_mass for link in links) + (0.0 if first is None else first.mass)
+    arm = {"length": sum(link.length for link in links), "mass": mass}
     objectives = {o.name: value for o, value in zip(history.problem.objectives, member.values, strict=True)}
     return {**reals, **arm, **objectives}
 

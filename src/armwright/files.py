@@ -1,4 +1,4 @@
-"""Files replaced in one step."""
+"""Files replaced in one step, and text that they can hold."""
 
 import os
 from pathlib import Path
@@ -9,3 +9,8 @@ def replace_file(target: Path, content: bytes) -> None:
     part = target.with_name(target.name + ".part")
     part.write_bytes(content)
     os.replace(part, target)
+
+
+def writable(text: str) -> str:
+    """Without lone surrogates, which JSON and names of files can carry and UTF-8 cannot."""
+    return text.encode("utf-8", "replace").decode("utf-8")

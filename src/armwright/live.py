@@ -22,7 +22,7 @@ import threading
 from collections.abc import AsyncGenerator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, cast
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
@@ -39,20 +39,23 @@ from armwright.control import (
     stop_study,
 )
 from armwright.exceptions import ArmwrightError, FailureError, MissingExtraError, SettingsError
+from armwright.files import writable
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
 from armwright.report.content import RunContent, design_files
 from armwright.report.page import render_page
 from armwright.results import SUMMARY
-from armwright.run_folder import CONFIG, TRIALS
+from armwright.run_folder import CONFIG, TRIALS, read_config
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
     from starlette.requests import Request
 
 LOOPBACK = "127.0.0.1"
+HTTP_PORT = 80  # which addresses leave out
 LOOK_EVERY = 0.25  # [s] between two looks at the run folder
 BEAT = 15.0  # [s] after which an event says that nothing has changed
 GRACE = 3.0  # [s] that a server without its study waits for a page to look on
+LINGER = 60.0  # [s] that it waits for one that has looked on, and may be a tab that is not seen
 LARGEST_BODY = 64 * 1024  # [bytes] of a POST
 WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
 RECENT = 20  # trials, whose time says how long the others will take
@@ -84,32 +87,55 @@ _ACTIONS: dict[str, Callable[[Path], None]] = {"pause": pause_study, "resume": r
 
 
 class LiveRun:
-    """The run folder as it is now; there need not be a run in it yet."""
+    """The run folder as it is now; there need not be a run in it yet. Several threads may ask."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.content: RunContent | None = None
-        self.status: dict[str, Any] = {}
         self.fault = ""  # why the folder cannot be read
-        self._seen: list[tuple[int, int, int] | None] = []
+        self._content: RunContent | None = None
+        self._seen: list[tuple[int, ...] | None] = []
+        self._server = secrets.token_hex(8)  # another at this address is another run to a page
+        self._run = 0  # how many runs lay here since the server began
+        self._lock = threading.Lock()
+        self.status = self._status()
 
     def look(self) -> None:
         """Reads what has changed."""
-        seen = [_stamp(self.folder / name) for name in WATCHED]
-        if seen != self._seen or (self.status.get("doing") in RUNNING and not self._is_alive()):
+        with self._lock:
+            seen = [_stamp(self.folder / name) for name in WATCHED]
+            if seen == self._seen and not (self.status["doing"] in RUNNING and not self._is_alive()):
+                return
             self._seen = seen
             try:
                 self._read()
                 self.fault = ""
             except ArmwrightError as fault:
                 self.fault = str(fault)  # such as a file that is just being written anew; read again when it changes
+            except Exception as fault:  # noqa: BLE001 (whatever lies in a folder, the server goes on looking)
+                self.fault = f"the run folder cannot be read: {type(fault).__name__}: {fault}"
             self.status = self._status()
 
+    def packed(self, designs: int, calls: int) -> bytes | None:
+        """What is new for a page; None as long as there is no run."""
+        with self._lock:
+            return None if self._content is None else self._content.packed(designs, calls, with_files=False)
+
+    def file(self, number: int, kind: str) -> str | None:
+        """A design as text; None where there is none."""
+        with self._lock:
+            if self._content is None or number >= len(self._content.history) or kind not in ("urdf", "mjcf"):
+                return None
+            return design_files(self._content.history, number)[kind]
+
     def _read(self) -> None:
-        if self.content is None and (self.folder / CONFIG).is_file():
-            self.content = RunContent(self.folder)
-        elif self.content is not None:
-            self.content.refresh()
+        if not (self.folder / CONFIG).is_file():
+            return
+        if self._content is None or not self._content.is_still(read_config(self.folder)):
+            self._content = None  # what cannot be read is not shown as what was read before
+            self._run += 1
+            self._content = RunContent(self.folder)
+        elif self._content.refresh():
+            self._run += 1
 
     def _is_alive(self) -> bool:
         status = read_status(self.folder)
@@ -117,7 +143,7 @@ class LiveRun:
 
     def _status(self) -> dict[str, Any]:
         """What the bar of the page says."""
-        content, said, asked = self.content, read_status(self.folder), read_control(self.folder)
+        content, said, asked = self._content, read_status(self.folder), read_control(self.folder)
         history = None if content is None else content.history
         study = None if content is None else content.study
         planned = None if study is None else study.n_trials
@@ -132,6 +158,7 @@ class LiveRun:
         calls = () if content is None else content.calls
         used = used_hints(calls)
         return {
+            "run": f"{self._server}-{self._run}",
             "doing": doing,
             "since": 0.0 if said is None else said.since,
             "designs": n,
@@ -161,12 +188,12 @@ def _iteration(used: dict[Hint, str], hint: Hint, n_init: int) -> int | None:
     return int(used[hint].rpartition("-")[2]) - n_init + 1
 
 
-def _stamp(path: Path) -> tuple[int, int, int] | None:
+def _stamp(path: Path) -> tuple[int, ...] | None:
     try:
         there = path.stat()
     except OSError:
         return None
-    return there.st_mtime_ns, there.st_size, there.st_ino
+    return there.st_mtime_ns, there.st_ctime_ns, there.st_size, there.st_ino
 
 
 def _lives(pid: int) -> bool:
@@ -188,7 +215,7 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
     """
     from starlette.applications import Starlette
     from starlette.middleware import Middleware
-    from starlette.requests import Request
+    from starlette.requests import ClientDisconnect, Request
     from starlette.responses import PlainTextResponse, Response, StreamingResponse
     from starlette.routing import Route
 
@@ -196,7 +223,7 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
     changed = asyncio.Condition()
 
     async def watch() -> None:
-        told: dict[str, Any] = {}
+        told = run.status
         while True:
             await asyncio.to_thread(run.look)
             if run.status != told:
@@ -212,33 +239,44 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         watching.cancel()
 
     async def page(request: Request) -> Response:
-        html = render_page(f"{folder.resolve().name}: armwright, live", token=token)
+        html = render_page(writable(f"{folder.resolve().name}: armwright, live"), token=token)
         return Response(html, media_type="text/html; charset=utf-8")
 
     async def packed(request: Request) -> Response:
-        if run.content is None:
-            return PlainTextResponse("the run has not begun yet", status_code=503)
         designs, calls = (_whole(request, name) for name in ("designs", "calls"))
-        data = await asyncio.to_thread(run.content.packed, designs, calls, with_files=False)
+        try:
+            data = await asyncio.to_thread(run.packed, designs, calls)
+        except ValueError as fault:  # numbers in the folder's files that are none
+            return PlainTextResponse(f"the run cannot be shown: {fault}", status_code=500)
+        if data is None:
+            return PlainTextResponse(run.fault or "the run has not begun yet", status_code=503)
         return Response(data, media_type="application/octet-stream")
 
     async def file(request: Request) -> Response:
         number, kind = _whole(request, "design"), request.query_params.get("format", "")
-        if run.content is None or number >= len(run.content.history) or kind not in ("urdf", "mjcf"):
+        text = await asyncio.to_thread(run.file, number, kind)
+        if text is None:
             return PlainTextResponse("there is no such file", status_code=404)
-        return Response(design_files(run.content.history, number)[kind], media_type="application/xml")
+        return Response(text, media_type="application/xml")
 
     async def events(request: Request) -> Response:
+        if request.method == "HEAD":  # which has no end of its own
+            return Response(media_type="text/event-stream")
         return StreamingResponse(_told(), media_type="text/event-stream")
 
     async def _told() -> AsyncGenerator[str]:
         pages.open += 1
+        pages.were_open = True
+        told, since = None, 0.0
         try:
             while not pages.is_closing:
-                yield f"event: status\ndata: {json.dumps(run.status)}\n\n"
+                now = asyncio.get_running_loop().time()
+                if run.status is not told or now - since > BEAT:
+                    told, since = run.status, now
+                    yield f"event: status\ndata: {json.dumps(told)}\n\n"
                 async with changed:
                     with suppress(TimeoutError):
-                        await asyncio.wait_for(changed.wait(), BEAT)
+                        await asyncio.wait_for(changed.wait(), LOOK_EVERY)
         finally:
             pages.open -= 1
 
@@ -251,16 +289,21 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
             return PlainTextResponse("JSON is wanted", status_code=415)
         body = b""
-        async for part in request.stream():
-            body += part
-            if len(body) > LARGEST_BODY:
-                return PlainTextResponse("that is too long", status_code=413)
+        try:
+            async for part in request.stream():
+                body += part
+                if len(body) > LARGEST_BODY:
+                    return PlainTextResponse("that is too long", status_code=413)
+        except ClientDisconnect:
+            return Response(status_code=400)  # to nobody
         try:
             wish = _WISHES.validate_json(body)
+            if not folder.is_dir():
+                return PlainTextResponse("the run folder is gone", status_code=409)
             if isinstance(wish, HintWish):
-                add_hint(folder, wish.text)
+                await asyncio.to_thread(add_hint, folder, wish.text)
             else:
-                _ACTIONS[wish.action](folder)
+                await asyncio.to_thread(_ACTIONS[wish.action], folder)
         except ValidationError:
             return PlainTextResponse("that is no pause, resume, stop or hint", status_code=422)
         except ArmwrightError as fault:
@@ -274,7 +317,7 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         Route("/", page),
         Route("/run", packed),
         Route("/file", file),
-        Route("/events", events),
+        Route("/events", events, methods=["GET"]),
         Route("/control", control, methods=["POST"]),
     ]
     guard = Middleware(_Guard, is_allowed=is_allowed)
@@ -318,6 +361,7 @@ class Pages:
 
     def __init__(self) -> None:
         self.open = 0
+        self.were_open = False  # ever
         self.is_closing = False  # the server
 
 
@@ -330,7 +374,10 @@ def serve(
     study: a pipe that ends with the process of the study; then the server ends, too, as soon as no page looks on.
     """
     try:
+        import starlette
         import uvicorn
+
+        assert starlette
     except ImportError as fault:
         raise MissingExtraError(
             'the live page needs the extra armwright[live]: pip install "armwright[live]"'
@@ -338,9 +385,9 @@ def serve(
     listener = _listen(host, port)
     port = listener.getsockname()[1]
     pages = Pages()
-    app = live_app(folder, secrets.token_urlsafe(24), _hosts(host, port), pages)
+    app = live_app(folder, secrets.token_urlsafe(24), _hosts(host, listener), pages)
     settings = uvicorn.Config(
-        app, log_level="error", access_log=False, lifespan="on", timeout_graceful_shutdown=1, server_header=False
+        app, log_config=None, access_log=False, lifespan="on", timeout_graceful_shutdown=1, server_header=False
     )
     server = uvicorn.Server(settings)
     tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/")
@@ -354,7 +401,7 @@ def serve(
         while not server.should_exit:
             await asyncio.sleep(LOOK_EVERY)
             idle = idle + LOOK_EVERY if pages.open == 0 and is_alone.is_set() else 0.0
-            if idle >= GRACE:
+            if idle >= (LINGER if pages.were_open else GRACE):
                 server.should_exit = True
         pages.is_closing = True
 
@@ -368,6 +415,8 @@ def serve(
 
 
 def _listen(host: str, port: int) -> socket.socket:
+    if not host:
+        raise SettingsError("--host is empty; 127.0.0.1 is this machine alone")
     try:
         kind = socket.AF_INET6 if ":" in host else socket.AF_INET
         listener = socket.socket(kind, socket.SOCK_STREAM)
@@ -381,20 +430,20 @@ def _listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def _hosts(host: str, port: int) -> Callable[[str], bool]:
+def _hosts(host: str, listener: socket.socket) -> Callable[[str], bool]:
     """Which names a browser may have called us by."""
-    names = {host, "localhost", LOOPBACK, "::1"}
-    known = {f"{f'[{name}]' if ':' in name else name}:{port}" for name in names}
-    if _is_loopback(host):
-        return known.__contains__
-    return lambda asked: True  # whoever opens it to a network knows by what names it is reached
+    address, port = cast("tuple[str, int]", listener.getsockname()[:2])
+    if not _is_loopback(address):
+        return lambda asked: True  # whoever opens it to a network knows by what names it is reached
+    names = {f"[{name}]" if ":" in name else name for name in (host.lower(), address, "localhost", LOOPBACK, "::1")}
+    known = {f"{name}:{port}" for name in names}
+    return lambda asked: asked.lower() in known or (port == HTTP_PORT and asked.lower() in names)
 
 
-def _is_loopback(host: str) -> bool:
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+def _is_loopback(address: str) -> bool:
+    ip = ipaddress.ip_address(address)
+    mapped = ip.ipv4_mapped if isinstance(ip, ipaddress.IPv6Address) else None
+    return (mapped or ip).is_loopback
 
 
 def begin_server(folder: Path) -> str:
@@ -402,12 +451,13 @@ def begin_server(folder: Path) -> str:
 
     It outlives the study as long as a page looks on, and its crash is no matter to the study.
     """
-    command = [sys.executable, "-m", "armwright", "live", str(folder), "--follow"]
+    # Nothing of the folder that the user stands in is taken for a module (-P).
+    command = [sys.executable, "-P", "-m", "armwright", "live", str(folder.absolute()), "--follow"]
     # A session of its own: Ctrl-C ends the study, and the page still shows what it came to.
     server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
     assert server.stdout is not None
     address = server.stdout.readline().decode().strip()
-    if not address:
+    if not address.startswith("http://"):
         raise FailureError("the live page's server did not begin; its words stand above")
     _pipes.append(server)
     return address

@@ -8,6 +8,7 @@ import numpy as np
 
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.kinematics.arrays import Actuation
 
 TORQUE_SCALE = 40.0  # α of the paper
 REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
@@ -59,6 +60,32 @@ def _position_error(evaluation: Evaluation) -> Array:
 
 def _torque_norm(evaluation: Evaluation) -> Array:
     return np.linalg.norm(evaluation.joint_torques, axis=-1)
+
+
+def _actuation(evaluation: Evaluation, name: str) -> Actuation:
+    actuation = evaluation.arms.actuation
+    if actuation is None:
+        raise SettingsError(f"objective {name} needs actuators: name some in the space file (actuators: [...])")
+    return actuation
+
+
+def _torque_use(evaluation: Evaluation) -> Array:
+    effort = _actuation(evaluation, "torque_use").effort
+    moving = evaluation.joint_torques[..., list(evaluation.arms.joint_numbers)]
+    return np.abs(moving / effort[:, None]).max(axis=-1)
+
+
+def _price(evaluation: Evaluation) -> Array:
+    price = _actuation(evaluation, "price").price
+    if np.isnan(price).any():
+        raise SettingsError("objective price needs the price of every actuator; the space names one without")
+    return price
+
+
+def _mass(evaluation: Evaluation) -> Array:
+    arms = evaluation.arms
+    at_base = 0.0 if arms.actuation is None else arms.actuation.base_mass
+    return arms.mass.sum(axis=1, dtype=np.float64) + at_base
 
 
 POSITION_ERROR = Objective(
@@ -118,8 +145,27 @@ MASS = Objective(
     label="Mass",
     unit="kg",
     symbol="E_mass",
-    words="the mass of the arm without its payload",
-    each=lambda evaluation: evaluation.arms.mass.sum(axis=1, dtype=np.float64),
+    words="the mass of the arm, its actuators included, without its payload",
+    each=_mass,
+    over="arm",
+)
+TORQUE_USE = Objective(
+    name="torque_use",
+    label="Torque use",
+    unit="of what is allowed",
+    symbol="E_use",
+    words="the largest share of its actuator's torque that any joint needs to hold the kept posture up against "
+    "gravity; above 1 the arm cannot hold it",
+    each=_torque_use,
+    over="max",
+)
+PRICE = Objective(
+    name="price",
+    label="Price",
+    unit="USD",
+    symbol="E_price",
+    words="the price of all actuators",
+    each=_price,
     over="arm",
 )
 LENGTH = Objective(
@@ -132,10 +178,8 @@ LENGTH = Objective(
     over="arm",
 )
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
-OBJECTIVES: Mapping[str, Objective] = {
-    objective.name: objective
-    for objective in (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, MASS, LENGTH)
-}
+_ALL = (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE)
+OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 
 
 def named_objectives(names: Sequence[str]) -> tuple[Objective, ...]:

@@ -91,7 +91,7 @@ def read_summary(path: Path) -> dict[str, Any] | None:
     try:
         summary: dict[str, Any] = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
         return summary if summary.keys() >= {"n_trials", "hypervolume", "best_known", "verification"} else None
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError, AttributeError, RecursionError):
         return None
 
 

@@ -29,7 +29,7 @@ from armwright.control import CHANNEL_FILES
 from armwright.documents import parse_document
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
-from armwright.files import replace_file
+from armwright.files import replace_file, writable
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.devices import Device, usable_device
 from armwright.objectives import OBJECTIVES, PAPER_OBJECTIVES, Objective
@@ -332,7 +332,7 @@ def _trial_line(trial: FinishedTrial) -> bytes:
         number=trial.number,
         source=trial.source,
         proposal=trial.proposal,
-        reason=trial.reason,
+        reason=writable(trial.reason),
         expected=None if trial.expected is None else list(trial.expected),
         fault=trial.fault,
         asked=trial.asked,
@@ -400,11 +400,21 @@ class TrialsReader:
         if is_other:
             self.trials, self._at = [], 0
             self._file = 0 if there is None else there.st_ino
-        config = self._config
-        new, length = _parse_trials(content, len(self.trials), self._path, config.space, len(config.objectives))
+        try:
+            new, length = self._parsed(content)
+        except RunFolderError:
+            if self._at == 0:
+                raise
+            self.trials, self._at = [], 0  # written anew in place, perhaps, and longer than what was read
+            is_other = True
+            new, length = self._parsed(self._path.read_bytes())
         self.trials = [*self.trials, *new]
         self._at += length
         return is_other
+
+    def _parsed(self, content: bytes) -> tuple[list[FinishedTrial], int]:
+        config = self._config
+        return _parse_trials(content, len(self.trials), self._path, config.space, len(config.objectives))
 
 
 def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int) -> FinishedTrial:

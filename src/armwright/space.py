@@ -6,7 +6,7 @@ joint, one length for each link. Every number of it can be changed in a YAML fil
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import count, takewhile
 from pathlib import Path
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_validator, model_validator
 
-from armwright.arm import Arm, Axis, Joint, uniform_link
+from armwright.arm import Actuator, Arm, Axis, Joint, uniform_link
+from armwright.catalogue import ActuatorRecord, TorqueKind, resolved
 from armwright.documents import check_document, read_document
 from armwright.exceptions import DesignError, SpaceError, did_you_mean
 
@@ -32,6 +33,7 @@ JOINT_WORDS: dict[JointType, str] = {
 }
 TOY_MASS = 0.1  # [kg] of a whole arm
 LARGEST_ANGLE = 2 * math.pi  # [rad]
+MOST_ACTUATORS = 50
 LARGEST_LENGTH = 1000.0  # [m]; beyond it float32 kernels lose the millimetre
 
 
@@ -106,6 +108,11 @@ class Design:
     def links(self) -> tuple[float, ...]:
         """The link lengths in order [m]."""
         return tuple(float(value) for value in self._numbered("link"))
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """The names of the joints' actuators in order; none where the space leaves no choice."""
+        return tuple(str(value) for value in self._numbered("motor"))
 
     def _numbered(self, kind: str) -> list[ParameterValue]:
         """The values of kind_1, kind_2, …, in whatever order the mapping has them."""
@@ -190,6 +197,10 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     The first joint sits at the origin O; link j follows joint j along local +z; with all angles 0 the
     links stand in one vertical line. 2 D + 3 parameters.
+
+    actuators: what the joints may have, names of the catalogue or records; with several, each joint's is a parameter.
+    None: joints without mass.
+    actuator_torque, safety_factor: which torque of theirs counts, divided by what.
     """
 
     name: str = Field(default="paper", min_length=1, max_length=100)
@@ -202,6 +213,16 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     link: Range = (0.03, 0.30)  # [m]
     link_radius: float = Field(default=0.015, gt=0.0, le=1.0)  # [m]
     mass: MassModel = MassPerMetre()
+    actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MOST_ACTUATORS)
+    actuator_torque: TorqueKind = "stall"
+    safety_factor: float = Field(default=1.0, gt=0.0, le=100.0)
+
+    @field_validator("actuators", mode="before")
+    @classmethod
+    def _look_up(cls, value: Any) -> Any:
+        if not isinstance(value, (list, tuple)):
+            raise ValueError("actuators is a list of names, or of records with name, mass and stall_torque")
+        return [resolved(entry) for entry in cast("list[Any]", value)]
 
     @field_validator("mass", mode="before")
     @classmethod
@@ -233,6 +254,11 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(f"joint_range = [{low:g}, {high:g}] rad goes beyond ±2π, a full turn each way")
         if not low <= 0.0 <= high:
             raise ValueError(f"joint_range = [{low:g}, {high:g}] rad must hold 0, where the inverse kinematics starts")
+        names = [record.name for record in self.actuators]
+        if len(set(names)) != len(names):
+            raise ValueError(f"actuators names one twice: {', '.join(names)}")
+        for record in self.actuators:
+            record.actuator(self.actuator_torque, self.safety_factor)
         if len(set(self.joint_types)) != len(self.joint_types):
             raise ValueError(f"joint_types names a type twice: {', '.join(self.joint_types)}")
         return self
@@ -255,9 +281,11 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise DesignError(f"missing: {', '.join(missing)}")
         return Design({parameter.name: parameter.check(params[parameter.name]) for parameter in self.parameters})
 
-    def clipped(self, origin: Iterable[float], joints: str, links: Iterable[float]) -> Design:
-        """The design of these numbers, each moved into its range."""
-        values = [*origin, *joints, *links]
+    def clipped(
+        self, origin: Iterable[float], joints: str, links: Iterable[float], motors: Sequence[str] = ()
+    ) -> Design:
+        """The design of these numbers, each moved into its range; without motors, the usual ones."""
+        values = [*origin, *joints, *links, *(motors or self.usual_motors)]
         return Design({p.name: _clip(p, value) for p, value in zip(self.parameters, values, strict=True)})
 
     def matrix(self, designs: Sequence[Design]) -> NDArray[np.float64]:
@@ -278,24 +306,55 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return [Design({p.name: _draw(p, rng) for p in self.parameters}) for _ in range(n)]
 
     @property
+    def usual_motors(self) -> tuple[str, ...]:
+        """One for each joint, where there is a choice: from the strongest at the base to the weakest at the tip."""
+        if len(self.actuators) < 2:
+            return ()
+        ranked = sorted(self.arm_actuators, key=lambda actuator: -actuator.effort)
+        return tuple(ranked[len(ranked) * j // self.joints].name for j in range(self.joints))
+
+    @property
+    def arm_actuators(self) -> tuple[Actuator, ...]:
+        """The actuators as the arm knows them, in the order of the list."""
+        return _arm_actuators(self)
+
+    @property
     def is_toy(self) -> bool:
         """Whether even the heaviest arm weighs next to nothing, as the paper's do."""
-        return self.joints * self.mass.mass(self.link[1]) < TOY_MASS
+        heaviest = max((record.mass for record in self.actuators), default=0.0)
+        return self.joints * (self.mass.mass(self.link[1]) + heaviest) < TOY_MASS
 
     @property
     def mass_note(self) -> str:
         """How heavy the links are taken to be, in one sentence; it belongs wherever torques are shown."""
         toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if self.is_toy else ""
-        return f"links: {self.mass.words()}{toy}"
+        chosen = ", ".join(record.name for record in self.actuators)
+        motors = f"; actuators: {chosen}" if self.actuators else ""
+        return f"links: {self.mass.words()}{toy}{motors}"
 
     def arm(self, design: Design) -> Arm:
         """The physical chain that a design builds."""
         if not len(design.joints) == len(design.links) == self.joints:
             self.design(design.params)  # says what is wrong
         lower, upper = self.joint_range
-        joints = [Joint("revolute", JOINT_AXES[kind], lower, upper) for kind in design.joints]  # pyright: ignore[reportArgumentType]
-        links = [uniform_link((0.0, 0.0, length), self.mass.mass(length), self.link_radius) for length in design.links]
+        motors = self._motors(design)
+        ends = [0.0 if motor is None else motor.mass for motor in (*motors[1:], None)]
+        kinds = cast("list[JointType]", list(design.joints))
+        joints = [
+            Joint("revolute", JOINT_AXES[kind], lower, upper, motor) for kind, motor in zip(kinds, motors, strict=True)
+        ]
+        links = [
+            replace(uniform_link((0.0, 0.0, length), self.mass.mass(length), self.link_radius), end_mass=end)
+            for length, end in zip(design.links, ends, strict=True)
+        ]
         return Arm(base=design.origin, joints=tuple(joints), links=tuple(links))
+
+    def _motors(self, design: Design) -> list[Actuator | None]:
+        """Of each joint."""
+        if not self.actuators:
+            return [None] * self.joints
+        by_name = {actuator.name: actuator for actuator in self.arm_actuators}
+        return [by_name[name] for name in (design.motors or (self.arm_actuators[0].name,) * self.joints)]
 
 
 def paper_space(joints: int = 4) -> DesignSpace:
@@ -316,7 +375,14 @@ def _parameters(space: DesignSpace) -> tuple[Parameter, ...]:
     origin = [FloatParameter(f"origin_{axis}", *limits, "m") for axis, limits in ranges.items()]
     joints = [CategoricalParameter(f"joint_{j}", space.joint_types) for j in range(1, space.joints + 1)]
     links = [FloatParameter(f"link_{j}", *space.link, "m") for j in range(1, space.joints + 1)]
-    return (*origin, *joints, *links)
+    names = tuple(record.name for record in space.actuators)
+    motors = [CategoricalParameter(f"motor_{j}", names) for j in range(1, space.joints + 1)] if len(names) > 1 else []
+    return (*origin, *joints, *links, *motors)
+
+
+@cache
+def _arm_actuators(space: DesignSpace) -> tuple[Actuator, ...]:
+    return tuple(record.actuator(space.actuator_torque, space.safety_factor) for record in space.actuators)
 
 
 def _clip(parameter: Parameter, value: Any) -> ParameterValue:

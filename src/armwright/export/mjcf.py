@@ -9,6 +9,7 @@ from armwright.export.shapes import (
     COLOURS,
     along,
     cylinder_inertia,
+    inertia_tensor,
     marker_radius,
     middle,
     number,
@@ -25,8 +26,8 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     """The MJCF of an arm: `base`, link_1 on joint_1, …, a site `tip`, and motor_1 on joint_1, ….
 
     Names, frames, masses, inertias and colours are those of `to_urdf`: link frames stand at their joints, and with all
-    joints at 0 they are parallel to the world's. Each joint that moves has a motor with gear 1 and without limits, as
-    the arm has no actuators of its own yet: its `ctrl` is the torque [N m], or the force [N], on that joint.
+    joints at 0 they are parallel to the world's. Each joint that moves has a motor with gear 1, limited to the torque of
+    its actuator where it has one: its `ctrl` is the torque [N m], or the force [N], on that joint.
 
     What is drawn is for sight alone. It has no mass, as that of each link is stated, and touches nothing: links overlap
     at their joints, so contacts would push them out of any posture, and arms are searched without collisions, too.
@@ -53,7 +54,10 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     actuators = ElementTree.SubElement(root, "actuator")
     for n, joint in enumerate(arm.joints, start=1):
         if joint.kind != "fixed":
-            ElementTree.SubElement(actuators, "motor", name=f"motor_{n}", joint=f"joint_{n}", gear="1")
+            motor = {"name": f"motor_{n}", "joint": f"joint_{n}", "gear": "1"}
+            if joint.actuator is not None:
+                motor["ctrlrange"] = f"{number(-joint.actuator.effort)} {number(joint.actuator.effort)}"
+            ElementTree.SubElement(actuators, "motor", motor)
     return text_of(root)
 
 
@@ -81,10 +85,16 @@ def _add_joint(body: ElementTree.Element, name: str, joint: Joint) -> None:
 
 
 def _add_link(body: ElementTree.Element, joint: Joint, link: Link) -> None:
-    across, around = cylinder_inertia(link)
     euler = numbers(along(link.offset))
-    inertial = {"pos": numbers(link.com), "euler": euler, "mass": number(link.mass)}
-    ElementTree.SubElement(body, "inertial", {**inertial, "diaginertia": f"{across} {across} {around}"})
+    inertial = {"pos": numbers(link.total_com), "mass": number(link.total_mass)}
+    if link.end_mass == 0.0:
+        across, around = cylinder_inertia(link)
+        inertial |= {"euler": euler, "diaginertia": f"{across} {across} {around}"}
+    else:
+        tensor = inertia_tensor(link)
+        places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+        inertial["fullinertia"] = " ".join(f"{tensor[place]:.17g}" for place in places)
+    ElementTree.SubElement(body, "inertial", inertial)
     if link.length > 0.0:
         cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}
         ElementTree.SubElement(

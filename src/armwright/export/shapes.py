@@ -3,6 +3,9 @@
 import math
 from xml.etree import ElementTree
 
+import numpy as np
+from numpy.typing import NDArray
+
 from armwright.arm import Link, Vector
 
 AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
@@ -26,6 +29,20 @@ def cylinder_inertia(link: Link) -> tuple[str, str]:
     around = link.mass * link.radius**2 / 2.0
     across = around / 2.0 + link.mass * link.length**2 / 12.0
     return f"{across:.17g}", f"{around:.17g}"
+
+
+def inertia_tensor(link: Link) -> NDArray[np.float64]:
+    """(3, 3) of the cylinder and of what sits at its end, about their common centre of mass, in the link's frame."""
+    r2, l2 = link.radius**2, link.length**2
+    across = link.mass * (3.0 * r2 + l2) / 12.0
+    axis = np.array(link.offset) / link.length if link.length > 0.0 else np.array([0.0, 0.0, 1.0])
+    around = np.outer(axis, axis)
+    tensor = across * (np.eye(3) - around) + link.mass * r2 / 2.0 * around
+    centre = np.array(link.total_com)
+    for mass, place in ((link.mass, link.com), (link.end_mass, link.offset)):
+        away = np.array(place) - centre
+        tensor += mass * (away @ away * np.eye(3) - np.outer(away, away))
+    return tensor
 
 
 def along(offset: Vector) -> Vector:

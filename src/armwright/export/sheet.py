@@ -19,6 +19,7 @@ class SheetRow:
     length: of the link, joint to joint [m]. mass: of the link [kg]. lower, upper: limits [rad] or [m].
     used: the least and the largest value at the targets [rad] or [m]. torque: the largest absolute one that holds
     it at any target [N m], or [N] where it slides; target: at which one, counted from 1.
+    actuator: its name; use: the share of its torque that is needed; price: [USD].
     """
 
     number: int
@@ -31,6 +32,9 @@ class SheetRow:
     used: tuple[float, float]
     torque: float
     target: int
+    actuator: str
+    use: float | None
+    price: float | None
 
 
 def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
@@ -38,6 +42,7 @@ def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
     rows: list[SheetRow] = []
     for j, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True)):
         worst = int(np.argmax(np.abs(torques[:, j])))
+        torque, motor = float(np.abs(torques[worst, j])), joint.actuator
         rows.append(
             SheetRow(
                 number=j + 1,
@@ -48,8 +53,11 @@ def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
                 lower=joint.lower,
                 upper=joint.upper,
                 used=(float(q[:, j].min()), float(q[:, j].max())),
-                torque=float(np.abs(torques[worst, j])),
+                torque=torque,
                 target=worst + 1,
+                actuator="" if motor is None else motor.name,
+                use=None if motor is None else torque / motor.effort,
+                price=None if motor is None else motor.price,
             )
         )
     return rows
@@ -64,8 +72,8 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         f"Base, the first joint's place: ({base}) mm. With all joints at 0 the links stand as listed, along their own "
         "axes. Lengths are from joint to joint, the last one to the tip.",
         "",
-        "| # | joint | limits | used at the targets | holds at most | at target | link | mass |",
-        "|--:|---|---|---|--:|--:|--:|--:|",
+        "| # | joint | actuator | limits | used at the targets | holds at most | at target | link | mass |",
+        "|--:|---|---|---|---|--:|--:|--:|--:|",
     ]
     for row in rows:
         unit, force = ("m", "N") if row.kind == "prismatic" else ("rad", "N m")
@@ -73,9 +81,10 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         cells = [
             str(row.number),
             "fixed" if fixed else f"{row.kind}, {row.axis}",
+            row.actuator or "–",
             "" if fixed else f"{row.lower:.3f} to {row.upper:.3f} {unit}",
             "" if fixed else f"{row.used[0]:.3f} to {row.used[1]:.3f} {unit}",
-            "" if fixed else f"{row.torque:.4g} {force}",
+            "" if fixed else f"{row.torque:.4g} {force}" + ("" if row.use is None else f" ({row.use:.0%})"),
             "" if fixed else str(row.target),
             f"{1e3 * row.length:.1f} mm",
             f"{1e3 * row.mass:.4g} g",
@@ -83,5 +92,10 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         lines.append(f"| {' | '.join(cells)} |")
     length, mass = sum(row.length for row in rows), sum(row.mass for row in rows)
     lines += ["", f"Together {1e3 * length:.1f} mm of links, {1e3 * mass:.4g} g."]
+    motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
+    if motors:
+        prices = [motor.price for motor in motors]
+        price = "" if None in prices else f", {sum(price or 0.0 for price in prices):,.0f} USD"
+        lines += ["", f"{len(motors)} actuators of {1e3 * sum(motor.mass for motor in motors):.4g} g{price}."]
     lines += [f"\n{note}" for note in notes]
     return "\n".join(lines) + "\n"

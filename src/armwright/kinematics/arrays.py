@@ -8,7 +8,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import AXES, Arm, Link, Vector
+from armwright.arm import AXES, Actuator, Arm, Link, Vector
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.space import JOINT_AXES, DesignSpace
 
@@ -21,6 +21,23 @@ Ints = NDArray[np.int32]
 
 FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
 ARRAYS = (*FLOATS, "axis")  # of `ArmArrays`, with a row for each arm
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What turns the joints of N arms of D moving joints.
+
+    effort: (N, D) the torque that may be asked of each [N m].
+    price: (N,) of all together [USD]; NaN where one has none.
+    base_mass: (N,) of the first, which stands with the base and loads no joint [kg].
+    """
+
+    effort: NDArray[np.float64]
+    price: NDArray[np.float64]
+    base_mass: NDArray[np.float64]
+
+    def __getitem__(self, rows: slice) -> "Actuation":
+        return Actuation(self.effort[rows], self.price[rows], self.base_mass[rows])
 
 
 @dataclass(frozen=True)
@@ -39,12 +56,14 @@ class ArmArrays:
     mass: Floats  # (N, D) [kg]
     joint_numbers: tuple[int, ...]
     n_joints: int
+    actuation: Actuation | None = None  # where all moving joints have actuators
 
     def __len__(self) -> int:
         return len(self.base)
 
     def __getitem__(self, rows: slice) -> "ArmArrays":
-        return replace(self, **{name: getattr(self, name)[rows] for name in ARRAYS})
+        actuation = None if self.actuation is None else self.actuation[rows]
+        return replace(self, **{name: getattr(self, name)[rows] for name in ARRAYS}, actuation=actuation)
 
     @property
     def precision(self) -> Precision:
@@ -84,10 +103,24 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         lower=-_never_above([[-j.lower for j in row] for row in joints], precision),
         upper=_never_above([[j.upper for j in row] for row in joints], precision),
         offset=np.array([[link.offset for link in links] for _, links in rigid], dtype=precision),
-        com=np.array([[link.com for link in links] for _, links in rigid], dtype=precision),
-        mass=np.array([[link.mass for link in links] for _, links in rigid], dtype=precision),
+        com=np.array([[link.total_com for link in links] for _, links in rigid], dtype=precision),
+        mass=np.array([[link.total_mass for link in links] for _, links in rigid], dtype=precision),
         joint_numbers=moving,
         n_joints=len(kinds),
+        actuation=_actuation([[joint.actuator for joint in row] for row in joints]),
+    )
+
+
+def _actuation(rows: Sequence[Sequence[Actuator | None]]) -> Actuation | None:
+    """None where a joint has no actuator."""
+    chosen = [[actuator for actuator in row if actuator is not None] for row in rows]
+    if any(len(few) < len(row) for few, row in zip(chosen, rows, strict=True)):
+        return None
+    prices = [[np.nan if actuator.price is None else actuator.price for actuator in row] for row in chosen]
+    return Actuation(
+        effort=np.array([[actuator.effort for actuator in row] for row in chosen]),
+        price=np.array(prices).sum(axis=1),
+        base_mass=np.array([row[0].mass for row in chosen]),
     )
 
 
@@ -98,12 +131,22 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precis
     """
     n, dof = len(matrix), space.joints
     axes = np.array([AXES.index(JOINT_AXES[kind]) for kind in space.joint_types], dtype=np.int32)
-    links = matrix[:, 3 + dof :]
+    links = matrix[:, 3 + dof : 3 + 2 * dof]
     lower, upper = _limits(*space.joint_range, precision)
     offset = np.zeros((n, dof, 3), dtype=precision)
     offset[..., 2] = links
+    mass, middle = space.mass.masses(links), links / 2
+    actuation = None
+    if space.actuators:
+        chosen = _chosen_actuators(space, matrix)
+        efforts, masses, prices = _catalogue(space)
+        actuation = Actuation(efforts[chosen], prices[chosen].sum(axis=1), masses[chosen[:, 0]])
+        ends = np.concatenate([masses[chosen[:, 1:]], np.zeros((n, 1))], axis=1)  # a link carries the next joint's
+        total = mass + ends
+        middle = np.where(ends > 0.0, (mass * middle + ends * links) / np.where(total > 0.0, total, 1.0), middle)
+        mass = total
     com = np.zeros((n, dof, 3), dtype=precision)
-    com[..., 2] = links / 2
+    com[..., 2] = middle
     return ArmArrays(
         base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
         axis=axes[matrix[:, 3 : 3 + dof].astype(np.intp)],
@@ -111,9 +154,28 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precis
         upper=np.full((n, dof), upper, dtype=precision),
         offset=offset,
         com=com,
-        mass=np.ascontiguousarray(space.mass.masses(links), dtype=precision),
+        mass=np.ascontiguousarray(mass, dtype=precision),
         joint_numbers=tuple(range(dof)),
         n_joints=dof,
+        actuation=actuation,
+    )
+
+
+def _chosen_actuators(space: DesignSpace, matrix: NDArray[np.float64]) -> NDArray[np.intp]:
+    """(N, D) places of the joints' actuators in the space's list."""
+    if len(space.actuators) == 1:
+        return np.zeros((len(matrix), space.joints), dtype=np.intp)
+    return matrix[:, 3 + 2 * space.joints :].astype(np.intp)
+
+
+@cache
+def _catalogue(space: DesignSpace) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Effort [N m], mass [kg] and price [USD] of each of a space's actuators."""
+    actuators = space.arm_actuators
+    return (
+        np.array([actuator.effort for actuator in actuators]),
+        np.array([actuator.mass for actuator in actuators]),
+        np.array([np.nan if actuator.price is None else actuator.price for actuator in actuators]),
     )
 
 
@@ -154,9 +216,9 @@ def _join(links: Sequence[Link]) -> Link:
         return links[0]
     offset, moment, mass = np.zeros(3), np.zeros(3), 0.0
     for link in links:
-        moment = moment + link.mass * (offset + link.com)
+        moment = moment + link.total_mass * (offset + np.array(link.total_com))
         offset = offset + link.offset
-        mass += link.mass
+        mass += link.total_mass
     com = moment / mass if mass > 0.0 else offset
     return Link(_vector(offset), mass, _vector(com), links[0].radius)
 

@@ -137,6 +137,7 @@ def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
         "origin": vector(design.origin, decimals),
         "joints": "(" + ", ".join(design.joints) + ")",
         "links": vector(design.links, decimals),
+        "motors": "(" + ", ".join(design.motors) + ")" if design.motors else "",
     }
 
 

@@ -1,4 +1,4 @@
-"""Designs written as lines: ORIGIN, JOINTS and LINKS, as a prompt asks for them in free text.
+"""Designs written as lines: ORIGIN, JOINTS, LINKS and MOTORS, as a prompt asks for them in free text.
 
 A line is read only where every word of it is understood; where numbers are mixed with other words, it is no value.
 """
@@ -10,7 +10,7 @@ from typing import Any
 from armwright.space import JOINT_WORDS
 
 AXES = ("x", "y", "z")
-GROUPS = ("origin", "joints", "links")
+GROUPS = ("origin", "joints", "links", "motors")
 LONGEST_LINE = 2000  # characters; a longer one holds no values
 
 _MINUS = str.maketrans({"−": "-", "﹣": "-", "-": "-", "＋": "+"})
@@ -25,8 +25,8 @@ _LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # what may stand betwe
 
 # At the beginning of a line in any form of list or emphasis; in capitals, also further on in it.
 _NAME = re.compile(
-    r"(?:^[ \t>*_#`|•–-]{0,20}(?:\d+[.)] ?)?[*_`]{0,3}(?P<first>(?i:ORIGIN|JOINTS|LINKS|EXPECTED|REASON))"
-    r"|(?<=[\s;,])[*_`]{0,3}(?P<later>ORIGIN|JOINTS|LINKS|EXPECTED|REASON))[ \t*_`]*[:=]",
+    r"(?:^[ \t>*_#`|•–-]{0,20}(?:\d+[.)] ?)?[*_`]{0,3}(?P<first>(?i:ORIGIN|JOINTS|LINKS|MOTORS|EXPECTED|REASON))"
+    r"|(?<=[\s;,])[*_`]{0,3}(?P<later>ORIGIN|JOINTS|LINKS|MOTORS|EXPECTED|REASON))[ \t*_`]*[:=]",
     re.MULTILINE,
 )
 
@@ -89,6 +89,9 @@ def _values(name: str, words: str) -> dict[str, Any] | None:
     words = _LATEX.sub(" ", words.translate(_MINUS))
     if name == "joints":
         return _joints(words)
+    if name == "motors":
+        names = re.findall(r"[A-Za-z0-9][A-Za-z0-9._-]*", re.sub(r"motor_\d+\s*[:=]", "", words))
+        return {_parameter(name, place): motor.rstrip(".") for place, motor in enumerate(names)} or None
     if name == "origin":
         words = re.sub(r"(?<!\w)([xyz])\s*[:=]", r"origin_\1 =", words)
     elif name == "links":

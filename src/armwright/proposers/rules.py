@@ -139,7 +139,7 @@ def trim(history: History, inside: list[FrontMember], rng: np.random.Generator) 
     j = int(np.argmax(links * np.cumsum(carried)))
     links[j] *= TRIM
     space = history.problem.space
-    design = space.clipped(towards_missed(history, member), member.design.joints, links)
+    design = space.clipped(towards_missed(history, member), member.design.joints, links, member.design.motors)
     return design, f"trims link {j + 1} of trial {member.number}, which weighs most on its joints; {described(design)}"
 
 
@@ -152,7 +152,7 @@ def swap(history: History, inside: list[FrontMember], rng: np.random.Generator) 
     others = [kind for kind in types if kind != joints[j]] or [joints[j]]
     other = "Y" if "Y" in others and rng.random() < 0.5 else others[int(rng.integers(len(others)))]
     design = history.problem.space.clipped(
-        towards_missed(history, member), joints[:j] + other + joints[j + 1 :], member.design.links
+        towards_missed(history, member), joints[:j] + other + joints[j + 1 :], member.design.links, member.design.motors
     )
     return design, f"turns joint {j + 1} of trial {member.number}, the least used, into {other}; {described(design)}"
 
@@ -181,14 +181,15 @@ def between(a: Design, b: Design, share: float, history: History) -> Design:
     origin, links = (
         share * np.array(u) + (1.0 - share) * np.array(v) for u, v in ((a.origin, b.origin), (a.links, b.links))
     )
-    return history.problem.space.clipped(origin, a.joints, links)
+    return history.problem.space.clipped(origin, a.joints, links, a.motors)
 
 
 def scaled(history: History, member: FrontMember, scale: float) -> Design:
     """The member with all links scaled about its shoulder, its base moved towards what it misses."""
     height = standing(member.design, history.evaluation([member.number]).q[0])
     origin = towards_missed(history, member) + np.array([0.0, 0.0, (1.0 - scale) * height])
-    return history.problem.space.clipped(origin, member.design.joints, scale * np.array(member.design.links))
+    links = scale * np.array(member.design.links)
+    return history.problem.space.clipped(origin, member.design.joints, links, member.design.motors)
 
 
 def standing(design: Design, angles: Array) -> float:
@@ -222,7 +223,7 @@ def distinct(design: Design, history: History, rng: np.random.Generator) -> Desi
             break
         origin = np.array(design.origin) + rng.normal(0.0, spread, 3)
         links = np.array(design.links) * np.exp(rng.normal(0.0, spread, space.joints))
-        design = space.clipped(origin, design.joints, links)
+        design = space.clipped(origin, design.joints, links, design.motors)
         spread *= 1.5
     return design
 

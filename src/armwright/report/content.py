@@ -18,7 +18,7 @@ from armwright.best_known import known_front
 from armwright.comparison import method_words
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
-from armwright.history import History
+from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
 from armwright.pareto import front_numbers, hypervolume, hypervolume_history
@@ -44,21 +44,27 @@ class RunContent:
         self._n = 0
         self.refresh()
 
+    def is_still(self, config: RunConfig) -> bool:
+        """Whether a folder with these settings holds the same run, perhaps a longer one."""
+        changing: dict[str, Any] = {"reference_point": None, "versions": {}, "earlier_versions": [], "method": None}
+        ours, theirs = (one.model_copy(update=changing) for one in (self.config, config))
+        return ours == theirs and type(self.config.method) is type(config.method)
+
     def refresh(self) -> bool:
-        """Reads on; whether there was anything new."""
+        """Reads on; whether it had to begin anew, as the file is another one than before."""
         self.config = read_config(self.folder)  # the reference point may have been found
-        if self._reader.read_on():
-            self._chunks, self._n = [], 0  # another file than before: all of it is new
+        is_other = self._reader.read_on() or len(self._reader.trials) < self._n
+        if is_other:
+            self._chunks, self._n = [], 0
         self.summary = read_summary(self.folder)
         self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
         self.history = History(
             self.config.problem, self._reader.trials, self.config.method.n_init, self.config.reference_point
         )
-        new = len(self.history) - self._n
-        if new:
+        if len(self.history) > self._n:
             self._chunks.append((self._n, _designs(self.history, range(self._n, len(self.history)))))
             self._n = len(self.history)
-        return new > 0
+        return is_other
 
     @property
     def study(self) -> Method | None:
@@ -77,8 +83,10 @@ class RunContent:
         if self.history.reference_point is not None and len(self.history):
             curve = hypervolume_history(self.history.values, self.history.reference_point)
         front = front_numbers(self.history.values) if len(self.history) else []
+        search = None if self.summary is None or self.study is not None else self.summary["search"]
+        spent = None if search is None else search["evaluations"]
         head = {
-            **_about(self.config, self.folder, self.history),
+            **_about(self.config, self.folder, self.history, spent),
             "n": self._n,
             "designs_from": designs_from,
             "front": front,
@@ -148,8 +156,8 @@ def _arm_arrays(arms: Sequence[Arm]) -> Arrays:
         "lower": floats([[j.lower for j in row] for row in joints]),
         "upper": floats([[j.upper for j in row] for row in joints]),
         "offset": floats([[link.offset for link in row] for row in links]),
-        "com": floats([[link.com for link in row] for row in links]),
-        "mass": floats([[link.mass for link in row] for row in links]),
+        "com": floats([[link.total_com for link in row] for row in links]),
+        "mass": floats([[link.total_mass for link in row] for row in links]),
         "radius": floats([[link.radius for link in row] for row in links]),
     }
 
@@ -160,8 +168,8 @@ def _joined(chunks: Sequence[Arrays]) -> dict[str, NDArray[Any]]:
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
 
 
-def _about(config: RunConfig, folder: Path, history: History) -> dict[str, Any]:
-    """What does not change while the run goes on."""
+def _about(config: RunConfig, folder: Path, history: History, spent: int | None) -> dict[str, Any]:
+    """What hardly changes while the run goes on; spent: evaluations of a search for the whole front."""
     task, method, space = config.task, config.method, config.space
     study = None if isinstance(method, FrontMethod) else method
     known = known_front(config.problem)
@@ -187,7 +195,7 @@ def _about(config: RunConfig, folder: Path, history: History) -> dict[str, Any]:
         "study": None if study is None else study.model_dump(mode="json"),
         "n_init": method.n_init,
         "planned": None if study is None else study.n_trials,
-        "command": repeat_command(config),
+        "command": repeat_command(config, any(trial.source == POLISH for trial in history), spent),
         "config": config.model_dump(mode="json"),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
         "colours": {"front": FRONT, "missed": MISSED, "target": TARGET, "joint": JOINT},

@@ -5,9 +5,11 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from armwright.objectives import OBJECTIVES
 from armwright.run_folder import FrontMethod, Method, RunConfig
 from armwright.space import paper_space
 from armwright.task import builtin_names, load_task
+from armwright.tolerance import TOLERANCE
 
 OWN_TASK, OWN_SPACE = "TASK.yaml", "SPACE.yaml"  # where they are files of the user's
 OF_PROPOSER = (
@@ -19,24 +21,27 @@ USUAL = {
 }  # fmt: skip
 
 
-def repeat_command(config: RunConfig) -> str:
+def repeat_command(config: RunConfig, polished: bool = False, spent: int | None = None) -> str:
     """The command for a shell; what is as usual is left out.
 
+    polished: whether the run was polished afterwards. spent: evaluations of a search for the whole front.
     A task or a space of the user's is named TASK.yaml or SPACE.yaml: both stand in the run's config.yaml. Objectives,
     samplers and proposers that are code of the user's cannot be named: then it is empty.
     """
     name, task = config.task.name, config.task
-    builtin = name in builtin_names() or name.startswith("random-")
-    words = [name if builtin and load_task(name).targets == task.targets else OWN_TASK]
+    if any(record.name not in OBJECTIVES for record in config.objectives) or config.tolerance not in (0.0, TOLERANCE):
+        return ""
+    builtin = load_task(name) if name in builtin_names() or name.startswith("random-") else None
+    as_told = ("targets", "payload", "objectives", "reference_point")
+    alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in as_told)
+    words = [name if alike else OWN_TASK]
     said: dict[str, Any] = {}
-    if task.objectives != (load_task(name).objectives if words[0] == name else task.objectives):
-        said["objectives"] = ",".join(task.objectives or ())
     paper = paper_space(config.space.joints).model_dump(exclude={"name"})
     if config.space.model_dump(exclude={"name"}) != paper or config.space.joints != paper_space().joints:
         said["space"] = OWN_SPACE
     if isinstance(config.method, FrontMethod):
-        begun = (config.method.begin_with or {}).get("run")
-        said["from"] = begun
+        begun = config.method.begin_with or {}
+        said |= {"budget": spent, "from": begun.get("run"), "proposer": begun.get("proposer", {}).get("name")}
         command = "front"
     else:
         command = "optimize"
@@ -47,7 +52,8 @@ def repeat_command(config: RunConfig) -> str:
     options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
     options += ["--robust"] * (config.tolerance > 0.0)
     options += ["--overlap"] * ("in_flight" in given)
-    return shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])
+    line = shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])
+    return f"{line} && armwright polish RUN" if polished else line
 
 
 def _study_options(method: Method) -> dict[str, Any]:

@@ -3,14 +3,17 @@
 import { postures, REACHED } from "./design.js";
 import { chain } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
-import { $, colour, millimetres, number, onTheme, shown } from "./words.js";
+import { $, colour, element, millimetres, number, onTheme, shown } from "./words.js";
 
-const CELLS = [0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // m, sides of the grid's cells
+const CELLS = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // m, sides of the grid's cells
 const MOST_CELLS = 16; // along one side
 const MOVE = 700; // ms from one posture to the next
 const REST = 500; // ms at a target, when playing
 const VIEW = [0.55, -1, 0.42]; // from where one looks at first
+const FILLS = 0.8; // of the frame's radius, below which an arm is seen too small
 const SLACK = 0.2; // of the frame's radius, by which an arm may leave it before it grows
+
+const [HIT, NOW] = ["#009E73", "#E69F00"]; // of targets
 
 let content = null;
 let scene = null, camera = null, controls = null, renderer = null;
@@ -19,6 +22,7 @@ let materials = {};
 let frame = null; // { centre, radius } of what there is to see
 let moving = null; // { from, to, began } in joint space
 let playing = false;
+let turned = false; // whether the user has chosen from where to look
 let unit = {}; // shapes of size 1, which all parts share
 
 export function openArm(shownContent) {
@@ -28,7 +32,7 @@ export function openArm(shownContent) {
   $("next").addEventListener("click", () => step(1));
   $("play").addEventListener("click", () => play(!playing));
   $("ghost").addEventListener("change", drawArm);
-  $("reset").addEventListener("click", () => { frame = null; drawArm(); });
+  $("reset").addEventListener("click", () => { frame = null; turned = false; drawArm(); });
   $("compare").addEventListener("click", () => set({ compared: state.compared === null ? state.design : null }));
   addEventListener("keydown", (event) => {
     if (event.target.closest("input, select, textarea, table, .plot") || event.altKey || event.ctrlKey || event.metaKey) return;
@@ -37,6 +41,7 @@ export function openArm(shownContent) {
       event.preventDefault();
     }
   });
+  legend();
   try {
     begin();
   } catch {
@@ -56,9 +61,6 @@ export function openArm(shownContent) {
   words();
 }
 
-export function growArm() {
-  if (state.design !== null) drawArm();
-}
 
 // Where the joints of the drawn arm are, from what is drawn; for tests.
 export function drawnJoints() {
@@ -82,7 +84,9 @@ function begin() {
   }
   $("arm").append(renderer.domElement);
   controls = new THREE.OrbitControls(camera, renderer.domElement);
+  renderer.domElement.style.touchAction = "pan-y"; // a finger that goes up or down scrolls the page
   controls.addEventListener("change", render);
+  controls.addEventListener("start", () => { turned = true; });
   new ResizeObserver(fit).observe($("arm"));
   paint();
   onTheme(() => { paint(); frame = null; drawArm(); });
@@ -96,9 +100,21 @@ function paint() {
   materials = {
     link: solid(colour("arm")), base: solid(shown("#111111")), joints: ["x", "y", "z"].map((axis) => solid(joint[axis])),
     ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45),
-    reached: solid("#009E73"), missed: solid(target), now: solid("#E69F00"),
+    reached: solid(HIT), missed: solid(target), now: solid(NOW),
     gap: new THREE.LineDashedMaterial({ color: missed, dashSize: 0.02, gapSize: 0.012 }),
   };
+}
+
+// What the colours mean; letters as in the names of designs.
+function legend() {
+  const { joint } = content.head.colours, words = content.head.joint_words;
+  const parts = [...["x", "y", "z"].map((axis) => [joint[axis], words[axis]]),
+    [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
+  $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
+    const dot = element("span", { class: "dot" });
+    dot.style.background = paint_;
+    return element("span", { class: "key" }, dot, text);
+  }));
 }
 
 function fit() {
@@ -108,7 +124,8 @@ function fit() {
   renderer.setSize(box.clientWidth, box.clientHeight);
   camera.aspect = box.clientWidth / box.clientHeight;
   camera.updateProjectionMatrix();
-  render();
+  if (frame === null) render();
+  else look();
 }
 
 function render() {
@@ -129,8 +146,10 @@ function ball(place, radius, material) {
 
 // What there is to see of the selected design: the targets, and the arm in all postures.
 function extent() {
-  const arm = content.arm(state.design), points = [...content.targets];
-  content.targets.forEach((_, t) => points.push(...chain(arm, content.q(state.design, t)).joints));
+  const points = [...content.targets];
+  for (const i of new Set([state.design, state.compared ?? state.design])) {
+    content.targets.forEach((_, t) => points.push(...chain(content.arm(i), content.q(i, t)).joints));
+  }
   const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
   const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
   return { low, high };
@@ -138,15 +157,14 @@ function extent() {
 
 // Makes a frame that holds it; one that is there already stays, unless the arm leaves it.
 function reframe() {
-  let { low, high } = extent();
+  const { low, high } = extent(), radius = Math.max(1e-3, Math.hypot(...high.map((v, k) => v - low[k])) / 2);
   if (frame !== null) {
     const slack = SLACK * frame.radius;
     const holds = low.every((v, k) => v >= frame.low[k] - slack) && high.every((v, k) => v <= frame.high[k] + slack);
-    if (holds) return;
-    [low, high] = [low.map((v, k) => Math.min(v, frame.low[k])), high.map((v, k) => Math.max(v, frame.high[k]))];
+    if (holds && radius > FILLS * frame.radius) return;
   }
   const centre = low.map((v, k) => (v + high[k]) / 2);
-  frame = { centre, low, high, radius: Math.max(0.05, Math.hypot(...high.map((v, k) => v - low[k])) / 2) };
+  frame = { centre, low, high, radius };
   drawFloor();
   drawTargets();
   look();
@@ -154,9 +172,9 @@ function reframe() {
 
 function look() {
   const far = (1.02 * frame.radius) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
-  const size = Math.hypot(...VIEW);
+  const way = turned ? camera.position.clone().sub(controls.target) : new THREE.Vector3(...VIEW);
   controls.target.set(...frame.centre);
-  camera.position.set(...VIEW.map((v, k) => frame.centre[k] + (v / size) * far));
+  camera.position.copy(controls.target).addScaledVector(way.normalize(), far);
   camera.near = far / 100;
   camera.far = 10 * far;
   camera.updateProjectionMatrix();
@@ -166,20 +184,24 @@ function look() {
 
 function drawFloor() {
   empty(groups.floor);
-  const { low, high } = frame, span = Math.max(high[0] - low[0], high[1] - low[1], 0.1);
+  const { low, high } = frame, span = Math.max(high[0] - low[0], high[1] - low[1], 0.5 * frame.radius);
   const cell = CELLS.find((size) => span / size <= MOST_CELLS) ?? 100;
   const [x0, x1, y0, y1] = [low[0], high[0], low[1], high[1]].map((v, k) => (k % 2 ? Math.ceil(v / cell) : Math.floor(v / cell)) * cell);
   const z = low[2] - 0.02 * frame.radius, points = [];
   for (let x = x0; x <= x1 + cell / 2; x += cell) points.push(x, y0, z, x, y1, z);
   for (let y = y0; y <= y1 + cell / 2; y += cell) points.push(x0, y, z, x1, y, z);
   groups.floor.add(segments(points, new THREE.LineBasicMaterial({ color: colour("line") })));
-  for (const [k, axis] of ["x", "y", "z"].entries()) { // the world's axes, at the grid's corner
-    const end = [x0, y0, z];
-    end[k] += 0.45 * frame.radius;
-    groups.floor.add(segments([x0, y0, z, ...end], new THREE.LineBasicMaterial({ color: colour("soft") })));
-    groups.floor.add(label(axis, end));
+  const isSeen = [low[0], low[1], low[2]].every((v, k) => v - frame.radius / 2 <= 0 && high[k] + frame.radius / 2 >= 0);
+  const corner = isSeen ? [0, 0, 0] : [x0, y0, z];
+  for (const [k, axis] of ["x", "y", "z"].entries()) {
+    const [end, place] = [[...corner], [...corner]];
+    end[k] += 0.3 * frame.radius;
+    place[k] += 0.37 * frame.radius;
+    groups.floor.add(segments([...corner, ...end], new THREE.LineBasicMaterial({ color: colour("soft") })));
+    groups.floor.add(label(axis, place));
   }
-  $("arm-note").textContent = `Grid of ${number(cell)} m; z is up. Drag turns, wheel or two fingers zoom, arrow keys step through the targets.`;
+  const where = isSeen ? "the axes stand at the world's origin" : "the axes stand at the grid's corner, not at the world's origin";
+  $("arm-note").textContent = `Grid of ${number(cell)} m; ${where}; z is up. Drag turns, wheel or two fingers zoom, arrow keys step through the targets.`;
 }
 
 function segments(points, material) {
@@ -210,6 +232,9 @@ function drawTargets() {
 
 const ballSize = () => 0.028 * frame.radius;
 
+// A link is drawn as thick as it is, as far as that can be seen and hides nothing.
+const thick = (arm, j) => Math.min(Math.max(arm.radius[j], 0.008 * frame.radius), 0.035 * frame.radius);
+
 // A cylinder from one place to another.
 function rod(from, to, radius, material) {
   const [a, b] = [new THREE.Vector3(...from), new THREE.Vector3(...to)], way = b.clone().sub(a);
@@ -224,7 +249,7 @@ function drawPosture(group, arm, q, paints) {
   empty(group);
   const { joints, axes } = chain(arm, q);
   for (let j = 0; j < q.length; j++) {
-    const radius = Math.max(arm.radius[j], 0.008 * frame.radius), wide = 1.45 * radius;
+    const radius = thick(arm, j), wide = 1.45 * radius;
     group.add(rod(joints[j], joints[j + 1], radius, paints.link));
     const along = axes[j].map((v) => v * 1.25 * wide);
     const joint = rod(joints[j].map((v, k) => v - along[k]), joints[j].map((v, k) => v + along[k]), wide, paints.joints[arm.axis[j]]);
@@ -232,7 +257,7 @@ function drawPosture(group, arm, q, paints) {
     joint.position.set(...joints[j]);
     group.add(joint);
   }
-  const radius = Math.max(arm.radius[0], 0.008 * frame.radius);
+  const radius = thick(arm, 0);
   const [bx, by, bz] = joints[0];
   group.add(rod([bx, by, bz - 2.05 * radius], [bx, by, bz - 1.15 * radius], 2.4 * radius, paints.base));
   const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
@@ -251,14 +276,14 @@ export function drawArm() {
   gap(tip);
   groups.targets.children.forEach((mesh, t) => {
     mesh.material = t === state.target ? materials.now : posed[t].error < REACHED ? materials.reached : materials.missed;
-    mesh.scale.setScalar((t === state.target ? 1.35 : 1) * ballSize());
+    mesh.scale.setScalar((t === state.target ? 1.6 : 1) * ballSize());
   });
   empty(groups.ghost);
   if ($("ghost").checked) {
     posed.forEach((one, t) => {
       if (t === state.target) return;
       for (let j = 0; j < one.q.length; j++) {
-        groups.ghost.add(rod(one.joints[j], one.joints[j + 1], 0.55 * Math.max(arm.radius[j], 0.008 * frame.radius), materials.ghost));
+        groups.ghost.add(rod(one.joints[j], one.joints[j + 1], 0.55 * thick(arm, j), materials.ghost));
       }
     });
   }
@@ -300,7 +325,6 @@ function tick(now) {
   moving.now = moving.from.map((v, j) => v + eased * (moving.to[j] - v));
   if (share >= 1) {
     drawArm();
-    if (playing) setTimeout(() => playing && step(1), REST);
     return;
   }
   const shape = { link: materials.link, joints: materials.joints, base: materials.base };
@@ -317,8 +341,12 @@ function step(by) {
   if (n === 1) move();
 }
 
+let beat = null;
+
 function play(on) {
   playing = on;
+  clearInterval(beat);
+  beat = on ? setInterval(() => step(1), MOVE + REST) : null;
   $("play").setAttribute("aria-pressed", on);
   $("play").textContent = on ? "Stop" : "Play";
   if (on) step(1);

@@ -71,7 +71,7 @@ export class Content {
   get objectives() { return this.head.objectives; }
   get targets() { return this.head.targets; }
   source(i) { return this.head.sources[this._part("source", i)[0]]; }
-  look(i) { return this.head.looks[this.source(i)]; }
+  look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }
 
   params(i) {
@@ -82,6 +82,11 @@ export class Content {
   // Joint types in order, as one word.
   joints(i) {
     return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
+  }
+
+  // Names of the joints' actuators in order, where there is a choice.
+  motors(i) {
+    return this.params(i).filter((p) => p.choices && p.name.startsWith("motor_")).map((p) => p.value);
   }
 
   arm(i) {

@@ -1,7 +1,7 @@
 // The hypervolume over the iterations, and who gained what.
 
 import { set } from "./state.js";
-import { $, colour, element, number, onTheme, percent, plain } from "./words.js";
+import { $, colour, element, isTouched, number, onTheme, percent, plain } from "./words.js";
 
 const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
 
@@ -19,12 +19,14 @@ export function openCurve(shownContent) {
 }
 
 export function drawCurve() {
+  $("curve-box").querySelector("h2").textContent =
+    content.head.study ? "Hypervolume, and who enlarged it" : "Hypervolume";
   const search = content.head.result.search;
   const traces = search ? ofSearch(search) : ofStudy();
   const best = content.head.best_known;
   const layout = {
     xaxis: {
-      title: { text: search ? "Designs evaluated" : `Iteration (after ${content.head.n_init} random designs)`, standoff: 6 },
+      title: { text: search ? "Designs evaluated" : content.head.study ? `Iteration (after ${content.head.n_init} random designs)` : "Designs of the front", standoff: 6 },
       type: search ? "log" : "linear", gridcolor: colour("grid"), zeroline: false, linecolor: colour("line"), showline: true,
     },
     yaxis: {
@@ -36,7 +38,7 @@ export function drawCurve() {
       line: { color: colour("missed"), width: 1.2, dash: "dash" },
       label: { text: `best known ${number(best)}`, textposition: "start", font: { color: colour("missed"), size: 11 }, yanchor: "bottom" },
     }],
-    margin: { l: 58, r: 12, t: 14, b: 42 }, showlegend: false, hovermode: "closest", dragmode: "pan",
+    margin: { l: 58, r: 12, t: 14, b: 42 }, showlegend: false, hovermode: "closest", dragmode: isTouched() ? false : "pan",
     paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
   };
   if (best !== null) layout.yaxis.range = [0, 1.08 * Math.max(best, ...content.curve.slice(-1))];
@@ -75,17 +77,17 @@ function ofSearch(search) {
 
 // A design is credited with what it added when it came.
 function gains() {
-  const { curve } = content, gained = {};
+  const { curve } = content, gained = new Map();
   if (content.head.result.search || !curve.length) {
     $("gains").replaceChildren();
     return;
   }
   for (let i = 0; i < curve.length; i++) {
     const source = content.source(i);
-    gained[source] = (gained[source] ?? 0) + curve[i] - (curve[i - 1] ?? 0);
+    gained.set(source, (gained.get(source) ?? 0) + curve[i] - (curve[i - 1] ?? 0));
   }
   const whole = curve.at(-1) || 1;
-  $("gains").replaceChildren(...Object.entries(gained).map(([source, sum]) => {
+  $("gains").replaceChildren(...[...gained].map(([source, sum]) => {
     const look = content.head.looks[source];
     const dot = element("span", { class: "dot" });
     dot.style.background = look.colour;

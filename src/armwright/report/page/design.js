@@ -2,7 +2,7 @@
 
 import { chain, distance, holding, length, linkLength } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
-import { $, element, millimetres, number, save } from "./words.js";
+import { $, element, metres, millimetres, number, save } from "./words.js";
 
 export const REACHED = 1e-3; // m
 const AT_LIMIT = 1e-3; // rad or m
@@ -45,14 +45,18 @@ export function drawDesign() {
   $("design-box").hidden = i === null;
   if (i === null) return;
   const { head } = content, arm = content.arm(i), posed = postures(i), values = content.values(i);
-  const solid = content.isSolid(i);
+  const solid = content.isSolid(i), n = content.targets.length;
   const verdict = solid === null || !head.front.includes(i) ? "" : solid ? ", solid" : ", fragile";
   $("design-title").textContent = `#${i} ${content.joints(i)}, ${content.look(i).label}${verdict}`;
   const iteration = head.study && i >= head.n_init ? ` Iteration ${i - head.n_init + 1}.` : "";
-  const objectives = head.objectives.map((o, k) => `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}`);
+  const objectives = head.objectives.map((o, k) => {
+    const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
+    return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
+  });
+  const motors = content.motors(i).length ? ` Motors: ${content.motors(i).join(", ")}.` : "";
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
-  const base = Array.from(arm.base, (v) => number(v, 3)).join(", ");
-  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m. ${onFront}${iteration}`;
+  const base = Array.from(arm.base, metres).join(", ");
+  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m. ${onFront}${iteration}${motors}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -70,8 +74,8 @@ function drawLinks(arm) {
   $("links").replaceChildren(...Array.from(arm.axis, (axis, j) => {
     const long = linkLength(arm, j);
     const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${"xyz"[axis]})` },
-      `${"xyz"[axis].toUpperCase()} ${millimetres(long)}`);
-    bar.style.flex = `${Math.max(long, 1e-3)} 1 0`;
+      `${"RPY"[axis]} ${millimetres(long)}`);
+    bar.style.flex = `${1e6 * Math.max(long, 1e-6)} 1 0`;
     bar.style.background = joint["xyz"[axis]];
     return bar;
   }));
@@ -81,10 +85,16 @@ function drawPostures(arm, posed) {
   const joints = [...arm.axis.keys()];
   const head = element("tr", {}, ...["", "target [m]", "missed by", "torque [N m]"].map((name, k) =>
     element("th", { scope: "col", class: k === 1 ? "text" : "" }, name)),
-  ...joints.map((j) => element("th", { scope: "col" }, arm.kind[j] === 1 ? `q${j + 1} [m]` : `q${j + 1}`)));
+  ...joints.map((j) => element("th", { scope: "col", title: `limits ${number(arm.lower[j], 3)} to ${number(arm.upper[j], 3)}` },
+    arm.kind[j] === 1 ? `q${j + 1} [m]` : `q${j + 1}`)));
   const rows = posed.map((one, t) => element("tr", {
     "data-target": t, tabindex: "0", onclick: () => set({ target: t }),
-    onkeydown: (event) => { if (event.key === "Enter") set({ target: t }); },
+    onkeydown: (event) => {
+      if (event.key === "Enter" || event.key === " ") {
+        set({ target: t });
+        event.preventDefault();
+      }
+    },
   },
   element("td", {}, String(t + 1)),
   element("td", { class: "text" }, one.target.map((v) => number(v, 3)).join(", ")),
@@ -95,21 +105,39 @@ function drawPostures(arm, posed) {
     return element("td", {}, element("span", { class: side ? "limit" : "", title: side ? `at its ${side} limit` : null }, one.q[j].toFixed(3).replace(/^-(?=[0.]+$)/, "")));
   })));
   const limits = element("tr", {}, element("td", { class: "text", colspan: "4" }, "limits"),
-    ...joints.map((j) => element("td", {}, `${number(arm.lower[j], 3)} … ${number(arm.upper[j], 3)}`)));
+    ...joints.map((j) => element("td", {}, `${number(arm.lower[j], 3)}…${number(arm.upper[j], 3)}`)));
   $("postures").replaceChildren(element("thead", {}, head), element("tbody", {}, ...rows), element("tfoot", {}, limits));
   mark();
 }
 
 function mark() {
   for (const row of $("postures").querySelectorAll("tbody tr")) {
-    row.classList.toggle("chosen", Number(row.dataset.target) === state.target);
+    const isChosen = Number(row.dataset.target) === state.target;
+    row.classList.toggle("chosen", isChosen);
+    row.setAttribute("aria-current", isChosen);
+    if (isChosen) showRow(row);
+  }
+}
+
+// Scrolls a table's own box, never the page.
+export function showRow(row) {
+  const box = row.closest(".scroll"), head = box.querySelector("thead").offsetHeight;
+  if (row.offsetTop - head < box.scrollTop) box.scrollTop = row.offsetTop - head;
+  else if (row.offsetTop + 2 * row.offsetHeight > box.scrollTop + box.clientHeight) {
+    box.scrollTop = row.offsetTop + 2 * row.offsetHeight - box.clientHeight;
   }
 }
 
 async function download(format) {
   const i = state.design, name = `${content.head.task.name}-${i}.${ENDINGS[format]}`;
   if (format === "csv") save(name, asCsv(i), TYPES.csv);
-  else save(name, content.head.files[i]?.[format] ?? (await fetchFile(i, format)), TYPES[format]);
+  else {
+    try {
+      save(name, content.head.files[i]?.[format] ?? (await fetchFile(i, format)), TYPES[format]);
+    } catch (fault) {
+      $("design-note").textContent = `The file did not come: ${fault.message}.`;
+    }
+  }
 }
 
 function asCsv(i) {

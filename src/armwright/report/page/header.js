@@ -1,20 +1,15 @@
 // What run this is, and what it came to.
 
-import { $, duration, element, number, percent } from "./words.js";
+import { $, duration, element, number, percent, plural } from "./words.js";
 
 let content = null;
 
 export function openHeader(shownContent) {
   content = shownContent;
-  const { head } = content;
-  $("title").textContent = `${head.task.name}: ${head.method}, seed ${head.seed}`;
-  $("description").textContent = head.task.description;
-  $("repeat").hidden = head.command === "";
-  $("repeat").querySelector("code").textContent = head.command;
   const copy = $("repeat").querySelector("button");
   copy.hidden = navigator.clipboard === undefined;
   copy.addEventListener("click", async () => {
-    await navigator.clipboard.writeText(head.command);
+    await navigator.clipboard.writeText(content.head.command);
     copy.textContent = "Copied";
   });
   drawHeader();
@@ -28,6 +23,10 @@ function fact(name, value, paint) {
 
 export function drawHeader() {
   const { head } = content, { result } = head, facts = [];
+  $("title").textContent = `${head.task.name}: ${head.method}, seed ${head.seed}`;
+  $("description").textContent = head.task.description;
+  $("repeat").hidden = head.command === "";
+  $("repeat").querySelector("code").textContent = head.command;
   if (!result.finished) facts.push(fact("state", "unfinished"));
   if (result.hypervolume !== null) {
     const share = head.best_known ? ` (${percent(result.hypervolume / head.best_known)} of the best known)` : "";
@@ -35,12 +34,12 @@ export function drawHeader() {
     facts.push(fact("reference point", `(${head.reference_point.map((v) => number(v)).join(", ")})`));
   }
   const solid = result.solid === null ? "" : `, ${result.solid.length} solid`;
-  facts.push(fact("front", `${head.front.length} designs${solid}`));
+  facts.push(fact("front", `${plural(head.front.length, "design")}${solid}`));
   for (const [source, n] of Object.entries(result.by_source)) {
     facts.push(fact(head.looks[source].label, `${n}`, head.looks[source].colour));
   }
   if (result.evaluations > content.n) facts.push(fact("evaluations", result.evaluations.toLocaleString("en")));
-  facts.push(fact("time", duration(result.seconds)));
+  if (result.seconds > 0) facts.push(fact("time", duration(result.seconds)));
   if (content.calls.length) {
     const calls = content.calls.reduce((sum, call) => sum + Math.max(1, call.requests), 0);
     const costs = content.calls.map((call) => call.cost_usd).filter((cost) => cost !== null);

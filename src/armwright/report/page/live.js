@@ -8,7 +8,7 @@ let content = null;
 let take = null;
 let token = "";
 let status = null;
-let busy = false, behind = false;
+let busy = false, behind = false, lost = false;
 
 // The part of the run that the page lacks.
 async function fetchRun() {
@@ -39,18 +39,36 @@ export function openLive(shownContent, taken) {
     const text = $("hint-text").value.trim();
     if (text && (await send({ action: "hint", text }))) $("hint-text").value = "";
   });
-  const events = new EventSource("events"); // asks again by itself when the connection is lost
+  // A browser has six connections to a server for all of its tabs; those that nobody sees do without.
+  listenTo();
+  document.addEventListener("visibilitychange", listenTo);
+  setInterval(show, 1000); // the seconds of what goes on
+}
+
+let events = null;
+
+function listenTo() {
+  events?.close();
+  events = null;
+  if (document.hidden) return;
+  events = new EventSource("events"); // asks again by itself when the connection is lost
   events.addEventListener("status", (event) => {
+    lost = false;
+    const before = status;
     status = JSON.parse(event.data);
+    if (before !== null && before.run !== status.run) { // another run in this folder, or at this address
+      location.reload();
+      return;
+    }
     show();
     const isNews = status.designs !== content.n || status.calls !== content.calls.length
       || status.finished !== content.head?.result.finished;
     if (isNews && (status.designs || content.n)) catchUp();
   });
   events.addEventListener("error", () => {
-    if (status === null || status.doing !== "finished") $("doing").textContent = "No connection to the run; trying again …";
+    lost = true;
+    show();
   });
-  setInterval(show, 1000); // the seconds of what goes on
 }
 
 async function catchUp() {
@@ -59,13 +77,14 @@ async function catchUp() {
     return;
   }
   busy = true;
+  let news = null;
   try {
-    take(await fetchRun());
-  } catch (fault) {
-    $("doing").textContent = `No connection to the run (${fault.message}); trying again …`;
+    news = await fetchRun();
+  } catch {
     setTimeout(catchUp, AGAIN);
   }
   busy = false;
+  if (news !== null) take(news);
   if (behind) {
     behind = false;
     catchUp();
@@ -73,24 +92,30 @@ async function catchUp() {
 }
 
 async function send(wish) {
-  const reply = await fetch("control", {
-    method: "POST", headers: { "content-type": "application/json", "x-armwright-token": token }, body: JSON.stringify(wish),
-  });
-  complain(reply.ok ? "" : await reply.text());
-  return reply.ok;
+  try {
+    const reply = await fetch("control", {
+      method: "POST", headers: { "content-type": "application/json", "x-armwright-token": token }, body: JSON.stringify(wish),
+    });
+    complain("refusal", reply.ok ? "" : `That was refused: ${await reply.text()}.`);
+    return reply.ok;
+  } catch {
+    complain("refusal", "That did not reach the run.");
+    return false;
+  }
 }
 
-function complain(words) {
-  $("fault").hidden = words === "";
-  $("fault").textContent = words;
+function complain(id, words) {
+  $(id).hidden = words === "";
+  $(id).textContent = words;
 }
 
 const since = () => duration(Math.max(0, Date.now() / 1000 - status.since));
 
 function doing() {
   switch (status.doing) {
-    case "asking": return `asking the model, ${since()}`;
-    case "evaluating": return `evaluating ${Math.min(status.designs + 1, status.planned)} of ${status.planned}`;
+    case "asking": return `asking the ${status.takes_hints ? "model" : "proposer"}, ${since()}`;
+    case "evaluating":
+      return status.designs < status.planned ? `evaluating ${status.designs + 1} of ${status.planned}` : "writing the results";
     case "paused": return `paused for ${since()}, at ${status.designs} of ${status.planned}`;
     case "stopped": return `stopped at ${status.designs} of ${status.planned}; the same command goes on`;
     case "finished": return `finished: ${status.designs} designs`;
@@ -99,18 +124,21 @@ function doing() {
 }
 
 function show() {
+  const isOver = lost || !["asking", "evaluating", "paused"].includes(status?.doing);
+  if (lost && status?.doing !== "finished") $("doing").textContent = "No connection to the run; trying again …";
+  else if (status !== null) $("doing").textContent = doing();
   if (status === null) return;
-  const isOver = !["asking", "evaluating", "paused"].includes(status.doing);
-  $("doing").textContent = doing();
   $("progress").hidden = !status.planned;
   $("progress").max = status.planned || 1;
   $("progress").value = status.designs;
-  $("left").textContent = isOver || status.left === null ? "" : `about ${duration(status.left)} left`;
-  $("pause").disabled = $("stop").disabled = isOver;
+  $("left").textContent = isOver || status.left === null || status.left < 1 ? "" : `about ${duration(status.left)} left`;
+  $("pause").hidden = $("stop").hidden = !lost && isOver;
+  $("pause").disabled = $("stop").disabled = lost;
   $("pause").setAttribute("aria-pressed", status.paused);
   $("pause").textContent = status.paused ? "Resume" : "Pause";
   $("hint").hidden = !status.takes_hints || isOver;
-  complain(status.fault ? `last fault: ${status.fault}` : "");
-  $("hints").replaceChildren(...status.hints.map((hint) => element("li", {},
+  complain("fault", status.fault ? `last fault: ${status.fault}` : "");
+  const used = status.hints.filter((hint) => hint.used !== null), waiting = status.hints.filter((hint) => hint.used === null);
+  $("hints").replaceChildren(...[...used.slice(-1), ...waiting].map((hint) => element("li", {},
     hint.used === null ? "waits for the next question: " : `used at iteration ${hint.used}: `, element("em", {}, hint.text))));
 }

@@ -1,6 +1,6 @@
 // Opens the page: with what it holds, or with what its server sends.
 
-import { drawArm, drawnJoints, growArm, openArm } from "./arm.js";
+import { drawArm, drawnJoints, openArm } from "./arm.js";
 import { Content, embedded } from "./content.js";
 import { drawCurve, openCurve } from "./curve.js";
 import { drawDesign, openDesign, postures } from "./design.js";
@@ -53,16 +53,24 @@ function grow() {
   growPareto();
   drawTable();
   drawTranscript();
-  drawDesign();
-  growArm();
   drawConfiguration();
 }
 
 function take(buffer) {
+  const known = content.n, before = content.head?.result.finished;
   content.add(buffer);
   if (content.n === 0) return;
-  if (isOpen) grow();
-  else open();
+  if (!isOpen) {
+    open();
+    return;
+  }
+  const isAnother = content.n < known || content.head.designs_from === 0; // the run began anew, or was polished
+  if (isAnother) set({ design: Math.min(state.design ?? 0, content.n - 1), compared: null });
+  grow();
+  if (isAnother || content.head.result.finished !== before) {
+    drawDesign();
+    drawArm();
+  }
 }
 
 async function start() {

@@ -1,14 +1,18 @@
 // The designs in the plane of two objectives: who found them, their front, and which one is selected.
 
 import { listen, set, state } from "./state.js";
-import { $, colour, element, number, onTheme, plain, title } from "./words.js";
+import { $, colour, element, isTouched, number, onTheme, plain, title } from "./words.js";
 
 const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
 const VIEW = 1.35; // of the reference point, the part of the plane that is shown first
 const PRECISE = 0.02; // of the reference point
 const FLOOR = 1e-4; // m; on a logarithmic axis smaller errors are drawn here
+const DENSE = 100; // designs of a front, from which on outlines would eat the dots
 const MARKS = [0.05, 0.35, 0.65, 1]; // of the iterations: 10, 70, 130, 200 of 200
-const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+const CONFIG = {
+  displaylogo: false, responsive: true, plotlyServerURL: "",
+  modeBarButtons: [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
+};
 
 let content = null;
 let x = 0, y = 1, log = false;
@@ -88,23 +92,26 @@ function slider() {
   $("iteration-value").textContent = state.iteration ?? total;
   const planned = content.head.planned - content.head.n_init;
   const marks = MARKS.map((share) => Math.max(1, Math.round(share * planned))).filter((mark) => mark <= total);
-  $("marks").replaceChildren(...[...new Set(marks)].map((mark) => {
+  const list = [...new Set(marks)];
+  if (list.join() === $("marks").dataset.list) return; // so that a button keeps the focus
+  $("marks").dataset.list = list.join();
+  $("marks").replaceChildren(...list.map((mark) => {
     const button = document.createElement("button");
     button.type = "button";
     button.textContent = mark;
     button.title = `After ${mark} iterations`;
-    button.addEventListener("click", () => set({ iteration: mark >= total ? null : mark }));
+    button.addEventListener("click", () => set({ iteration: mark >= counted() ? null : mark }));
     return button;
   }));
 }
 
 function draw() {
   slider();
-  const n = until(), reference = content.head.reference_point, traces = [];
+  const n = until(), reference = content.head.reference_point, traces = [], many = content.objectives.length > 2;
   const front = frontUntil(n);
   const inside = reference === null ? front
     : front.filter((i) => content.values(i)[x] < reference[x] && content.values(i)[y] < reference[y]);
-  if (inside.length && reference !== null) {
+  if (inside.length && reference !== null && !many) {
     const xs = [], ys = [];
     inside.forEach((i, k) => {
       const [u, v] = [placed(content.values(i)[x], 0), content.values(i)[y]];
@@ -121,7 +128,7 @@ function draw() {
       x: xs, y: ys, mode: "lines", line: { color: colour("ink"), width: 1.5 }, name: "Pareto front", hoverinfo: "skip",
     });
   }
-  const onFront = new Set(front);
+  const onFront = new Set(many && n === content.n ? content.head.front : front);
   for (const source of content.head.sources) {
     const look = content.head.looks[source], rows = [];
     for (let i = 0; i < n; i++) if (content.source(i) === source) rows.push(i);
@@ -138,7 +145,10 @@ function draw() {
         symbol: SYMBOLS[look.marker] ?? "circle", color: look.colour,
         size: rows.map((i) => (onFront.has(i) ? 10 : isProposer(source) ? 9 : 7)),
         opacity: rows.map((i) => (onFront.has(i) ? 1 : isProposer(source) ? 0.9 : 0.55)),
-        line: { width: look.marker === "x" ? 1.5 : 0.6, color: look.marker === "x" ? look.colour : colour("paper") },
+        line: {
+          width: look.marker === "x" ? 1.5 : front.length > DENSE ? 0 : 0.6,
+          color: look.marker === "x" ? look.colour : colour("paper"),
+        },
       },
     });
   }
@@ -148,7 +158,8 @@ function draw() {
       marker: { symbol: "cross-thin", size: 12, line: { width: 2, color: colour("ink") } },
     });
   }
-  const high = (k) => (reference === null ? undefined : VIEW * reference[k]);
+  const worst = (k) => Math.max(...front.map((i) => content.values(i)[k]));
+  const high = (k) => (reference === null ? undefined : VIEW * (inside.length ? reference[k] : Math.max(reference[k], worst(k))));
   const low = Math.max(FLOOR, Math.min(...inside.map((i) => content.values(i)[x]), high(x) ?? 1));
   const layout = {
     xaxis: axis(content.objectives[x], log ? [Math.log10(low / 1.5), Math.log10(high(x) ?? 10)] : high(x) && [0, high(x)], log),
@@ -156,13 +167,15 @@ function draw() {
     margin: { l: 58, r: 12, t: 8, b: 46 },
     legend: { orientation: "h", y: -64 / Math.max(100, $("pareto").clientHeight - 54), font: { size: 12 } },
     paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
-    hovermode: "closest", uirevision: `${x} ${y} ${log}`, dragmode: "pan",
+    modebar: { bgcolor: "transparent", color: colour("soft"), activecolor: colour("accent") },
+    hovermode: "closest", uirevision: `${x} ${y} ${log}`, dragmode: isTouched() ? false : "pan",
   };
   Plotly.react($("pareto"), traces, layout, CONFIG);
   const outside = reference === null ? 0
     : [...Array(n).keys()].filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
   const notes = ["Click a design to see its arm."];
   if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
+  if (many) notes.push("Large: on the front in all objectives; in this plane others may lie before them.");
   if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
   if (content.head.is_toy) notes.push("Toy masses: torques compare designs, and say nothing of motors.");
   $("pareto-note").textContent = notes.join(" ");

@@ -1,7 +1,8 @@
 // The Pareto front as a table: sorted by any column, linked to what is selected.
 
+import { showRow } from "./design.js";
 import { listen, set, state } from "./state.js";
-import { $, element, number } from "./words.js";
+import { $, element, metres, number, plural } from "./words.js";
 
 let content = null;
 let sorted = { key: "0", up: true };
@@ -26,8 +27,12 @@ function columns() {
     made.push({ key: "solid", name: "verdict", text: true, value: (i) => (content.isSolid(i) ? "solid" : "fragile") });
   }
   made.push({ key: "joints", name: "joints", text: true, value: (i) => content.joints(i) });
+  if (head.parameters.some((p) => p.name.startsWith("motor_"))) {
+    made.push({ key: "motors", name: "motors", text: true, value: (i) => content.motors(i).join(", ") });
+  }
   head.parameters.forEach((p, k) => {
-    if (!p.choices) made.push({ key: p.name, name: `${p.name.replace("_", " ")} [${p.unit}]`, value: (i) => content.params(i)[k].value });
+    const form = p.unit === "m" ? metres : number;
+    if (!p.choices) made.push({ key: p.name, name: `${p.name.replace("_", " ")} [${p.unit}]`, form, value: (i) => content.params(i)[k].value });
   });
   return made;
 }
@@ -52,10 +57,12 @@ export function drawTable() {
   const body = rows.map((i) => element("tr", { "data-design": i, tabindex: "0", onclick: () => set({ design: i }), onkeydown: step },
     ...all.map((column) => {
       const value = column.value(i);
-      return element("td", { class: column.text ? "text" : "" }, column.text || column.key === "number" ? String(value) : number(value));
+      return element("td", { class: column.text ? "text" : "" }, column.text || column.key === "number" ? String(value) : (column.form ?? number)(value));
     })));
+  const focused = document.activeElement?.closest?.("#table tbody tr")?.dataset.design;
   $("table").replaceChildren(element("thead", {}, head), element("tbody", {}, ...body));
-  $("table-title").textContent = `Pareto front: ${rows.length} design${rows.length === 1 ? "" : "s"}`;
+  if (focused !== undefined) $("table").querySelector(`tr[data-design="${focused}"]`)?.focus({ preventScroll: true });
+  $("table-title").textContent = `Pareto front: ${plural(rows.length, "design")}`;
   mark();
 }
 
@@ -76,6 +83,7 @@ function mark() {
   for (const row of $("table").querySelectorAll("tbody tr")) {
     const chosen = Number(row.dataset.design) === state.design;
     row.classList.toggle("chosen", chosen);
-    row.setAttribute("aria-selected", chosen);
+    row.setAttribute("aria-current", chosen);
+    if (chosen) showRow(row);
   }
 }

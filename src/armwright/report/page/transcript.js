@@ -23,6 +23,9 @@ export function drawTranscript() {
   const parts = [];
   if (!all) parts.push(element("p", {}, words()));
   parts.push(...calls.map(told));
+  const key = `${all} ${state.design} ${calls.length}`; // what is there stays, so that an opened prompt stays open
+  if (key === $("transcript").dataset.key) return;
+  $("transcript").dataset.key = key;
   $("transcript").replaceChildren(...parts);
 }
 
@@ -31,7 +34,7 @@ function words() {
   if (i === null) return "Select a design.";
   if (said?.refines !== null && said?.refines !== undefined) return `#${i} is design #${said.refines}, refined.`;
   if (said?.fault) return `At #${i} a proposal was due and failed (${said.fault}); the black box took its place.`;
-  if (!said) return `#${i} is by ${content.look(i).label}; nobody gave words for it.`;
+  if (!said) return `#${i} was found by: ${content.look(i).label}; nobody gave words for it.`;
   const expected = said.expected ? ` Expected: ${said.expected.map((value) => number(value)).join(", ")}.` : "";
   return `#${i}, by ${content.look(i).label}: ${said.reason || "no reason was given"}.${expected}`.replace("..", ".");
 }

@@ -15,13 +15,19 @@ export function element(tag, attributes = {}, ...children) {
 
 export function number(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
-  if (value === 0) return "0";
+  if (Math.abs(value) < 1e-12) return "0";
   const size = Math.abs(value);
   return size >= 1e5 || size < 1e-4 ? value.toExponential(2) : String(Number(value.toPrecision(digits)));
 }
 
 export const percent = (share, digits = 1) => `${(100 * share).toFixed(digits)} %`;
-export const millimetres = (metres) => `${number(1000 * metres, 3)} mm`;
+export const millimetres = (metres) => (metres >= 1 ? `${number(metres, 3)} m` : `${number(1000 * metres, 3)} mm`);
+export const plural = (n, word) => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
+
+// Metres to a tenth of a millimetre, so that columns stand under each other.
+export const metres = (value) => value.toFixed(4).replace(/^-(?=[0.]+$)/, "");
+
+export const isTouched = () => matchMedia("(pointer: coarse)").matches;
 
 export function duration(seconds) {
   if (seconds < 1) return `${Math.round(1000 * seconds)} ms`;
@@ -41,7 +47,7 @@ export function colour(name) {
 
 // Calls back when the system goes dark or light.
 export function onTheme(told) {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", told);
+  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", told);
 }
 
 // What is nearly black on paper is nearly white in the dark.

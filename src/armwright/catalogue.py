@@ -1,0 +1,79 @@
+"""Real actuators: what their makers state, each number with its source; a field without a source is empty.
+
+Shipped in actuators.csv. A space names those that its joints may have, or describes others.
+"""
+
+import csv
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from armwright.arm import Actuator
+from armwright.exceptions import SpaceError, did_you_mean
+
+CATALOGUE = "actuators.csv"
+TorqueKind = Literal["stall", "rated", "peak"]
+
+
+class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """An actuator as a data sheet tells of it; None where it does not.
+
+    Masses in kg, torques in N m, speed in rad/s without load, size in m, price in USD.
+    """
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,39}$")
+    maker: str = Field(default="", max_length=100)
+    kind: str = Field(default="", max_length=40)
+    voltage: float | None = Field(default=None, gt=0.0)
+    mass: float = Field(ge=0.0, le=1e4)
+    stall_torque: float | None = Field(default=None, gt=0.0, le=1e6)
+    rated_torque: float | None = Field(default=None, gt=0.0, le=1e6)
+    peak_torque: float | None = Field(default=None, gt=0.0, le=1e6)
+    speed: float | None = Field(default=None, gt=0.0)
+    width: float | None = Field(default=None, gt=0.0)
+    height: float | None = Field(default=None, gt=0.0)
+    depth: float | None = Field(default=None, gt=0.0)
+    price: float | None = Field(default=None, ge=0.0)
+    source: str = Field(default="", max_length=500)
+    note: str = Field(default="", max_length=1000)
+
+    def torque(self, kind: TorqueKind) -> float | None:
+        """The stall, rated or peak torque [N m]."""
+        return {"stall": self.stall_torque, "rated": self.rated_torque, "peak": self.peak_torque}[kind]
+
+    def actuator(self, kind: TorqueKind, safety_factor: float) -> Actuator:
+        """What the arm knows of it: its torque of that kind, divided by the factor; SpaceError where none is stated."""
+        torque = self.torque(kind)
+        if torque is None:
+            stated = [other for other in ("stall", "rated", "peak") if self.torque(other) is not None]
+            known = f"its {' and '.join(stated)} torque is known" if stated else "none is known"
+            raise SpaceError(f"actuator {self.name} has no {kind} torque, {known}; choose another by actuator_torque")
+        return Actuator(self.name, self.mass, torque / safety_factor, self.speed, self.price)
+
+
+@cache
+def catalogue() -> Mapping[str, ActuatorRecord]:
+    """The actuators that come with armwright, by name."""
+    text = (resources.files("armwright") / CATALOGUE).read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    records = [
+        ActuatorRecord.model_validate({key: value for key, value in row.items() if value})
+        for row in csv.DictReader(lines)
+    ]
+    return {record.name: record for record in records}
+
+
+def resolved(entry: Any) -> Any:
+    """The record of a name in a space file; anything else as it is, to be checked as a record."""
+    if not isinstance(entry, str):
+        return entry
+    known = catalogue()
+    if entry not in known:
+        raise ValueError(
+            f'unknown actuator "{entry}".{did_you_mean(entry, known)} `armwright actuators` lists the {len(known)} of '
+            "the catalogue; others are described by name, mass [kg] and stall_torque [N m]"
+        )
+    return known[entry]
