@@ -26,8 +26,8 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     """The MJCF of an arm: `base`, link_1 on joint_1, …, a site `tip`, and motor_1 on joint_1, ….
 
     Names, frames, masses, inertias and colours are those of `to_urdf`: link frames stand at their joints, and with all
-    joints at 0 they are parallel to the world's. Each joint that moves has a motor with gear 1, limited to the torque of
-    its actuator where it has one: its `ctrl` is the torque [N m], or the force [N], on that joint.
+    joints at 0 they are parallel to the world's. Each joint that moves has a motor with gear 1, limited to the torque
+    of its actuator where it has one: its `ctrl` is the torque [N m], or the force [N], on that joint.
 
     What is drawn is for sight alone. It has no mass, as that of each link is stated, and touches nothing: links overlap
     at their joints, so contacts would push them out of any posture, and arms are searched without collisions, too.
