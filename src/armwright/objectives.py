@@ -152,7 +152,7 @@ MASS = Objective(
 TORQUE_USE = Objective(
     name="torque_use",
     label="Torque use",
-    unit="of what is allowed",
+    unit="of allowed",
     symbol="E_use",
     words="the largest share of its actuator's torque that any joint needs to hold the kept posture up against "
     "gravity; above 1 the arm cannot hold it",

@@ -122,10 +122,9 @@ function mark() {
 // Scrolls a table's own box, never the page.
 export function showRow(row) {
   const box = row.closest(".scroll"), head = box.querySelector("thead").offsetHeight;
+  const foot = box.querySelector("tfoot")?.offsetHeight ?? 0, end = row.offsetTop + row.offsetHeight + foot;
   if (row.offsetTop - head < box.scrollTop) box.scrollTop = row.offsetTop - head;
-  else if (row.offsetTop + 2 * row.offsetHeight > box.scrollTop + box.clientHeight) {
-    box.scrollTop = row.offsetTop + 2 * row.offsetHeight - box.clientHeight;
-  }
+  else if (end > box.scrollTop + box.clientHeight) box.scrollTop = end - box.clientHeight;
 }
 
 async function download(format) {
