@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from armwright.arm import Actuator, Arm, Joint, Link
 from armwright.catalogue import ActuatorRecord, catalogue
 from armwright.cli import app
+from armwright.evaluation import evaluate
 from armwright.exceptions import ArmError, SettingsError, SpaceError
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
@@ -188,3 +189,32 @@ def test_a_record_is_the_same_after_a_round_trip() -> None:
     again = DesignSpace.model_validate(json.loads(SPACE.model_dump_json()))
     assert again == SPACE
     assert ActuatorRecord.model_validate(BIG).actuator("rated", 2.0).effort == 2.0
+
+
+def open_manipulator_x() -> Arm:
+    """ROBOTIS OpenMANIPULATOR-X from its maker's URDF; the links' masses hold their actuators."""
+    motor = catalogue()["XM430-W350"].actuator("stall", 1.0)
+    limits = ((-0.9, 0.9), (-0.57, 0.5), (-0.3, 0.44), (-0.57, 0.65))
+    bodies = [
+        ((0.0, 0.0, 0.0595), 0.098406837, (-0.000301849, 0.000540437, 0.047433464)),
+        ((0.024, 0.0, 0.128), 0.13850917, (0.010308393, 0.000377434, 0.101701970)),
+        ((0.124, 0.0, 0.0), 0.13274562, (0.090909590, 0.000389298, 0.000224133)),
+        ((0.126, 0.0, 0.0), 0.16327573, (0.048796, 0.0, 0.007822)),  # with both fingers of the gripper, 10 g each
+    ]
+    joints = [
+        Joint("revolute", axis, np.pi * low, np.pi * high, motor)
+        for axis, (low, high) in zip("zyyy", limits, strict=True)
+    ]
+    return Arm(
+        (0.012, 0.0, 0.017), tuple(joints), tuple(Link(offset, mass, com, 0.015) for offset, mass, com in bodies)
+    )
+
+
+@pytest.mark.parametrize(("payload", "holds"), [(0.0, True), (0.5, True), (1.0, False)])
+def test_open_manipulator_x_carries_what_its_maker_says_and_not_twice_that(payload: float, holds: bool) -> None:
+    """0.5 kg at a reach of 0.38 m, by the stall torque of its XM430-W350 at 12 V: the maker's specification."""
+    reached = (0.012 + 0.378, 0.0, 0.017 + 0.0595)  # the shoulder's height, 2 mm short of the stretched arm
+    evaluation = evaluate([open_manipulator_x()], [reached], payload=payload)
+    assert evaluation.position_error[0, 0] < 0.01  # the stretched arm is singular
+    (use,) = named_objectives(["torque_use"])[0](evaluation)
+    assert (use <= 1.0) == holds

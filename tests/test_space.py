@@ -3,12 +3,21 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError, SpaceError
+from armwright.front import find_front
+from armwright.kinematics.arrays import FLOATS, arrays_of, stack_arms
+from armwright.llm.prompt import load_prompt
+from armwright.problem import Problem
+from armwright.run_folder import read_run
 from armwright.space import Design, DesignSpace, FloatParameter, MassOfTube, MassPerLink, load_space, paper_space
+from armwright.study import optimize
+from armwright.task import load_task
 
 GOOD = paper_space().sample(1, 0)[0].params
 
@@ -165,3 +174,55 @@ def test_a_design_of_another_space_builds_no_arm() -> None:
 def test_designs_are_values() -> None:
     assert Design(GOOD) == Design(dict(GOOD))
     assert len({Design(GOOD), Design(dict(GOOD))}) == 1
+
+
+RESTRICTED = {"joint_1": "Y", "joint_2": ["P", "R"], "origin_z": 0.0, "link_1": [0.1, 0.2]}
+
+
+def test_single_parameters_can_be_fixed_or_narrower(tmp_path: Path) -> None:
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": RESTRICTED}))
+    space = load_space(tmp_path / "space.yaml")
+    designs = space.sample(200, 1)
+    assert {design.joints[0] for design in designs} == {"Y"}
+    assert {design.joints[1] for design in designs} == {"P", "R"}
+    assert {design.joints[2] for design in designs} == {"R", "P", "Y"}
+    assert {design.origin[2] for design in designs} == {0.0}
+    assert 0.1 <= min(design.links[0] for design in designs) <= max(design.links[0] for design in designs) <= 0.2
+    one, other = arrays_of(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
+    for name in (*FLOATS, "axis"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+    assert space.designs(space.matrix(designs)) == designs
+    assert DesignSpace.model_validate_json(space.model_dump_json()) == space
+    moved = space.clipped((0.0, 0.0, 0.7), "RYPY", (0.3, 0.3, 0.3, 0.3))
+    assert (moved.joints, moved.origin[2], moved.links[0]) == ("YRPY", 0.0, 0.2)
+
+
+def test_a_restricted_space_goes_through_a_run(tmp_path: Path) -> None:
+    space = DesignSpace.model_validate({"restrict": RESTRICTED})
+    problem = Problem(load_task("target-1"), space)
+    run = optimize(problem, proposer="rules", n_init=4, n_step=2, n_total=12, out=tmp_path / "run")
+    assert {trial.design.joints[0] for trial in run.trials} == {"Y"}
+    assert read_run(tmp_path / "run")[0].space == space
+    found = find_front(problem, budget=1500)
+    assert {member.design.joints[0] for member in found.front} == {"Y"}
+    prompt = load_prompt("plus").render(run.history, 0)
+    assert "origin_z = 0 (fixed); joint_1 = Y; joint_2 is one of R, P; 0.1 <= link_1 <= 0.2." in prompt
+
+
+@pytest.mark.parametrize(
+    ("restrict", "words"),
+    [
+        ({"joint_1": "S"}, "joint_1 = 'S' is not one of R, P, Y"),
+        ({"joint_1": []}, "joint_1 is left no choice"),
+        ({"link_9": 0.1}, 'no parameter "link_9".*Did you mean'),
+        ({"link_1": [0.2, 0.1]}, "is not a part of"),
+        ({"link_1": 0.5}, "is not a part of"),
+        ({"link_1": "Y"}, "no number and no range"),
+        ({"link_1": [0.1, 0.15, 0.2]}, "restrict"),
+        ("joint_1", "restrict"),
+    ],
+)
+def test_what_is_no_part_of_a_parameter_is_refused(tmp_path: Path, restrict: object, words: str) -> None:
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": restrict}))
+    with pytest.raises(SpaceError, match=words):
+        load_space(tmp_path / "space.yaml")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
 
 from armwright.arm import Actuator, Arm, Axis, Joint, uniform_link
 from armwright.catalogue import ActuatorRecord, TorqueKind, resolved
@@ -23,6 +23,7 @@ from armwright.exceptions import DesignError, SpaceError, did_you_mean
 
 JointType = Literal["R", "P", "Y"]
 Range = tuple[float, float]
+Restriction = float | str | Range | tuple[str, ...]
 ParameterValue = float | str
 
 JOINT_AXES: dict[JointType, Axis] = {"R": "x", "P": "y", "Y": "z"}
@@ -201,6 +202,8 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     actuators: what the joints may have, names of the catalogue or records; with several, each joint's is a parameter.
     None: joints without mass.
     actuator_torque, safety_factor: which torque of theirs counts, divided by what.
+    restrict: single parameters by name, fixed (`joint_1: Y`, `origin_z: 0.0`), of fewer choices (`joint_2: [P, R]`)
+        or in a narrower range (`link_1: [0.1, 0.2]`).
     """
 
     name: str = Field(default="paper", min_length=1, max_length=100)
@@ -216,6 +219,16 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MOST_ACTUATORS)
     actuator_torque: TorqueKind = "stall"
     safety_factor: float = Field(default=1.0, gt=0.0, le=100.0)
+    restrict: tuple[tuple[str, Restriction], ...] = Field(default=(), max_length=100)
+
+    @field_validator("restrict", mode="before")
+    @classmethod
+    def _pairs(cls, value: Any) -> Any:
+        return tuple(cast("dict[str, Any]", value).items()) if isinstance(value, dict) else value
+
+    @field_serializer("restrict")
+    def _as_mapping(self, value: tuple[tuple[str, Restriction], ...]) -> dict[str, Restriction]:
+        return dict(value)
 
     @field_validator("actuators", mode="before")
     @classmethod
@@ -254,6 +267,7 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(f"joint_range = [{low:g}, {high:g}] rad goes beyond ±2π, a full turn each way")
         if not low <= 0.0 <= high:
             raise ValueError(f"joint_range = [{low:g}, {high:g}] rad must hold 0, where the inverse kinematics starts")
+        _check_restrictions(self)
         names = [record.name for record in self.actuators]
         if len(set(names)) != len(names):
             raise ValueError(f"actuators names one twice: {', '.join(names)}")
@@ -377,7 +391,44 @@ def _parameters(space: DesignSpace) -> tuple[Parameter, ...]:
     links = [FloatParameter(f"link_{j}", *space.link, "m") for j in range(1, space.joints + 1)]
     names = tuple(record.name for record in space.actuators)
     motors = [CategoricalParameter(f"motor_{j}", names) for j in range(1, space.joints + 1)] if len(names) > 1 else []
-    return (*origin, *joints, *links, *motors)
+    to = dict(space.restrict)
+    return tuple(
+        _restricted(parameter, to[parameter.name]) if parameter.name in to else parameter
+        for parameter in (*origin, *joints, *links, *motors)
+    )
+
+
+def _restricted(parameter: Parameter, to: Restriction) -> Parameter:
+    """The parameter as `restrict` leaves it; ValueError where that is not a part of it."""
+    asked: tuple[float | str, ...] = (to,) if isinstance(to, (str, float, int)) else to
+    if isinstance(parameter, CategoricalParameter):
+        for choice in asked:
+            if choice not in parameter.choices:
+                raise ValueError(
+                    f"restrict: {parameter.name} = {choice!r} is not one of {', '.join(parameter.choices)}"
+                )
+        if not asked:
+            raise ValueError(f"restrict: {parameter.name} is left no choice")
+        return CategoricalParameter(parameter.name, tuple(c for c in parameter.choices if c in asked))
+    numbers = [value for value in asked if not isinstance(value, str)]
+    if not 1 <= len(numbers) == len(asked) <= 2:
+        raise ValueError(f"restrict: {parameter.name} = {to!r} is no number and no range [{parameter.unit}]")
+    low, high = numbers[0], numbers[-1]
+    if not parameter.low <= low <= high <= parameter.high:
+        raise ValueError(
+            f"restrict: {parameter.name} = [{low:g}, {high:g}] {parameter.unit} is not a part of "
+            f"[{parameter.low:g}, {parameter.high:g}]"
+        )
+    return FloatParameter(parameter.name, low, high, parameter.unit)
+
+
+def _check_restrictions(space: DesignSpace) -> None:
+    """ValueError where one is of no parameter, or not a part of it."""
+    free = {parameter.name: parameter for parameter in space.model_copy(update={"restrict": ()}).parameters}
+    for name, to in space.restrict:
+        if name not in free:
+            raise ValueError(f'restrict: there is no parameter "{name}".{did_you_mean(name, free)}')
+        _restricted(free[name], to)
 
 
 @cache
@@ -388,7 +439,7 @@ def _arm_actuators(space: DesignSpace) -> tuple[Actuator, ...]:
 def _clip(parameter: Parameter, value: Any) -> ParameterValue:
     if isinstance(parameter, FloatParameter):
         return min(max(float(value), parameter.low), parameter.high)
-    return parameter.check(value)
+    return value if value in parameter.choices else parameter.choices[0]
 
 
 def _column(parameter: Parameter, designs: Sequence[Design]) -> list[float]:

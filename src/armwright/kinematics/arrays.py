@@ -1,6 +1,6 @@
 """Arms stacked into arrays, as the kernels take them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Literal, cast, get_args
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from armwright.arm import AXES, Actuator, Arm, Link, Vector
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
-from armwright.space import JOINT_AXES, DesignSpace
+from armwright.space import JOINT_AXES, CategoricalParameter, DesignSpace
 
 MOST_JOINTS = 8
+_AXIS_NUMBERS = {kind: AXES.index(axis) for kind, axis in JOINT_AXES.items()}
 LARGEST_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
 
 Precision = Literal["float32", "float64"]
@@ -130,7 +131,6 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precis
     matrix: (N, P) designs as rows (`DesignSpace.matrix`).
     """
     n, dof = len(matrix), space.joints
-    axes = np.array([AXES.index(JOINT_AXES[kind]) for kind in space.joint_types], dtype=np.int32)
     links = matrix[:, 3 + dof : 3 + 2 * dof]
     lower, upper = _limits(*space.joint_range, precision)
     offset = np.zeros((n, dof, 3), dtype=precision)
@@ -149,7 +149,7 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precis
     com[..., 2] = middle
     return ArmArrays(
         base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
-        axis=axes[matrix[:, 3 : 3 + dof].astype(np.intp)],
+        axis=_chosen(space, matrix, "joint_", _AXIS_NUMBERS).astype(np.int32),
         lower=np.full((n, dof), lower, dtype=precision),
         upper=np.full((n, dof), upper, dtype=precision),
         offset=offset,
@@ -165,7 +165,20 @@ def _chosen_actuators(space: DesignSpace, matrix: NDArray[np.float64]) -> NDArra
     """(N, D) places of the joints' actuators in the space's list."""
     if len(space.actuators) == 1:
         return np.zeros((len(matrix), space.joints), dtype=np.intp)
-    return matrix[:, 3 + 2 * space.joints :].astype(np.intp)
+    return _chosen(space, matrix, "motor_", {record.name: i for i, record in enumerate(space.actuators)})
+
+
+def _chosen(
+    space: DesignSpace, matrix: NDArray[np.float64], prefix: str, numbers: Mapping[str, int]
+) -> NDArray[np.intp]:
+    """(N, D) the numbers of the categories in the columns of the parameters whose names begin so."""
+    columns = [i for i, parameter in enumerate(space.parameters) if parameter.name.startswith(prefix)]
+    choices = [cast("CategoricalParameter", space.parameters[i]).choices for i in columns]
+    picked = [
+        np.array([numbers[choice] for choice in c])[matrix[:, i].astype(np.intp)]
+        for i, c in zip(columns, choices, strict=True)
+    ]
+    return np.stack(picked, axis=1)
 
 
 @cache
