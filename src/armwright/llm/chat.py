@@ -7,6 +7,7 @@ import os
 import re
 import threading
 import time
+import warnings
 from collections.abc import Coroutine, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, replace
@@ -37,6 +38,9 @@ try:
     from armwright.llm.faults import CALL_FAULTS, PASSING, kind_of, words_of
 except ImportError as fault:
     raise MissingExtraError('language models need an extra: pip install "armwright[llm]"') from fault
+
+# A price that cannot be known is no news to the user, who is told of costs by `cost_words` and the budget.
+warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
 
 CALL_SECONDS = 120.0  # of one request, all attempts included
 CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
