@@ -31,6 +31,7 @@ from armwright.task import Task as DesignTask
 EVERY = 10  # counted trials between two plain lines
 SHORT = {POSITION_ERROR: "error [m]", TORQUE: "torque"}  # what the paper's objectives are called in narrow tables
 MOST_ROWS = 16  # of the front; front.csv has all
+MOST_WITH_PLACES = 3  # objectives beside which there is room for base and links
 
 
 class Watch(Protocol):
@@ -303,12 +304,21 @@ def _payload_note(task: DesignTask) -> str:
     return f"; payload {low:g} kg" if low == high else f"; payloads {low:g} to {high:g} kg"
 
 
+def _base_words(member: FrontMember) -> str:
+    return " ".join(f"{value:5.2f}" for value in member.design.origin)
+
+
+def _link_words(member: FrontMember) -> str:
+    return " ".join(f"{value:.2f}" for value in member.design.links)
+
+
 def _front_table(history: History, solid: set[int] | None) -> Table:
     title = f"Pareto front of {history.problem.task.name}"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
     verdict = () if solid is None else ("verdict",)
     objectives = [SHORT.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
-    for name in ("#", "source", *verdict, *objectives, "base [m]", "joints", "links [m]"):
+    places = ("base [m]", "links [m]") if len(objectives) <= MOST_WITH_PLACES else ()
+    for name in ("#", "source", *verdict, *objectives, "joints", *places):
         justify = "right" if name in ("#", *objectives) else "left"
         table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
     reference = history.reference_point or (math.inf,) * len(objectives)
@@ -320,9 +330,8 @@ def _front_table(history: History, solid: set[int] | None) -> Table:
             member.source,
             *(() if solid is None else ("solid" if member.number in solid else "fragile",)),
             *map(_value, member.values),
-            " ".join(f"{value:5.2f}" for value in member.design.origin),
             member.design.joints,
-            " ".join(f"{value:.2f}" for value in member.design.links),
+            *((_base_words(member), _link_words(member)) if places else ()),
         )
     left_out = len(history.front) - len(shown)
     if left_out:
