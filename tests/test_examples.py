@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from armwright.cli import app
 from tests.chat_server import Answer, ChatServer, Request
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -20,6 +22,21 @@ def run(example: str, *options: str) -> str:
 
 def told(server: ChatServer) -> tuple[str, ...]:
     return ("--model", "test-model", "--base-url", server.url, "--origin", "scripted")
+
+
+@pytest.mark.parametrize("number", ["1-paper-target", "2-assembly", "6-price"])
+def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
+    task = next(EXAMPLES.glob(f"{number}*task.yaml"), EXAMPLES / f"{number}.yaml")
+    space = EXAMPLES / f"{number}-space.yaml"
+    spaces = ["--space", str(space)] if space.is_file() else []
+    options = ["--n-init", "5", "--n-total", "10", "--no-figures", "--json", "--out", str(tmp_path / "run")]
+    result = CliRunner().invoke(app, ["optimize", str(task), *spaces, *options])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["n_trials"] == 15
+    # What the first lines of a file say can be typed.
+    for line in task.read_text().splitlines():
+        if (said := re.search(r"armwright optimize (\S+)(?: --space (\S+))?", line)) and line.startswith("#"):
+            assert all((EXAMPLES.parent / file).is_file() for file in said.groups() if file)
 
 
 def test_the_scikit_learn_example(chat_server: ChatServer) -> None:

@@ -292,6 +292,28 @@ def test_a_search_for_the_whole_front(tmp_path: Path, tab: Tab) -> None:
     assert tab.faults == []
 
 
+def test_of_three_objectives_any_two_are_shown(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-1").model_copy(
+        update={
+            "name": "three",
+            "objectives": ("position_error", "torque", "length"),
+            "reference_point": (5.0, 5.0, 1.0),
+        }
+    )
+    run = aw.optimize(aw.Problem(task=task), proposer="none", n_init=6, n_total=20, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    assert tab.page.locator("#table tbody tr").count() == len(run.front)
+    tab.page.locator("#y-axis").select_option(label="Length")
+    drawn = tab.ask(
+        "pareto.data.flatMap((trace) => (trace.customdata ?? []).map((n, k) => [n, trace.x[k], trace.y[k]]))"
+    )
+    for number, x, y in drawn:
+        assert (x, y) == pytest.approx(run.history.values[int(number), [0, 2]])
+    assert len(drawn) == 26
+    assert tab.ask("pareto.layout.yaxis.title.text") == "Length [m]"
+    assert tab.faults == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 900])
 def test_it_fits_small_screens(run: Path, browser: Browser, width: int, scheme: str) -> None:
