@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,6 +16,7 @@ from playwright.sync_api import Browser
 
 import armwright as aw
 from armwright.best_known import known_front
+from armwright.decision import pick_from, read_condition
 from armwright.exceptions import RunFolderError
 from armwright.history import History
 from armwright.kinematics.chain import joint_positions
@@ -231,6 +233,59 @@ def test_the_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: H
     for row in tab.page.locator("#table tbody tr").all():
         verdict = "solid" if int(row.get_attribute("data-design")) in solid else "fragile"
         assert verdict in row.inner_text()
+
+
+def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", solid: bool = False) -> list[int]:
+    """The designs of the table, in its order, after a wish was typed in."""
+    page = tab.page
+    page.locator("#pick-where").fill(where)
+    page.locator("#pick-by").select_option(label=by)
+    if by == "weights":
+        page.locator("#pick-weights").fill(weights)
+    page.locator("#pick-solid").set_checked(solid)
+    page.get_by_role("button", name="Pick", exact=True).click()
+    return [int(text) for text in page.locator("#table tbody tr td:first-child").all_inner_texts()]
+
+
+def picked(run: Path, *conditions: str, **wishes: Any) -> list[int]:
+    """The same of `armwright pick`."""
+    _, members = pick_from(run, [read_condition(condition) for condition in conditions], **wishes)
+    return [member.number for member in members]
+
+
+def test_picking_in_the_page_is_picking_in_a_terminal(run: Path, tab: Tab) -> None:
+    tab.open(run / "report.html")
+    assert tab.ask("armwright.state.design") == picked(run)[0]  # it begins with the knee
+    assert asked(tab) == picked(run)
+    assert asked(tab, by="least torque") == picked(run, by="torque")
+    where = ("position_error<=2", " length < .6")
+    assert asked(tab, ",".join(where), by="least mass") == picked(run, *where, by="mass")
+    assert asked(tab, solid=True) == picked(run, solid=True)
+    assert asked(tab, "origin_z >= 1e-2") == picked(run, "origin_z>=0.01")
+    last = asked(tab, "torque < 4.5", by="weights", weights="position_error=2, torque=1")
+    assert last == picked(run, "torque<4.5", weights={"position_error": 2.0, "torque": 1.0})
+    assert tab.ask("armwright.state.design") == last[0]
+    assert tab.text("#pick-words").endswith(
+        'armwright pick RUN --where "torque<4.5" --weights position_error=2,torque=1'
+    )
+    tab.page.get_by_role("button", name="All again").click()
+    assert tab.page.locator("#table tbody tr").count() == len(picked(run))
+
+
+def test_why_nothing_was_picked(run: Path, tab: Tab, history: History) -> None:
+    tab.open(run / "report.html")
+    before = tab.page.locator("#table tbody tr").count()
+    asked(tab, "torque<100, position_error<=1e-6")
+    least = float(re.findall(r"the nearest has ([\d.]+)\.", tab.text("#pick-words"))[0])
+    assert least == pytest.approx(min(member.values[0] for member in history.front), rel=1e-3)
+    asked(tab, "mas<2")
+    assert 'no number "mas"' in tab.text("#pick-words")
+    asked(tab, "torque")
+    assert "such as mass<=2.5" in tab.text("#pick-words")
+    asked(tab, by="weights", weights="torque=0")
+    assert "above 0" in tab.text("#pick-words")
+    assert tab.page.locator("#table tbody tr").count() == before
+    assert tab.faults == []
 
 
 def test_two_designs_side_by_side(run: Path, tab: Tab) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armwright.arm import AXES, Arm
 from armwright.best_known import known_front
 from armwright.comparison import method_words
+from armwright.decision import numbers_of
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
 from armwright.history import POLISH, History
@@ -90,6 +91,7 @@ class RunContent:
             "n": self._n,
             "designs_from": designs_from,
             "front": front,
+            "arms": {number: _of_arm(self.history, number) for number in front},
             "proposals": _proposals(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
             "looks": {trial.source: _look(trial.source) for trial in self.history},
@@ -105,6 +107,12 @@ def design_files(history: History, number: int) -> dict[str, str]:
     """A design as text for simulators, by format."""
     name, arm = f"{history.problem.task.name}-{number}", history.member(number).arm
     return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}
+
+
+def _of_arm(history: History, number: int) -> dict[str, float]:
+    """What an arm is, whatever the targets, by the names that `armwright pick` knows."""
+    numbers = numbers_of(history, history.member(number))
+    return {name: numbers[name] for name in ("length", "mass")}
 
 
 def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:

@@ -7,6 +7,7 @@ import { drawDesign, openDesign, postures } from "./design.js";
 import { drawConfiguration, drawHeader, openHeader } from "./header.js";
 import { fileFetcher, openLive } from "./live.js";
 import { growPareto, openPareto } from "./pareto.js";
+import { drawPick, forget, openPick, ranked } from "./pick.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
 import { drawTable, openTable } from "./table.js";
 import { drawTranscript, openTranscript } from "./transcript.js";
@@ -15,19 +16,11 @@ import { $ } from "./words.js";
 const content = new Content();
 let isOpen = false;
 
-// The design to begin with: of the address, else the knee of the front, nearest to its best corner.
+// The design to begin with: of the address, else the knee of the front.
 function begin() {
   const asked = fromAddress(content);
-  if (asked.design === undefined) asked.design = knee();
+  if (asked.design === undefined) asked.design = ranked(content, content.head.front)[0] ?? (content.n ? 0 : null);
   set(asked);
-}
-
-function knee() {
-  const { front, reference_point: reference } = content.head;
-  if (!front.length) return content.n ? 0 : null;
-  const scale = (i) => Array.from(content.values(i), (v, k) => (reference === null ? v : v / reference[k]));
-  const far = (i) => Math.hypot(...scale(i));
-  return front.reduce((best, i) => (far(i) < far(best) ? i : best));
 }
 
 function open() {
@@ -37,6 +30,7 @@ function open() {
   openDesign(content, fileFetcher(content));
   openPareto(content);
   openTable(content);
+  openPick(content);
   openTranscript(content);
   keepAddress();
   begin();
@@ -52,6 +46,7 @@ function grow() {
   drawCurve();
   growPareto();
   drawTable();
+  drawPick();
   drawTranscript();
   drawConfiguration();
 }
@@ -65,7 +60,10 @@ function take(buffer) {
     return;
   }
   const isAnother = content.n < known || content.head.designs_from === 0; // the run began anew, or was polished
-  if (isAnother) set({ design: Math.min(state.design ?? 0, content.n - 1), compared: null });
+  if (isAnother) {
+    forget();
+    set({ design: Math.min(state.design ?? 0, content.n - 1), compared: null });
+  }
   grow();
   if (isAnother || content.head.result.finished !== before) {
     drawDesign();

@@ -6,6 +6,7 @@ import { $, element, metres, number, plural } from "./words.js";
 
 let content = null;
 let sorted = { key: "0", up: true };
+let only = null; // designs that were asked for, in their order; null: the whole front
 
 export function openTable(shownContent) {
   content = shownContent;
@@ -37,12 +38,22 @@ function columns() {
   return made;
 }
 
+// Shows these designs of the front alone, in this order, until a column is chosen.
+export function show(numbers) {
+  only = numbers;
+  sorted = only === null ? { key: "0", up: true } : { key: null, up: true };
+  drawTable();
+}
+
 export function drawTable() {
-  const all = columns(), by = all.find((column) => column.key === sorted.key) ?? all[0];
-  const rows = [...content.head.front].sort((a, b) => {
-    const [u, v] = [by.value(a), by.value(b)];
-    return (sorted.up ? 1 : -1) * (by.text ? String(u).localeCompare(String(v)) : u - v) || a - b;
-  });
+  const all = columns(), by = all.find((column) => column.key === sorted.key), { front } = content.head;
+  const rows = only === null ? [...front] : only.filter((i) => front.includes(i));
+  if (by) {
+    rows.sort((a, b) => {
+      const [u, v] = [by.value(a), by.value(b)];
+      return (sorted.up ? 1 : -1) * (by.text ? String(u).localeCompare(String(v)) : u - v) || a - b;
+    });
+  }
   const head = element("tr", {}, ...all.map((column) => {
     const arrow = column === by ? (sorted.up ? " ▲" : " ▼") : "";
     const sort = () => {
@@ -62,7 +73,7 @@ export function drawTable() {
   const focused = document.activeElement?.closest?.("#table tbody tr")?.dataset.design;
   $("table").replaceChildren(element("thead", {}, head), element("tbody", {}, ...body));
   if (focused !== undefined) $("table").querySelector(`tr[data-design="${focused}"]`)?.focus({ preventScroll: true });
-  $("table-title").textContent = `Pareto front: ${plural(rows.length, "design")}`;
+  $("table-title").textContent = `Pareto front: ${rows.length < front.length ? `${rows.length.toLocaleString("en")} of ` : ""}${plural(front.length, "design")}`;
   mark();
 }
 

@@ -1,0 +1,148 @@
+// Choosing a design of the front by conditions and one wish, as `armwright pick` does (decision.py).
+
+import { set } from "./state.js";
+import { show } from "./table.js";
+import { $, number, plural } from "./words.js";
+
+const NUMBER = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
+const CONDITION = new RegExp(`^\\s*([A-Za-z_]\\w*)\\s*(<=|>=|<|>)\\s*(${NUMBER})\\s*$`);
+const WEIGHT = new RegExp(`^\\s*([A-Za-z_]\\w*)\\s*=\\s*(${NUMBER})\\s*$`);
+const HOLDS = { "<=": (a, b) => a <= b, ">=": (a, b) => a >= b, "<": (a, b) => a < b, ">": (a, b) => a > b };
+const KNEE = "", WEIGHTS = "="; // no number has such a name
+
+let content = null;
+let names = [];
+
+export function openPick(shownContent) {
+  content = shownContent;
+  names = [...content.objectives.map((o) => o.name), "length", "mass",
+    ...content.head.parameters.filter((p) => !p.choices).map((p) => p.name)];
+  names = [...new Set(names)];
+  $("pick-by").append(new Option("the knee", KNEE), new Option("weights", WEIGHTS),
+    ...names.map((name) => new Option(`least ${name}`, name)));
+  $("pick-weights").placeholder = content.objectives.map((o) => `${o.name}=1`).join(", ");
+  $("pick-where").placeholder = `such as ${content.objectives[0].name}<=0.05, length<1`;
+  $("pick-by").addEventListener("change", () => { $("pick-weights").parentElement.hidden = $("pick-by").value !== WEIGHTS; });
+  $("pick").addEventListener("submit", (event) => {
+    event.preventDefault();
+    choose();
+  });
+  $("pick-all").addEventListener("click", forget);
+  drawPick();
+}
+
+export function drawPick() {
+  $("pick-solid").parentElement.hidden = content.head.result.solid === null;
+}
+
+// Shows all of the front again; what was asked for stays in the form.
+export function forget() {
+  $("pick-words").textContent = "";
+  $("pick-all").hidden = true;
+  show(null);
+}
+
+// What a design of the front can be chosen by.
+function numbersOf(i) {
+  const found = new Map(content.params(i).filter((p) => !p.choices).map((p) => [p.name, p.value]));
+  for (const [name, value] of Object.entries(content.head.arms[i])) found.set(name, value);
+  content.objectives.forEach((o, k) => found.set(o.name, content.values(i)[k]));
+  return found;
+}
+
+// The knee of these designs of a front first, then what lies nearest to its corner (pareto.py, knee_number).
+export function ranked(shownContent, numbers) {
+  const { reference_point: reference } = shownContent.head;
+  const values = new Map(numbers.map((i) => [i, Array.from(shownContent.values(i))]));
+  const far = new Map(numbers.map((i) => [i, Math.hypot(...values.get(i).map((v, k) => (reference ? v / reference[k] : v)))]));
+  const order = [...numbers].sort((a, b) => far.get(a) - far.get(b) || a - b);
+  const inside = numbers.filter((i) => !reference || values.get(i).every((v, k) => v < reference[k]));
+  if (inside.length < 3) return order;
+  const low = values.get(inside[0]).map((_, k) => Math.min(...inside.map((i) => values.get(i)[k])));
+  const span = low.map((least, k) => Math.max(...inside.map((i) => values.get(i)[k])) - least || 1);
+  const below = (i) => values.get(i).reduce((sum, v, k) => sum + (v - low[k]) / span[k], 0);
+  const knee = inside.reduce((best, i) => (below(i) < below(best) ? i : best));
+  return [knee, ...order.filter((i) => i !== knee)];
+}
+
+const split = (text) => text.split(",").filter((part) => part.trim());
+
+function known(name, allowed) {
+  if (!allowed.includes(name)) throw new Error(`A design has no number "${name}". There are: ${allowed.join(", ")}`);
+  return name;
+}
+
+function conditions() {
+  return split($("pick-where").value).map((part) => {
+    const found = CONDITION.exec(part);
+    if (!found) throw new Error(`"${part.trim()}": a name, one of <= < >= >, and a number are needed, such as mass<=2.5`);
+    return { name: known(found[1], names), relation: found[2], bound: Number(found[3]) };
+  });
+}
+
+function weights() {
+  const said = new Map(split($("pick-weights").value).map((part) => {
+    const found = WEIGHT.exec(part);
+    if (!found || !(Number(found[2]) >= 0)) throw new Error(`"${part.trim()}": names with numbers are needed, such as position_error=2, torque=1`);
+    return [known(found[1], content.objectives.map((o) => o.name)), Number(found[2])];
+  }));
+  if (![...said.values()].some((weight) => weight > 0)) throw new Error("At least one weight must be above 0.");
+  return said;
+}
+
+function ordered(left, told) {
+  const by = $("pick-by").value, { reference_point: reference } = content.head;
+  if (by === KNEE) return ranked(content, left);
+  let value = (i) => told.get(i).get(by);
+  if (by === WEIGHTS) {
+    const heavy = weights();
+    const shares = content.objectives.map((o, k) => (heavy.get(o.name) ?? 0) / (reference ? reference[k] : 1));
+    value = (i) => shares.reduce((sum, share, k) => sum + share * content.values(i)[k], 0);
+  }
+  return [...left].sort((a, b) => value(a) - value(b) || a - b);
+}
+
+// Why none is left: the first condition that none meets, and how near the front comes to it.
+function nearestMiss(asked, told) {
+  for (const { name, relation, bound } of asked) {
+    const values = [...told.values()].map((numbers) => numbers.get(name));
+    if (values.some((value) => HOLDS[relation](value, bound))) continue;
+    const nearest = relation.startsWith("<") ? Math.min(...values) : Math.max(...values);
+    return `No design of the front has ${name} ${relation} ${bound}; the nearest has ${number(nearest)}.`;
+  }
+  return "No design of the front meets all of these conditions at once.";
+}
+
+function choose() {
+  const told = new Map(content.head.front.map((i) => [i, numbersOf(i)]));
+  const words = $("pick-words");
+  try {
+    const asked = conditions(), solid = $("pick-solid").checked;
+    const left = content.head.front.filter((i) => (
+      (!solid || content.isSolid(i)) && asked.every(({ name, relation, bound }) => HOLDS[relation](told.get(i).get(name), bound))
+    ));
+    const order = ordered(left, told);
+    words.classList.toggle("missed", !order.length);
+    if (!order.length) {
+      words.textContent = nearestMiss(asked, told);
+      return;
+    }
+    show(order);
+    $("pick-all").hidden = false;
+    words.textContent = `Design ${order[0]}, of ${plural(order.length, "design")} that ${order.length === 1 ? "meets" : "meet"} it. ${command(asked, solid)}`;
+    set({ design: order[0] });
+  } catch (fault) {
+    words.classList.add("missed");
+    words.textContent = fault.message;
+  }
+}
+
+// The same in a terminal.
+function command(asked, solid) {
+  const by = $("pick-by").value;
+  const parts = asked.map(({ name, relation, bound }) => `--where "${name}${relation}${bound}"`);
+  if (by === WEIGHTS) parts.push(`--weights ${[...weights()].map(([name, weight]) => `${name}=${weight}`).join(",")}`);
+  else if (by !== KNEE) parts.push(`--by ${by}`);
+  if (solid) parts.push("--solid");
+  return `In a terminal: armwright pick RUN ${parts.join(" ")}`.trim();
+}
