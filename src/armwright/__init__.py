@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from armwright.export.urdf import to_urdf
     from armwright.front import FrontRun, find_front
     from armwright.history import FinishedTrial, FrontMember, History
+    from armwright.parameters import Design
     from armwright.pareto import hypervolume
     from armwright.polish import polish_run
     from armwright.problem import Problem
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from armwright.report.page import write_report
     from armwright.results import verify_run
     from armwright.run_folder import read_run
-    from armwright.space import Design, DesignSpace, load_space, paper_space
+    from armwright.space import DesignSpace, load_space, paper_space
     from armwright.study import Run, optimize
     from armwright.task import Task, builtin_tasks, load_task, random_task
 
@@ -44,7 +45,7 @@ _PLACES = {
     "Arm": "arm",
     "ArmwrightError": "exceptions",
     "Comparison": "comparison",
-    "Design": "space",
+    "Design": "parameters",
     "DesignSpace": "space",
     "Evaluation": "evaluation",
     "FailureError": "exceptions",
