@@ -151,6 +151,7 @@ FORMS = {
     "thoughts before": f"<think>TASK\n```yaml\n{TASK.replace('0.6', '9.9')}```\n</think>{ANSWER}",
     "a first try before": f"TASK\n```yaml\n{TASK.replace('0.6', '9.9')}```\nToo far. So:\n{ANSWER}",
     "commands after": f"{ANSWER}\n```sh\narmwright optimize wall.yaml\n```\nI hope this helps: enjoy.",
+    "keys in the words after": f"{ANSWER}\npayload: I took that from your words.\n",
     "indented": "\n".join(f"   {line}" for line in ANSWER.splitlines()),
     "Windows": ANSWER.replace("\n", "\r\n"),
     "space first": f"SPACE\n```yaml\n{SPACE}```\nTASK\n```yaml\n{TASK}```\n",
