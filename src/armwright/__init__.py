@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from armwright.any_study.proposals import StudyProposal, StudyProposer
     from armwright.arm import Arm, Joint, Link, uniform_link
     from armwright.comparison import Comparison, compare_runs
+    from armwright.drafting import Draft, draft
     from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
     from armwright.export.mjcf import to_mjcf
@@ -47,6 +48,7 @@ _PLACES = {
     "Comparison": "comparison",
     "Design": "parameters",
     "DesignSpace": "space",
+    "Draft": "drafting",
     "Evaluation": "evaluation",
     "FailureError": "exceptions",
     "FinishedTrial": "history",
@@ -72,6 +74,7 @@ _PLACES = {
     "UsageError": "exceptions",
     "builtin_tasks": "task",
     "compare_runs": "comparison",
+    "draft": "drafting",
     "evaluate": "evaluation",
     "find_front": "front",
     "hypervolume": "pareto",
@@ -96,6 +99,7 @@ __all__ = [
     "Comparison",
     "Design",
     "DesignSpace",
+    "Draft",
     "Evaluation",
     "FailureError",
     "FinishedTrial",
@@ -121,6 +125,7 @@ __all__ = [
     "UsageError",
     "builtin_tasks",
     "compare_runs",
+    "draft",
     "evaluate",
     "find_front",
     "hypervolume",
