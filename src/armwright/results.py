@@ -302,7 +302,8 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
 def _rows(history: History) -> Iterable[dict[str, Any]]:
     for trial in history:
         objectives = _objectives(history, trial.values)
-        yield {"number": trial.number, "source": trial.source, **trial.design.params, **objectives}
+        params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
+        yield {"number": trial.number, "source": trial.source, **params, **objectives}
 
 
 def _objectives(history: History, values: Sequence[float]) -> dict[str, float]:

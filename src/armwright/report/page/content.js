@@ -93,9 +93,12 @@ export class Content {
     return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
   }
 
-  // Names of the joints' actuators in order, where there is a choice.
-  motors(i) {
-    return this.params(i).filter((p) => p.choices && p.name.startsWith("motor_")).map((p) => p.value);
+  // One parameter's value; undefined where it does not matter.
+  param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
+
+  // The choices of kind_1, kind_2, … in order, where there are any: "motor", "direction".
+  chosen(i, kind) {
+    return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }
 
   arm(i) {
