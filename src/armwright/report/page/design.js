@@ -74,9 +74,10 @@ function drawLinks(arm) {
   const { joint } = content.head.colours;
   $("links").replaceChildren(...Array.from(arm.axis, (axis, j) => {
     const long = linkLength(arm, j);
-    const moves = [`${"RPY"[axis]}`, `slides ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
-    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves})` },
-      `${moves} ${millimetres(long)}`);
+    const moves = [`turns about ${"xyz"[axis]}`, `slides along ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
+    const word = content.joints(state.design), letter = word.length === arm.axis.length ? word[j] : ["RPY"[axis], "slide", "F"][arm.kind[j]];
+    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves} at first)` },
+      `${letter} ${millimetres(long)}`);
     bar.style.flex = `${1e6 * Math.max(long, 1e-6)} 1 0`;
     bar.style.background = joint["xyz"[axis]];
     return bar;
