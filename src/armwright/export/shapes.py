@@ -16,6 +16,8 @@ COLOURS = {
     "joint_z": "0.00 0.62 0.45 1",
 }
 
+MARKER = 1.4  # a joint's sphere to its link's radius
+
 # MuJoCo refuses a moving body without mass: it is to take these where a link has less.
 BOUNDS = {"boundmass": "1e-12", "boundinertia": "1e-14"}  # [kg], [kg m²]
 
@@ -45,6 +47,21 @@ def inertia_tensor(link: Link) -> NDArray[np.float64]:
     return tensor
 
 
+def inertia_frame(link: Link) -> Vector:
+    """Roll, pitch, yaw [rad] of the frame that `moments` are in: along the link's axis, where nothing sits at its end."""
+    return along(link.offset) if link.end_mass == 0.0 else (0.0, 0.0, 0.0)
+
+
+def moments(link: Link) -> dict[str, str]:
+    """About the centre of mass, in `inertia_frame` [kg m²]."""
+    if link.end_mass == 0.0:
+        across, around = cylinder_inertia(link)
+        return {"ixx": across, "iyy": across, "izz": around, "ixy": "0", "ixz": "0", "iyz": "0"}
+    tensor = inertia_tensor(link)
+    places = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+    return {name: f"{tensor[place]:.17g}" for name, place in places.items()}
+
+
 def along(offset: Vector) -> Vector:
     """Roll, pitch, yaw [rad] of the frame whose z points along `offset`."""
     x, y, z = offset
@@ -59,7 +76,7 @@ def middle(link: Link) -> Vector:
 
 def marker_radius(link: Link) -> float:
     """Of the sphere that shows a joint: a little more than its link [m]."""
-    return 1.4 * link.radius
+    return MARKER * link.radius
 
 
 def number(value: float) -> str:
