@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio
+import xacro
 
 from armwright.arm import Actuator, Arm, Joint, Link, uniform_link
 from armwright.export.urdf import to_urdf
@@ -97,3 +98,10 @@ class Peer:
 
 def peer_of(arm: Arm) -> Peer:
     return Peer(to_urdf(arm))
+
+
+def processed(text: str, **arguments: object) -> str:
+    """The URDF that xacro makes of it."""
+    document = xacro.parse(text)
+    xacro.process_doc(document, mappings={name: str(value) for name, value in arguments.items()})
+    return document.toxml()

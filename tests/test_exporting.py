@@ -7,7 +7,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio
 import pytest
-import xacro
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from typer.testing import CliRunner
@@ -20,7 +19,7 @@ from armwright.run_folder import read_run
 from armwright.space import DesignSpace
 from armwright.study import optimize
 from armwright.task import Task
-from tests.exported import Peer, load, peer_of, postures
+from tests.exported import Peer, load, peer_of, postures, processed
 
 HOSTILE = "a.b-c_" + "9" * 58  # what a task may be called at most
 
@@ -47,12 +46,6 @@ def exported(run: Path, kind: str, *options: str) -> str:
     result = CliRunner().invoke(app, ["export", str(run), "--design", "3", "--format", kind, *options])
     assert result.exit_code == 0, result.output
     return result.output
-
-
-def processed(text: str, **arguments: object) -> str:
-    document = xacro.parse(text)
-    xacro.process_doc(document, mappings={name: str(value) for name, value in arguments.items()})
-    return document.toxml()
 
 
 @pytest.mark.parametrize(

@@ -99,15 +99,19 @@ def test_collisions_and_sights_are_stated() -> None:
 
 
 def test_links_on_the_edge_load() -> None:
-    """Without mass, without length or with next to nothing of either."""
-    joint = Joint("revolute", "y", -1.0, 1.0)
+    """Without mass, without length or with next to nothing of either; none has no mass or no inertia in the file."""
     rng = np.random.default_rng(44)
     edge = [(0.0, 0.02, 0.0), (1e-13, 0.02, 0.1), (1.0, 1e-9, 0.1), (1.0, 0.02, 1e-15)]
+    links = [Link((0.0, 0.0, 0.1), 0.0, (0.0, 0.0, 0.05), 0.02, end_mass=0.5)]
     for mass, radius, length in [*rng.uniform([0.001, 0.001, 0.0], [5.0, 0.1, 0.0], (50, 3)).tolist(), *edge]:
-        for offset in ((0.0, 0.0, length), (0.6 * length, 0.0, -0.8 * length)):
-            assert Loaded(Arm((0.0, 0.0, 0.0), (joint,), (uniform_link(offset, mass, radius),))).plant.num_positions()
-    point = Link((0.0, 0.0, 0.1), 0.0, (0.0, 0.0, 0.05), 0.02, end_mass=0.5)
-    assert Loaded(Arm((0.0, 0.0, 0.0), (joint,), (point,))).plant.num_positions() == 1
+        links += [uniform_link((x * length, 0.0, z * length), mass, radius) for x, z in ((0.0, 1.0), (0.6, -0.8))]
+    for link in links:
+        arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -1.0, 1.0),), (link,))
+        assert Loaded(arm).plant.num_positions() == 1
+        for inertial in ElementTree.fromstring(to_sdf(arm)).findall("model/link/inertial"):
+            least = min(float(inertial.findtext(f"inertia/{moment}", "")) for moment in ("ixx", "iyy", "izz"))
+            assert least >= 1e-14
+            assert float(inertial.findtext("mass", "")) >= 1e-12
 
 
 def test_an_arm_that_does_not_move_loads() -> None:

@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 import pytest
-import xacro
 import yourdfpy
 
 from armwright.arm import Arm, Joint, Link, uniform_link
@@ -17,16 +16,9 @@ from armwright.export.urdf import to_urdf
 from armwright.export.xacro import to_xacro
 from armwright.exporting import mass_per_metre
 from armwright.space import Design, DesignSpace, MassModel
-from tests.exported import ARMS, MIXED, Peer, load, moving, peer_of, postures
+from tests.exported import ARMS, MIXED, Peer, load, moving, peer_of, postures, processed
 
 EVERY_ARM = pytest.mark.parametrize("arm", ARMS)
-
-
-def processed(text: str, **arguments: object) -> str:
-    """The URDF that xacro makes of it."""
-    document = xacro.parse(text)
-    xacro.process_doc(document, mappings={name: str(value) for name, value in arguments.items()})
-    return document.toxml()
 
 
 def assert_same(urdf: str, arm: Arm, prefix: str = "") -> None:

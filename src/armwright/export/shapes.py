@@ -48,7 +48,7 @@ def inertia_tensor(link: Link) -> NDArray[np.float64]:
 
 
 def inertia_frame(link: Link) -> Vector:
-    """Roll, pitch, yaw [rad] of the frame that `moments` are in: along the link's axis, where nothing sits at its end."""
+    """Roll, pitch, yaw [rad] of the frame that `moments` are in: along the link, where nothing sits at its end."""
     return along(link.offset) if link.end_mass == 0.0 else (0.0, 0.0, 0.0)
 
 
