@@ -10,10 +10,10 @@ import numpy as np
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.history import FrontMember, History
+from armwright.parameters import FloatParameter
 from armwright.pareto import knee_number
 from armwright.results import read_summary
 from armwright.run_folder import read_run
-from armwright.space import FloatParameter
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 _WEIGHT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
@@ -59,10 +59,10 @@ def read_weights(words: str) -> dict[str, float]:
 def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
     """What a design can be chosen by: its objectives, its real parameters, and the length and mass of its arm."""
     space = history.problem.space
-    reals = {p.name: float(member.design.params[p.name]) for p in space.parameters if isinstance(p, FloatParameter)}
-    links, first = member.arm.links, member.arm.joints[0].actuator
-    mass = sum(link.total_mass for link in links) + (0.0 if first is None else first.mass)
-    arm = {"length": sum(link.length for link in links), "mass": mass}
+    reals = {
+        p.name: float(member.design.params.get(p.name, 0.0)) for p in space.parameters if isinstance(p, FloatParameter)
+    }
+    arm = {"length": member.arm.length, "mass": member.arm.mass}
     objectives = {o.name: value for o, value in zip(history.problem.objectives, member.values, strict=True)}
     return {**reals, **arm, **objectives}
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation
+from armwright.parameters import Design
 from armwright.pareto import front_numbers, hypervolume_history
 from armwright.problem import Problem
-from armwright.space import Design
 
 RANDOM = "random"
 BBO = "bbo"

@@ -11,7 +11,8 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.objectives import PAPER_OBJECTIVES, Objective, named_objectives
-from armwright.space import Design, DesignSpace, paper_space
+from armwright.parameters import Design
+from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
 from armwright.tolerance import moved
 
@@ -61,7 +62,11 @@ class Problem:
 
     def evaluation(self, designs: Sequence[Design]) -> Evaluation:
         """The physics of N designs at all targets."""
-        return self.evaluate_arrays(arrays_of(self.space, self.space.matrix(designs)))
+        return self.evaluation_of_rows(self.space.matrix(designs))
+
+    def evaluation_of_rows(self, rows: Array) -> Evaluation:
+        """The same of designs as rows (N, P), which may lie outside the space: what is built knows no ranges."""
+        return self.evaluate_arrays(arrays_of(self.space, rows))
 
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
@@ -72,14 +77,15 @@ class Problem:
 
         Only the postures of a chunk of them are in memory at a time.
         """
+        matrix = self.space.settled(matrix)
         size = max(1, POSTURES_AT_ONCE[self.device] // len(self.task.points))
         values = np.empty((len(matrix), len(self.objectives)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
-            values[rows] = self._as_built(matrix[rows])
+            values[rows] = self.values(self.evaluation_of_rows(matrix[rows]))
             if self.tolerance > 0.0:
                 for copies in moved(self.space, matrix[rows], self.tolerance):
-                    values[rows] = np.maximum(values[rows], self._as_built(copies))
+                    values[rows] = np.maximum(values[rows], self.values(self.evaluation_of_rows(copies)))
         return values
 
     def values(self, evaluation: Evaluation) -> Array:
@@ -98,9 +104,5 @@ class Problem:
         values = self.values(self.evaluation(designs))
         if self.tolerance > 0.0:
             for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
-                values = np.maximum(values, self.values(self.evaluation(self.space.designs(copies))))
+                values = np.maximum(values, self.values(self.evaluation_of_rows(copies)))
         return values
-
-    def _as_built(self, rows: Array) -> Array:
-        """(n, M) of designs as rows, each built exactly as it stands there."""
-        return self.values(self.evaluate_arrays(arrays_of(self.space, rows)))
