@@ -21,7 +21,7 @@ MIXED = Arm(
     (0.1, -0.2, 0.3),
     (
         Joint("fixed", "x"),
-        Joint("prismatic", "z", 0.1, 0.4, Actuator("slider", 0.3, 55.0, 0.2)),
+        Joint("prismatic", "z", 0.1, 0.4, Actuator("slider", 0.3, 1.5, 4.0), travel=0.02),
         Joint("revolute", "y", -1.0, 2.0, Actuator("servo", 0.15, 4.5)),
         Joint("fixed", "z"),
         Joint("revolute", "x", -0.5, 0.7),
@@ -33,17 +33,26 @@ MIXED = Arm(
         uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),
         Link((0.0, 0.12, 0.0), 0.0, (0.0, 0.0, 0.0), 0.01, end_mass=0.25),
     ),
+    tool=(0.01, -0.02, 0.03),
+    tool_axis=(0.0, 1.0, 0.0),
+    tool_side=(0.0, 0.0, 1.0),
+    base_mass=0.3,
 )
 
 
 def odd_arms(n: int, dof: int, seed: int) -> list[Arm]:
-    """General arms; about half of their joints slide by what they would turn [m], half of their links end in a mass."""
+    """General arms; about half of their joints slide by what they would turn [m], half of their links end in a mass.
+
+    Their tools point anywhere.
+    """
     rng = np.random.default_rng([seed, dof])
     arms: list[Arm] = []
     for arm in general_arms(n, dof, seed):
         joints = (replace(j, kind="prismatic") if j.kind != "fixed" and rng.random() < 0.5 else j for j in arm.joints)
         links = (replace(link, end_mass=float(max(0.0, rng.uniform(-1.0, 1.0)))) for link in arm.links)
-        arms.append(Arm(arm.base, tuple(joints), tuple(links)))
+        axis, side = np.linalg.qr(rng.normal(size=(3, 3)))[0][:2].tolist()
+        tool = rng.uniform(-0.1, 0.1, 3).tolist()
+        arms.append(Arm(arm.base, tuple(joints), tuple(links), tuple(tool), tuple(axis), tuple(side)))
     return arms
 
 

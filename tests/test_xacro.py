@@ -72,6 +72,8 @@ def test_arguments_change_the_arm_as_they_say(arm: Arm) -> None:
     slope = 0.3
     arguments: dict[str, float] = {f"base_{axis}": float(rng.uniform(-1.0, 1.0)) for axis in "xyz"}
     base = (arguments["base_x"], arguments["base_y"], arguments["base_z"])
+    arguments |= {f"tool_{axis}": float(rng.uniform(-0.2, 0.2)) for axis in "xyz"}
+    tool = (arguments["tool_x"], arguments["tool_y"], arguments["tool_z"])
     links: list[Link] = []
     for n, link in enumerate(arm.links, start=1):
         factor, radius, mass, end = (float(v) for v in rng.uniform([0.3, 0.005, 0.1, 0.0], [3.0, 0.05, 2.0, 1.0]))
@@ -81,7 +83,7 @@ def test_arguments_change_the_arm_as_they_say(arm: Arm) -> None:
         x, y, z = (factor * value for value in link.offset)
         u, v, w = (factor * value if link.length > 0.0 else value for value in link.com)
         links.append(Link((x, y, z), mass + slope * length, (u, v, w), radius, end))
-    assert_same(processed(to_xacro(arm), **arguments), Arm(base, arm.joints, tuple(links)))
+    assert_same(processed(to_xacro(arm), **arguments), replace(arm, base=base, links=tuple(links), tool=tool))
 
 
 MASSES = (

@@ -9,9 +9,8 @@ VELOCITY = 10.0  # [rad/s] or [m/s]
 
 def limits_of(joint: Joint) -> dict[str, float]:
     """lower, upper [rad] or [m], effort [N m] or [N] and velocity [rad/s] or [m/s]; the latter two its actuator's."""
-    motor = joint.actuator
-    effort = EFFORT if motor is None else motor.effort
-    velocity = VELOCITY if motor is None or motor.speed is None else motor.speed
+    effort = EFFORT if joint.effort is None else joint.effort
+    velocity = VELOCITY if joint.speed is None else joint.speed
     return {"lower": joint.lower, "upper": joint.upper, "effort": effort, "velocity": velocity}
 
 

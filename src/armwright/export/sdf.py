@@ -18,6 +18,8 @@ from armwright.export.shapes import (
     number,
     numbers,
     text_of,
+    tip_place,
+    tip_turn,
 )
 
 VERSION = "1.9"  # Gazebo Fortress reads it, and all since
@@ -52,7 +54,7 @@ def to_sdf(arm: Arm, name: str = "arm") -> str:
             _add_axis(element, joint, child)
         parent, place = child, link.offset
     tip = ElementTree.SubElement(model, "frame", name="tip", attached_to=parent)
-    ElementTree.SubElement(tip, "pose").text = f"{numbers(place)} 0 0 0"
+    ElementTree.SubElement(tip, "pose").text = f"{numbers(tip_place(arm))} {numbers(tip_turn(arm))}"
     return text_of(sdf)
 
 

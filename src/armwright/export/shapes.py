@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import Link, Vector
+from armwright.arm import Arm, Link, Vector
 
 AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 COLOURS = {
@@ -66,6 +66,25 @@ def along(offset: Vector) -> Vector:
     """Roll, pitch, yaw [rad] of the frame whose z points along `offset`."""
     x, y, z = offset
     return (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))
+
+
+def tip_place(arm: Arm) -> Vector:
+    """Of the tip, from the last joint [m]."""
+    (x, y, z), (u, v, w) = arm.links[-1].offset, arm.tool
+    return (x + u, y + v, z + w)
+
+
+def tip_turn(arm: Arm) -> Vector:
+    """Roll, pitch, yaw [rad] of the tip's frame in the last link's: z is the tool's axis and x its side."""
+    z = np.array(arm.tool_axis) / np.linalg.norm(arm.tool_axis)
+    y = np.cross(z, arm.tool_side)
+    y = y / np.linalg.norm(y)
+    x = np.cross(y, z)
+    level = math.hypot(x[0], x[1])
+    pitch = math.atan2(-x[2], level)
+    # Pointing straight up or down, roll and yaw turn about the same line: it is all yaw.
+    roll, yaw = (math.atan2(y[2], z[2]), math.atan2(x[1], x[0])) if level > 1e-9 else (0.0, math.atan2(-y[0], y[1]))
+    return (roll + 0.0, pitch + 0.0, yaw + 0.0)  # no -0.0
 
 
 def middle(link: Link) -> Vector:

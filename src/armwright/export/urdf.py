@@ -16,14 +16,17 @@ from armwright.export.shapes import (
     number,
     numbers,
     text_of,
+    tip_place,
+    tip_turn,
 )
 
 
 def to_urdf(arm: Arm, name: str = "arm") -> str:
     """The URDF of an arm: `world`, a fixed joint to `base`, then joint_1, link_1, …, and a frame `tip`.
 
-    Link frames stand at their joints; with all joints at 0 they are parallel to the world's. Links are
-    solid cylinders of uniform density from joint to joint, for inertia, collision and sight.
+    Link frames stand at their joints; with all joints at 0 they are parallel to the world's. The tip is the tool's, its
+    z along the tool's axis and its x to the tool's side. Links are solid cylinders of uniform density from joint to
+    joint, for inertia, collision and sight.
     """
     return text_of(urdf_tree(arm, name))
 
@@ -49,17 +52,23 @@ def urdf_tree(arm: Arm, name: str) -> ElementTree.Element:
             ElementTree.SubElement(element, "limit", {key: number(value) for key, value in limits_of(joint).items()})
         parent, place = child, link.offset
     ElementTree.SubElement(robot, "link", name="tip")
-    _add_joint(robot, "tip_joint", "fixed", parent, "tip", place)
+    _add_joint(robot, "tip_joint", "fixed", parent, "tip", tip_place(arm), tip_turn(arm))
     return robot
 
 
 def _add_joint(
-    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, xyz: Vector
+    robot: ElementTree.Element,
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    xyz: Vector,
+    rpy: Vector = (0.0, 0.0, 0.0),
 ) -> ElementTree.Element:
     element = ElementTree.SubElement(robot, "joint", name=name, type=kind)
     ElementTree.SubElement(element, "parent", link=parent)
     ElementTree.SubElement(element, "child", link=child)
-    ElementTree.SubElement(element, "origin", xyz=numbers(xyz), rpy="0 0 0")
+    ElementTree.SubElement(element, "origin", xyz=numbers(xyz), rpy=numbers(rpy))
     return element
 
 

@@ -14,13 +14,15 @@ from armwright.export.shapes import (
     number,
     numbers,
     text_of,
+    tip_turn,
 )
 
 NAMESPACE = "http://www.ros.org/wiki/xacro"
 NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
   prefix                 before the names of all links and joints but world
   base_x, base_y, base_z the first joint's place in the world [m]
-  link_N_length          from joint N to the next, or to the tip [m]
+  tool_x, tool_y, tool_z from the end of the last link to the tip [m]
+  link_N_length          from joint N to the next, or to the tool [m]
   link_N_radius          [m]
   link_N_mass            what weighs the same whatever the length [kg]
   link_N_mass_per_metre  what is added for each metre of length [kg/m]
@@ -47,7 +49,7 @@ def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float = 0.0) -> str:
     ElementTree.SubElement(robot, "link", name="world")
     ElementTree.SubElement(robot, "link", name=_own("base"))
     _add_joint(robot, "world_to_base", "fixed", "world", "base", "${base_x} ${base_y} ${base_z}")
-    parent, place = "base", "0 0 0"
+    parent, place, terms = "base", "0 0 0", ["0", "0", "0"]
     for n, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True), start=1):
         _add_link(robot, n, joint, link)
         element = _add_joint(robot, f"joint_{n}", joint.kind, _own(parent), f"link_{n}", place)
@@ -55,9 +57,11 @@ def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float = 0.0) -> str:
             ElementTree.SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
             ElementTree.SubElement(element, "limit", {key: number(value) for key, value in limits_of(joint).items()})
         parent = f"link_{n}"
-        place = " ".join(f"${{{term}}}" if term != "0" else term for term in _scaled(_direction(link), n))
+        terms = _scaled(_direction(link), n)
+        place = " ".join(f"${{{term}}}" if term != "0" else term for term in terms)
     ElementTree.SubElement(robot, "link", name=_own("tip"))
-    _add_joint(robot, "tip_joint", "fixed", _own(parent), "tip", place)
+    place = " ".join(f"${{{term} + tool_{axis}}}" for axis, term in zip("xyz", terms, strict=True))
+    _add_joint(robot, "tip_joint", "fixed", _own(parent), "tip", place, numbers(tip_turn(arm)))
     return text_of(robot)
 
 
@@ -73,6 +77,7 @@ def _own(name: str) -> str:
 def _add_arguments(robot: ElementTree.Element, arm: Arm, mass_per_metre: float) -> None:
     ElementTree.SubElement(robot, "xacro:arg", name="prefix", default="")
     values = {f"base_{axis}": value for axis, value in zip("xyz", arm.base, strict=True)}
+    values |= {f"tool_{axis}": value for axis, value in zip("xyz", arm.tool, strict=True)}
     for n, link in enumerate(arm.links, start=1):
         growing = mass_per_metre * link.length
         # A mass that is all in the length is not to leave a rounding beside it.
@@ -148,12 +153,12 @@ def _com(link: Link, n: int) -> list[str]:
 
 
 def _add_joint(
-    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, xyz: str
+    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0"
 ) -> ElementTree.Element:
     element = ElementTree.SubElement(robot, "joint", name=_own(name), type=kind)
     ElementTree.SubElement(element, "parent", link=parent)
     ElementTree.SubElement(element, "child", link=_own(child))
-    ElementTree.SubElement(element, "origin", xyz=xyz, rpy="0 0 0")
+    ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
     return element
 
 
