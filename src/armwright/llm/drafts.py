@@ -20,8 +20,9 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.llm.answer import LONGEST_ANSWER
 from armwright.llm.prompt import rendered
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
+from armwright.modules import JOINT_WORDS
 from armwright.objectives import MOST_OBJECTIVES, OBJECTIVES, PAPER_OBJECTIVES
-from armwright.space import JOINT_WORDS, DesignSpace
+from armwright.space import DesignSpace
 from armwright.task import MOST_TARGETS, Task, task_template
 
 LONGEST_WORDS = 10_000  # characters; who has more has points, and `armwright init --from` reads them
@@ -88,7 +89,7 @@ def draft_prompt(words: str, refused: str = "", refusal: str = "") -> str:
         "words": shown,
         "fence": fence(shown),
         "most_targets": MOST_TARGETS,
-        "reach": space.joints * space.link[1],
+        "reach": space.longest_reach,
         "bases": ", ".join(f"{low:g} <= {axis} <= {high:g}" for axis, (low, high) in zip("xyz", ranges, strict=True)),
         "toy": space.mass.words(),
         "task_schema": _schema(Task),
