@@ -65,7 +65,8 @@ class Problem:
 
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
-        return evaluate_arrays(arms, self.task.points, self.device, start, self.task.payloads)
+        task = self.task
+        return evaluate_arrays(arms, task.points, self.device, start, task.payloads, task.obstacles)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.

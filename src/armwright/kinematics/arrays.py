@@ -21,7 +21,7 @@ Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
 
 FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
-ARRAYS = (*FLOATS, "axis")  # of `ArmArrays`, with a row for each arm
+ARRAYS = (*FLOATS, "axis")  # of `ArmArrays`, with a row for each arm, that inverse kinematics takes
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,7 @@ class ArmArrays:
     offset: Floats  # (N, D, 3) from a joint to the next [m]
     com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next [m]
     mass: Floats  # (N, D) [kg]
+    radius: Floats  # (N, D) of what goes from a joint to the next [m]; 0 where there is nothing
     joint_numbers: tuple[int, ...]
     n_joints: int
     actuation: Actuation | None = None  # where all moving joints have actuators
@@ -64,7 +65,7 @@ class ArmArrays:
 
     def __getitem__(self, rows: slice) -> "ArmArrays":
         actuation = None if self.actuation is None else self.actuation[rows]
-        return replace(self, **{name: getattr(self, name)[rows] for name in ARRAYS}, actuation=actuation)
+        return replace(self, **{name: getattr(self, name)[rows] for name in (*ARRAYS, "radius")}, actuation=actuation)
 
     @property
     def precision(self) -> Precision:
@@ -106,6 +107,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         offset=np.array([[link.offset for link in links] for _, links in rigid], dtype=precision),
         com=np.array([[link.total_com for link in links] for _, links in rigid], dtype=precision),
         mass=np.array([[link.total_mass for link in links] for _, links in rigid], dtype=precision),
+        radius=np.array([[link.radius for link in links] for _, links in rigid], dtype=precision),
         joint_numbers=moving,
         n_joints=len(kinds),
         actuation=_actuation([[joint.actuator for joint in row] for row in joints]),
@@ -155,6 +157,7 @@ def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precis
         offset=offset,
         com=com,
         mass=np.ascontiguousarray(mass, dtype=precision),
+        radius=np.full((n, dof), space.link_radius, dtype=precision),
         joint_numbers=tuple(range(dof)),
         n_joints=dof,
         actuation=actuation,
