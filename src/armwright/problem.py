@@ -10,7 +10,7 @@ from armwright.evaluation import Array, Evaluation, evaluate_arrays
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.objectives import PAPER_OBJECTIVES, Objective, named_objectives
+from armwright.objectives import OF_CLEARANCE, PAPER_OBJECTIVES, Objective, named_objectives
 from armwright.space import Design, DesignSpace, paper_space
 from armwright.task import Task
 from armwright.tolerance import moved
@@ -54,6 +54,11 @@ class Problem:
     def reference_point(self) -> tuple[float, ...] | None:
         """The worst values that count for the hypervolume, where the task states them."""
         return self.task.reference_point
+
+    @property
+    def heeds_clearance(self) -> bool:
+        """Whether it counts where the arm is in an obstacle or in itself."""
+        return any(objective in OF_CLEARANCE for objective in self.objectives)
 
     def arm(self, design: Design) -> Arm:
         """The physical chain that a design builds."""
