@@ -222,9 +222,9 @@ def test_moving_everything_changes_nothing() -> None:
         for _ in range(3)
     ]
     bars = [
-        Cylinder(kind="cylinder", center=tuple(rng.uniform(-1, 1, 3)), radius=0.05, height=0.5, axis=tuple(rng.normal(size=3)))
-        for _ in range(3)
-    ]  # fmt: skip
+        Cylinder(kind="cylinder", center=tuple(at), radius=0.05, height=0.5, axis=tuple(axis))
+        for at, axis in zip(rng.uniform(-1, 1, (3, 3)), rng.normal(size=(3, 3)), strict=True)
+    ]
     ground = Ground(kind="ground", z=-0.5)
     there = [
         *(box.model_copy(update={"center": moved(box.center), "yaw": box.yaw + turn}) for box in boxes),
@@ -236,7 +236,7 @@ def test_moving_everything_changes_nothing() -> None:
     ]
     before = clearances(stack_arms(arms, "float64"), q, [*boxes, *bars, ground])
     elsewhere = [replace(arm, base=moved(arm.base)) for arm in arms]
-    after = clearances(stack_arms(elsewhere, "float64"), q + [turn, 0.0, 0.0, 0.0, 0.0], there)
+    after = clearances(stack_arms(elsewhere, "float64"), q + turn * np.eye(5)[0], there)
     assert np.array(after) == pytest.approx(np.array(before), abs=1e-9)
 
 
@@ -270,7 +270,7 @@ def test_links_that_are_not_there() -> None:
 
 
 def planar(lengths: Sequence[float], radius: float = 0.015) -> Arm:
-    links = tuple(uniform_link((0.0, 0.0, long), 0.1, radius) if long else Link((0, 0, 0), 0.1, (0, 0, 0), radius) for long in lengths)  # fmt: skip
+    links = tuple(Link((0.0, 0.0, long), 0.1, (0.0, 0.0, long / 2), radius) for long in lengths)
     return Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", "y", -3.1, 3.1) for _ in lengths), links)
 
 
@@ -292,7 +292,9 @@ def test_the_first_link_may_stand_on_what_its_foot_touches() -> None:
         arm = replace(planar(lengths), base=(0.0, 0.0, base))
         return float(clearances(stack_arms([arm]), np.array([[q]]), ground)[1][0, 0])
 
-    assert of(0.0, (0.0, 0.0)) == pytest.approx(0.2 - 0.015), "upright on the ground: the second link's start is nearest"
+    assert of(0.0, (0.0, 0.0)) == pytest.approx(0.2 - 0.015), (
+        "upright on the ground: the second link's start is nearest"
+    )
     assert of(-0.01, (0.0, 0.0)) == pytest.approx(0.19 - 0.015)
     assert of(0.0, (np.pi / 2, 0.0)) == pytest.approx(-0.015, abs=1e-6), "a link that lies in the table's surface"
     assert of(0.0, (2.0, 0.0)) < -0.1, "and one that goes down"
@@ -335,7 +337,8 @@ def test_many_arms_in_threads_are_as_one_by_one() -> None:
     obstacles = [random_obstacle(np.random.default_rng(1), kind) for kind in SHAPES]
     all_at_once = np.array(clearances(stack_arms(arms), q, obstacles))
     for n in (0, 333, 699):
-        assert np.array_equal(np.array(clearances(stack_arms(arms[n : n + 1]), q[n : n + 1], obstacles))[:, 0], all_at_once[:, n])  # fmt: skip
+        one = np.array(clearances(stack_arms(arms[n : n + 1]), q[n : n + 1], obstacles))
+        assert np.array_equal(one[:, 0], all_at_once[:, n])
 
 
 def test_fixed_joints_are_refused() -> None:

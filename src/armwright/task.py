@@ -196,10 +196,10 @@ targets:
 
 # What the arm should keep away from, in metres; it counts with the objective collision or closeness.
 # obstacles:
-#   - {kind: ground, z: 0.0}
-#   - {kind: box, name: shelf, center: [0.4, 0.0, 0.2], size: [0.3, 0.6, 0.02], yaw: 0.0}
-#   - {kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}
-#   - {kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}
+#   - {{kind: ground, z: 0.0}}
+#   - {{kind: box, name: shelf, center: [0.4, 0.0, 0.2], size: [0.3, 0.6, 0.02], yaw: 0.0}}
+#   - {{kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}}
+#   - {{kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}}
 
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
 # rms_torque, mass, length, collision, closeness.

@@ -21,11 +21,12 @@ GPU_CHUNKS = 64
 def clearances(
     arms: ArmArrays, q: NDArray[np.float64], obstacles: Sequence[Obstacle] = (), device: Device = "cpu"
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Of N arms in T postures, the smallest distance of two links that are not neighbours, and of a link from an
-    obstacle; (N, T) each [m], below 0 where they are in each other, infinite where there is nothing to hit.
+    """How far N arms in T postures are from themselves, and from obstacles: (N, T) each [m].
 
+    That is the smallest distance of two links that are not neighbours, and of a link from an obstacle; below 0 where
+    one is in the other, infinite where there is nothing to hit.
     q: (N, T, D) joint angles [rad].
-    """  # noqa: D205
+    """
     if arms.n_joints != arms.dof:
         fixed = next(j for j in range(arms.n_joints) if j not in arms.joint_numbers)
         raise ArmError(f"clearance is computed for arms whose joints all move; joint {fixed + 1} is fixed")
@@ -50,6 +51,7 @@ def _measured(
     arms: ArmArrays, q: NDArray[np.float64], solids: list[Any] | None, wp: Any, kernels: Any, device: Device
 ) -> NDArray[np.floating[Any]]:
     """(2, n, T) [m]."""
+
     def given(values: NDArray[Any], dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, copy=False)
 

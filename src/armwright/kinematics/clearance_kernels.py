@@ -122,7 +122,7 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
             a = starts[arm, target, i]
             u = ends[arm, target, i] - a
             long = wp.length(u)
-            links_between = int(0)
+            links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
             between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
             for j in range(i + 1, radius.shape[1]):
                 b = starts[arm, target, j]

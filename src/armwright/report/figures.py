@@ -228,7 +228,9 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
         _draw_postures(axes, member, evaluation, column, targets)
         frame(axes, extent)
         axes.set_title(f"{title}\n{_words(history, member)}", y=1.0)
-    figure.legend(handles=_arm_legend(evaluation), loc="lower center", ncols=3 if len(chosen) == 1 else _columns(evaluation))
+    figure.legend(
+        handles=_arm_legend(evaluation), loc="lower center", ncols=3 if len(chosen) == 1 else _columns(evaluation)
+    )
     return figure
 
 

@@ -69,6 +69,18 @@ export function drawnJoints() {
     .map((mesh) => mesh.position.toArray());
 }
 
+// The corners of what is drawn of obstacles, in the world; for tests.
+export function drawnObstacles() {
+  return groups.obstacles.children.map((part) => {
+    part.updateMatrixWorld();
+    const { array } = part.geometry.attributes.position, corners = [];
+    for (let k = 0; k < array.length; k += 3) {
+      corners.push(new THREE.Vector3(array[k], array[k + 1], array[k + 2]).applyMatrix4(part.matrixWorld).toArray());
+    }
+    return corners;
+  });
+}
+
 function begin() {
   unit = { rod: new THREE.CylinderGeometry(1, 1, 1, 20), ball: new THREE.SphereGeometry(1, 20, 14) };
   renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
