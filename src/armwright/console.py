@@ -25,6 +25,7 @@ from armwright.front import FrontProgress, FrontRun
 from armwright.history import FrontMember, History
 from armwright.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.polish import Polished
+from armwright.problem import Problem
 from armwright.results import REPORT
 from armwright.study import Progress as StudyProgress
 from armwright.study import Run
@@ -72,7 +73,8 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     _show_proposer(console, summary["proposer"])
     scaled = TORQUE in history.problem.objectives
     words = f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; " if scaled else ""
-    console.print(f"{words}{history.problem.space.mass_note}{_payload_note(history.problem.task)}")
+    problem = history.problem
+    console.print(f"{words}{problem.space.mass_note}{_payload_note(problem.task)}{_obstacle_note(problem)}")
     _show_places(console, run.folder, figures)
 
 
@@ -277,6 +279,8 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
         console.print(f"  objectives: {', '.join(task.objectives)}")
     if task.payloads.any():
         console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
+    for obstacle in task.obstacles:
+        console.print(f"  obstacle: {obstacle.words()}")
     console.print(f"  reference point: {reference}")
     console.print(f"  provenance: {task.provenance}")
     if known is not None:
@@ -319,6 +323,13 @@ def stdout_console() -> Console:
 def stderr_console() -> Console:
     """Words on stderr, where stdout is for a program."""
     return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+
+
+def _obstacle_note(problem: Problem) -> str:
+    """That a task's obstacles count for nothing, where that is so."""
+    if not problem.task.obstacles or problem.heeds_clearance:
+        return ""
+    return "; the task's obstacles count in none of the objectives (collision and closeness heed them)"
 
 
 def _payload_note(task: DesignTask) -> str:

@@ -12,6 +12,7 @@ from armwright.kinematics.arrays import FIXED, Actuation
 
 TORQUE_SCALE = 40.0  # α of the paper
 REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
+COMFORTABLE = 0.1  # [m] of clearance, beyond which more of it is worth nothing
 MOST_OBJECTIVES = 5  # of which the hypervolume is still computed in no time
 
 Over = Literal["sum", "max", "mean square", "arm"]
@@ -183,9 +184,39 @@ LENGTH = Objective(
     each=lambda evaluation: evaluation.arms.length,
     over="arm",
 )
+COLLISION = Objective(
+    name="collision",
+    label="Collision",
+    unit="m",
+    symbol="E_collision",
+    words="how deep the arm in the kept posture is in an obstacle or in itself, at the worst place; 0 where it is free",
+    each=lambda evaluation: np.maximum(0.0, -evaluation.clearance),
+)
+CLOSENESS = Objective(
+    name="closeness",
+    label="Closeness",
+    unit="m",
+    symbol="E_closeness",
+    words=f"by how much the arm in the kept posture comes nearer than {COMFORTABLE:g} m to an obstacle or to itself; "
+    f"above {COMFORTABLE:g} it is in it",
+    each=lambda evaluation: np.maximum(0.0, COMFORTABLE - evaluation.clearance),
+    over="max",
+)
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
-_ALL = (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS)
+_ALL = (
+    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS, COLLISION,
+    CLOSENESS,
+)  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
+
+
+# What an arm's clearance is called, where it is named: (N, T) each [m].
+CLEARANCES: Mapping[str, Callable[[Evaluation], Array]] = {
+    "clearance": lambda evaluation: evaluation.clearance,
+    "self_clearance": lambda evaluation: evaluation.self_clearance,
+    "obstacle_clearance": lambda evaluation: evaluation.obstacle_clearance,
+}
+OF_CLEARANCE = (COLLISION, CLOSENESS)
 
 
 def named_objectives(names: Sequence[str]) -> tuple[Objective, ...]:

@@ -10,7 +10,7 @@ from armwright.evaluation import Array, Evaluation, evaluate_arrays
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.objectives import PAPER_OBJECTIVES, Objective, named_objectives
+from armwright.objectives import OF_CLEARANCE, PAPER_OBJECTIVES, Objective, named_objectives
 from armwright.parameters import Design
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
@@ -56,6 +56,11 @@ class Problem:
         """The worst values that count for the hypervolume, where the task states them."""
         return self.task.reference_point
 
+    @property
+    def heeds_clearance(self) -> bool:
+        """Whether it counts where the arm is in an obstacle or in itself."""
+        return any(objective in OF_CLEARANCE for objective in self.objectives)
+
     def arm(self, design: Design) -> Arm:
         """The physical chain that a design builds."""
         return self.space.arm(design)
@@ -70,7 +75,8 @@ class Problem:
 
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
-        return evaluate_arrays(arms, self.task.points, self.device, start, self.task.payloads)
+        task = self.task
+        return evaluate_arrays(arms, task.points, self.device, start, task.payloads, task.obstacles)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.

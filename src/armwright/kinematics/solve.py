@@ -81,7 +81,7 @@ def solve_postures(
     if device == "cuda":
         _one_after_another(solve, n, size)
     else:
-        _in_threads(solve, n, min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups))))
+        in_threads(solve, n, min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups))))
     return solved
 
 
@@ -278,7 +278,7 @@ def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> Non
             first += size
 
 
-def _in_threads(solve: Callable[[slice], None], n: int, size: int) -> None:
+def in_threads(solve: Callable[[slice], None], n: int, size: int) -> None:
     """Solves n arms in chunks of `size`, by as many threads as there are cores."""
     chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
     if len(chunks) == 1:

@@ -22,10 +22,11 @@ from armwright.export.urdf import to_urdf
 from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
+from armwright.obstacles import Obstacle
 from armwright.parameters import FloatParameter
 from armwright.pareto import front_numbers, hypervolume, hypervolume_history
 from armwright.report.repeat import repeat_command
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, MISSED, TARGET, look
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.results import read_summary
 from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
 
@@ -194,6 +195,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
+        "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
         "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
@@ -216,8 +218,19 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "command": repeat_command(config, any(trial.source == POLISH for trial in history), spent),
         "config": config.model_dump(mode="json"),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
-        "colours": {"front": FRONT, "missed": MISSED, "target": TARGET, "joint": JOINT},
+        "colours": {"front": FRONT, "missed": MISSED, "target": TARGET, "joint": JOINT, "obstacle": OBSTACLE},
         "joint_words": JOINT_LABEL,
+    }
+
+
+def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    solid = obstacle.solid
+    return {
+        "shape": solid.shape,
+        "centre": list(solid.centre),
+        "rotation": solid.rotation.tolist(),
+        "half": list(solid.half),
+        "words": obstacle.words(),
     }
 
 

@@ -19,9 +19,11 @@ from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions, link_lines
 from armwright.objectives import POSITION_ERROR, TORQUE, Objective
+from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, TARGET, Look, look
+from armwright.report.solids import draw_obstacles
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, Look, look
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
@@ -221,10 +223,14 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
     for column, (title, member) in enumerate(chosen):
         axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
         targets = range(len(evaluation.targets))
+        extent = _extent(evaluation, [m for _, m in chosen])
+        draw_obstacles(axes, evaluation.obstacles, extent)
         _draw_postures(axes, member, evaluation, column, targets)
-        frame(axes, _extent(evaluation, [m for _, m in chosen]))
+        frame(axes, extent)
         axes.set_title(f"{title}\n{_words(history, member)}", y=1.0)
-    figure.legend(handles=_arm_legend(), loc="lower center", ncols=3 if len(chosen) == 1 else 6)
+    figure.legend(
+        handles=_arm_legend(evaluation), loc="lower center", ncols=3 if len(chosen) == 1 else _columns(evaluation)
+    )
     return figure
 
 
@@ -242,6 +248,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     extent = _extent(evaluation, [member])
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
+        draw_obstacles(axes, evaluation.obstacles, extent)
         _draw_postures(axes, member, evaluation, 0, [target])
         frame(axes, extent)
         error = evaluation.position_error[0, target]
@@ -249,7 +256,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
         axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=FRONT if error < REACHED else MISSED)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_words(history, member)}", fontsize=10)
-    figure.legend(handles=_arm_legend(), loc="lower center", ncols=6 if columns > 2 else 3)
+    figure.legend(handles=_arm_legend(evaluation), loc="lower center", ncols=_columns(evaluation) if columns > 2 else 3)
     return figure
 
 
@@ -341,6 +348,9 @@ def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.
     ]
     points = np.vstack([evaluation.targets, *places])
     low, high = points.min(axis=0), points.max(axis=0)
+    for obstacle in evaluation.obstacles:
+        if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor that is near
+            low[2] = min(low[2], obstacle.z)
     return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
 
 
@@ -358,14 +368,21 @@ def _legend(history: History) -> list[Line2D]:
     return [*marks, line] if len(history.problem.objectives) == 2 else marks
 
 
-def _arm_legend() -> list[Line2D]:
+def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:
     joints = [Line2D([], [], linestyle="", marker="o", color=JOINT[a], label=JOINT_LABEL[a]) for a in "xyz"]
+    obstacles = [Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle")] if evaluation.obstacles else []
     return [
         Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
         *joints,
         Line2D([], [], linestyle="", marker="*", markersize=9, color=TARGET, markeredgecolor=FRONT, label="target"),
         Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
+        *obstacles,
     ]
+
+
+def _columns(evaluation: Evaluation) -> int:
+    """Of a legend on one line."""
+    return len(_arm_legend(evaluation))
 
 
 def _paint(style: Look) -> dict[str, Any]:

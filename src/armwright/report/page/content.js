@@ -70,6 +70,7 @@ export class Content {
 
   get objectives() { return this.head.objectives; }
   get targets() { return this.head.targets; }
+  get obstacles() { return this.head.obstacles; }
   source(i) { return this.head.sources[this._part("source", i)[0]]; }
   look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }

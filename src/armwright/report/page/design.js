@@ -67,7 +67,8 @@ export function drawDesign() {
   }
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.`;
+  const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.words).join("; ")}.` : "";
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.${solids}`;
 }
 
 function drawLinks(arm) {
