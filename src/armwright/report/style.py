@@ -28,6 +28,7 @@ _LOOKS = {
 FRONT = "#111111"
 MISSED = "#CC0000"
 TARGET = "#CC79A7"
+INFEASIBLE = "#B0B0B0"
 LINK = "#5A5A60"
 JOINT = {"x": "#D55E00", "y": "#0072B2", "z": "#009E73"}
 JOINT_LABEL = {"x": "R (roll, x)", "y": "P (pitch, y)", "z": "Y (yaw, z)"}

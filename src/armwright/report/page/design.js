@@ -53,10 +53,11 @@ export function drawDesign() {
     const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
     return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
   });
+  const feasible = head.constraints.length ? ` ${constraintWords(i)}` : "";
   const motors = content.motors(i).length ? ` Motors: ${content.motors(i).join(", ")}.` : "";
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m. ${onFront}${iteration}${motors}`;
+  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m. ${onFront}${feasible}${iteration}${motors}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -67,6 +68,16 @@ export function drawDesign() {
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
   $("design-note").textContent = `Angles q in rad; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.`;
+}
+
+// What the design has where it is bounded.
+function constraintWords(i) {
+  const broken = content.broken(i);
+  const words = content.head.constraints.map((c, k) => {
+    const has = c.bound + c.sign * c.scale * broken[k];
+    return `${c.words}: ${number(has)} ${c.unit}${broken[k] > 0 ? " (broken)" : ""}`;
+  });
+  return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${words.join("; ")}.`;
 }
 
 function drawLinks(arm) {
