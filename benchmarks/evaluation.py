@@ -29,8 +29,9 @@ from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
 from armwright.kinematics.arrays import ArmArrays, Precision, arrays_of, stack_arms
 from armwright.kinematics.solve import UPDATES, solve_postures
+from armwright.masses import MassPerMetre
 from armwright.problem import Problem
-from armwright.space import MassPerMetre, paper_space
+from armwright.space import paper_space
 from armwright.task import load_task
 
 TARGETS = load_task("target-1").points
@@ -161,7 +162,7 @@ def compare_with_yardstick() -> None:
 
         def theirs(wide: int = wide) -> None:
             library.yardstick(
-                n, pointer(arrays.base), pointer(arrays.axis), pointer(links), ctypes.c_float(2.4),
+                n, pointer(arrays.base), pointer(arrays.motion), pointer(links), ctypes.c_float(2.4),
                 ctypes.c_float(MassPerMetre().kg), pointer(targets), UPDATES, wide, pointer(error), pointer(torque),
             )  # fmt: skip
 

@@ -13,9 +13,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from armwright.evaluation import Array
+from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
-from armwright.space import Design
 from armwright.study import Run, optimize
 from armwright.task import load_task
 from tests.chat_server import Answer, ChatServer, Request

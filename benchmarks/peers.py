@@ -13,9 +13,9 @@ from pymoo.core.termination import Termination
 from pymoo.optimize import minimize
 
 from armwright.evaluation import Array
+from armwright.parameters import FloatParameter
 from armwright.pareto import front_mask
 from armwright.problem import Problem
-from armwright.space import FloatParameter
 
 
 class Nsga2:

@@ -20,11 +20,11 @@ from peers import Nsga2
 import armwright
 from armwright.best_known import known_front
 from armwright.evaluation import Array
+from armwright.parameters import FloatParameter
 from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem import Problem
 from armwright.search.front import FrontSearch
 from armwright.search.survival import front, thinned
-from armwright.space import FloatParameter
 from armwright.task import builtin_tasks
 
 SEEDS = range(3)

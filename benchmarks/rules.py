@@ -15,10 +15,11 @@ import numpy as np
 from scipy.stats import qmc
 
 from armwright.history import History
+from armwright.parameters import FloatParameter, ParameterValue
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.proposers.rules import RulesProposer
-from armwright.space import DesignSpace, FloatParameter, ParameterValue
+from armwright.space import DesignSpace
 from armwright.study import optimize
 from armwright.task import load_task, random_task
 

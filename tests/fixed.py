@@ -5,22 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from armwright.evaluation import Evaluation
+from armwright.evaluation import Array, Evaluation
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.arrays import arrays_of
 from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
+from armwright.parameters import Design
 from armwright.pareto import default_reference_point
 from armwright.problem import Problem
-from armwright.space import Design, DesignSpace, paper_space
+from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
 
 
 class FixedProblem(Problem):
     """The tip comes a part of the way to each target; joint j turns by j steps; torques fall from base to tip."""
 
-    def evaluation(self, designs: Sequence[Design]) -> Evaluation:
+    def evaluation_of_rows(self, rows: Array) -> Evaluation:
         targets = self.task.points
-        n, t, d = len(designs), len(targets), self.space.joints
+        designs = self.space.designs(rows)
+        n, t, d = len(designs), len(targets), self.space.most_joints
         reach = np.array([sum(design.links) for design in designs])
         base = np.array([design.origin for design in designs]).reshape(n, 3)
         away = targets[None] - base[:, None]  # (N, T, 3)
@@ -30,10 +32,10 @@ class FixedProblem(Problem):
         lower, upper = self.space.joint_range
         steps = 0.4 * np.arange(1, d + 1) * (1 + np.arange(t)[:, None] % 3) - 1.5  # (T, D)
         q = np.broadcast_to(np.clip(steps, lower, upper), (n, t, d)).copy()
-        mass = self.space.joints * self.space.mass.mass(self.space.link[1])
+        mass = self.space.most_joints * self.space.mass.mass(self.space.link[1])
         lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
-        arms = arrays_of(self.space, self.space.matrix(designs))
+        arms = arrays_of(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
         return Evaluation(arms, targets, self.task.payloads, q, reached, error, torques)
 

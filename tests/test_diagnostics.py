@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from armwright.diagnostics import are_round, diagnose, front_share, repeated
 from armwright.history import FinishedTrial, History
+from armwright.parameters import Design
 from armwright.problem import Problem
-from armwright.space import Design
 from armwright.task import load_task, random_task
 
 EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)

@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright.parameters import CategoricalParameter, FloatParameter
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem import Problem
 from armwright.search.columns import Columns
 from armwright.search.front import CAPACITIES, FIRST_BATCH, SMALLEST_BATCH, FrontSearch
 from armwright.search.survival import leaders, survivors
 from armwright.search.variation import RARE_SHARE, _parents
-from armwright.space import CategoricalParameter, FloatParameter, paper_space
+from armwright.space import paper_space
 from armwright.task import load_task
 
 SPACE = paper_space()

@@ -19,7 +19,8 @@ from armwright.export.urdf import to_urdf
 from armwright.kinematics import solve
 from armwright.kinematics.arrays import ArmArrays, stack_arms
 from armwright.kinematics.solve import Postures, solve_postures, update_once
-from armwright.space import Design, DesignSpace, paper_space
+from armwright.parameters import Design
+from armwright.space import DesignSpace, paper_space
 from armwright.task import load_task
 from tests import reference
 from tests.arms import general_arms, paper_arms

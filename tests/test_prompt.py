@@ -30,8 +30,10 @@ from armwright.llm.prompt import (
     parameters_prompt,
     spread,
 )
+from armwright.masses import MassPerLink
+from armwright.parameters import exact
 from armwright.problem import Problem
-from armwright.space import DesignSpace, MassPerLink, exact, paper_space
+from armwright.space import DesignSpace, paper_space
 from armwright.task import Task, load_task
 from tests.fixed import (
     ONE_JOINT,

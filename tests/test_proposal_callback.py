@@ -22,13 +22,13 @@ from armwright.any_study.callback import ProposalCallback
 from armwright.any_study.proposals import StudyProposal, StudyProposer, study_history
 from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm.transcript import Transcript
+from armwright.parameters import Design
 from armwright.pareto import hypervolume
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposal
 from armwright.proposers.rules import RulesProposer
 from armwright.sampling import distributions
-from armwright.space import Design
 from armwright.task import Task, load_task
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
 

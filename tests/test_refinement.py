@@ -8,13 +8,13 @@ import pytest
 
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.history import POLISH
+from armwright.parameters import CategoricalParameter, FloatParameter
 from armwright.pareto import Array, hypervolume
 from armwright.polish import polish_run
 from armwright.problem import Problem
 from armwright.results import read_summary
 from armwright.run_folder import read_run
 from armwright.search.refinement import POPULATION, Refined, refine
-from armwright.space import CategoricalParameter, FloatParameter
 from armwright.study import Run, optimize
 from armwright.task import load_task
 

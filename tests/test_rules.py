@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armwright.history import RANDOM, FinishedTrial, History
+from armwright.masses import MassPerLink, MassPerMetre
 from armwright.pareto import hypervolume
 from armwright.problem import Problem
 from armwright.proposers.geometry import affordable_length, needed_length, shoulder, stretched_torque
 from armwright.proposers.proposer import Proposal
 from armwright.proposers.rules import EXPECTED, RULES, RulesProposer, members_inside
 from armwright.proposers.structures import OPENING, divided, fitted, worded
-from armwright.space import DesignSpace, MassPerLink, MassPerMetre, paper_space
+from armwright.space import DesignSpace, paper_space
 from armwright.study import optimize
 from armwright.task import Task, load_task, random_task
 

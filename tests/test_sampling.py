@@ -10,6 +10,7 @@ from optuna.trial import TrialState
 from armwright import sampling
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError
 from armwright.history import BBO, RANDOM, FinishedTrial, History
+from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.proposers.rules import RulesProposer
 from armwright.sampling import (
@@ -22,7 +23,7 @@ from armwright.sampling import (
     sampler_name,
 )
 from armwright.seeding import derived_seed
-from armwright.space import Design, paper_space
+from armwright.space import paper_space
 from armwright.study import optimize
 from armwright.task import Task, load_task
 from tests.extras import NEEDS_GP

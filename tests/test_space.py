@@ -13,9 +13,11 @@ from armwright.exceptions import DesignError, SpaceError
 from armwright.front import find_front
 from armwright.kinematics.arrays import FLOATS, arrays_of, stack_arms
 from armwright.llm.prompt import load_prompt
+from armwright.masses import MassOfTube, MassPerLink
+from armwright.parameters import Design, FloatParameter
 from armwright.problem import Problem
 from armwright.run_folder import read_run
-from armwright.space import Design, DesignSpace, FloatParameter, MassOfTube, MassPerLink, load_space, paper_space
+from armwright.space import DesignSpace, load_space, paper_space
 from armwright.study import optimize
 from armwright.task import load_task
 
@@ -119,15 +121,15 @@ def test_a_file_changes_what_it_names_and_keeps_the_rest(tmp_path: Path) -> None
     ("text", "words"),
     [
         ("joints: 0", "joints"),
-        ("joints: 9", "less than or equal to 8"),
+        ("joints: 9", "joints = 9: from 1 to 8"),
         ("link: [0.3, 0.03]", "link = [0.3, 0.03] m is upside down"),
         ("origin_x: [1, -1]", "origin_x = [1, -1] m is upside down"),
         ("link: [0, 0.3]", "longer than 0 m"),
         ("joint_range: [0.5, 2.4]", "must hold 0"),
         ("joint_range: [0, 0.01]", "narrower than 3 degrees"),
-        ("joint_types: [R, R]", "names a type twice"),
+        ("joint_types: [R, R]", "names one twice"),
         ("joint_types: []", "joint_types"),
-        ("joint_types: [R, X]", "joint_types"),
+        ("joint_types: [R, Q]", "joint_types"),
         ("links: [0.03, 0.3]", 'unknown key "links".'),
         ("mass: {kind: lead}", "mass"),
         ("mass: {kg: 3}", "kind is missing: per_metre, per_link or tube"),
@@ -167,7 +169,7 @@ def test_the_order_of_the_parameters_means_nothing() -> None:
 def test_a_design_of_another_space_builds_no_arm() -> None:
     with pytest.raises(DesignError, match="joint_5"):
         paper_space().arm(paper_space(5).sample(1, 0)[0])
-    with pytest.raises(SpaceError, match="less than or equal to 8"):
+    with pytest.raises(SpaceError, match="from 1 to 8"):
         paper_space(9)
 
 
@@ -189,7 +191,7 @@ def test_single_parameters_can_be_fixed_or_narrower(tmp_path: Path) -> None:
     assert {design.origin[2] for design in designs} == {0.0}
     assert 0.1 <= min(design.links[0] for design in designs) <= max(design.links[0] for design in designs) <= 0.2
     one, other = arrays_of(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
-    for name in (*FLOATS, "axis"):
+    for name in (*FLOATS, "motion"):
         assert np.array_equal(getattr(one, name), getattr(other, name))
     assert space.designs(space.matrix(designs)) == designs
     assert DesignSpace.model_validate_json(space.model_dump_json()) == space

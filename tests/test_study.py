@@ -13,11 +13,11 @@ from optuna.samplers import BaseSampler, NSGAIISampler, QMCSampler, RandomSample
 
 from armwright.exceptions import ProposalError, RunConflictError, RunFolderError, SettingsError
 from armwright.history import History
+from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.run_folder import read_run
 from armwright.sampling import SamplerFactory
-from armwright.space import Design
 from armwright.study import Progress, Run, optimize
 from armwright.task import Task, load_task
 from tests.extras import NEEDS_GP

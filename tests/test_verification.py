@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from armwright.history import FinishedTrial, History
+from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.results import read_summary, verify_run
-from armwright.space import Design
 from armwright.study import optimize
 from armwright.task import Task, load_task
 from armwright.tolerance import moved

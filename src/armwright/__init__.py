@@ -16,12 +16,14 @@ if TYPE_CHECKING:
     from armwright.any_study.proposals import StudyProposal, StudyProposer
     from armwright.arm import Arm, Joint, Link, uniform_link
     from armwright.comparison import Comparison, compare_runs
+    from armwright.drafting import Draft, draft
     from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
     from armwright.export.mjcf import to_mjcf
     from armwright.export.urdf import to_urdf
     from armwright.front import FrontRun, find_front
     from armwright.history import FinishedTrial, FrontMember, History
+    from armwright.parameters import Design
     from armwright.pareto import hypervolume
     from armwright.polish import polish_run
     from armwright.problem import Problem
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from armwright.report.page import write_report
     from armwright.results import verify_run
     from armwright.run_folder import read_run
-    from armwright.space import Design, DesignSpace, load_space, paper_space
+    from armwright.space import DesignSpace, load_space, paper_space
     from armwright.study import Run, optimize
     from armwright.task import Task, builtin_tasks, load_task, random_task
 
@@ -44,8 +46,9 @@ _PLACES = {
     "Arm": "arm",
     "ArmwrightError": "exceptions",
     "Comparison": "comparison",
-    "Design": "space",
+    "Design": "parameters",
     "DesignSpace": "space",
+    "Draft": "drafting",
     "Evaluation": "evaluation",
     "FailureError": "exceptions",
     "FinishedTrial": "history",
@@ -71,6 +74,7 @@ _PLACES = {
     "UsageError": "exceptions",
     "builtin_tasks": "task",
     "compare_runs": "comparison",
+    "draft": "drafting",
     "evaluate": "evaluation",
     "find_front": "front",
     "hypervolume": "pareto",
@@ -95,6 +99,7 @@ __all__ = [
     "Comparison",
     "Design",
     "DesignSpace",
+    "Draft",
     "Evaluation",
     "FailureError",
     "FinishedTrial",
@@ -120,6 +125,7 @@ __all__ = [
     "UsageError",
     "builtin_tasks",
     "compare_runs",
+    "draft",
     "evaluate",
     "find_front",
     "hypervolume",

@@ -18,8 +18,8 @@ GRAVITY = 9.81  # [m/s²] along -z
 class Actuator:
     """What turns a joint. It sits there and is carried by the link before.
 
-    mass: [kg]. effort: the torque [N m] or force [N] that may be asked of it. speed: the largest [rad/s] or [m/s], and
-    price: [USD]; None where not known.
+    mass: [kg]. effort: the torque that may be asked of it [N m]. speed: the largest [rad/s], and price: [USD]; None
+    where not known.
     """
 
     name: str
@@ -40,6 +40,7 @@ class Joint:
 
     lower, upper: the limits [rad] or [m]; a fixed joint has none and does not move.
     actuator: what turns it; None where that is not chosen.
+    travel: of a prismatic joint for each radian that its actuator turns [m/rad]; 1 of the others.
     """
 
     kind: JointKind
@@ -47,6 +48,7 @@ class Joint:
     lower: float = 0.0
     upper: float = 0.0
     actuator: Actuator | None = None
+    travel: float = 1.0
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(JointKind):
@@ -60,6 +62,20 @@ class Joint:
             raise ArmError(
                 f"joint limits are upside down: lower < upper is needed, not {self.lower} and {self.upper} {unit}"
             )
+        if not 0.0 < self.travel < math.inf or (self.kind != "prismatic" and self.travel != 1.0):
+            raise ArmError(f"travel = {self.travel} m/rad: above 0 of a prismatic joint, 1 of any other")
+
+    @property
+    def effort(self) -> float | None:
+        """What its actuator can do at the joint: a torque [N m], or a force [N] where it slides; None where unknown."""
+        return None if self.actuator is None else self.actuator.effort / self.travel
+
+    @property
+    def speed(self) -> float | None:
+        """The fastest that its actuator can move it [rad/s] or [m/s]; None where unknown."""
+        if self.actuator is None or self.actuator.speed is None:
+            return None
+        return self.actuator.speed * self.travel
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,11 +129,18 @@ class Arm:
 
     base: the first joint's position in the world [m].
     joints, links: joint j moves link j and all that follows it.
+    tool: from the end of the last link to the tip, in the frame of that link [m].
+    tool_axis, tool_side: the world's directions of the tool's own z and x when all joints are at 0.
+    base_mass: of what stands with the base, such as the first joint's actuator [kg].
     """
 
     base: Vector
     joints: tuple[Joint, ...]
     links: tuple[Link, ...]
+    tool: Vector = (0.0, 0.0, 0.0)
+    tool_axis: Vector = (0.0, 0.0, 1.0)
+    tool_side: Vector = (1.0, 0.0, 0.0)
+    base_mass: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.joints or len(self.joints) != len(self.links):
@@ -127,12 +150,24 @@ class Arm:
             )
         if not all(math.isfinite(v) for v in self.base):
             raise ArmError(f"the base position must be finite: {self.base} m")
+        if not all(math.isfinite(v) for v in self.tool):
+            raise ArmError(f"the tool's offset must be finite: {self.tool} m")
+
+    @property
+    def mass(self) -> float:
+        """Of all, what stands with the base included [kg]."""
+        return self.base_mass + sum(link.total_mass for link in self.links)
+
+    @property
+    def length(self) -> float:
+        """Of all links [m]."""
+        return sum(link.length for link in self.links)
 
     @property
     def reach(self) -> float:
         """The longest distance from the first joint that the tip could have [m]."""
         strokes = sum(max(abs(j.lower), abs(j.upper)) for j in self.joints if j.kind == "prismatic")
-        return strokes + sum(link.length for link in self.links)
+        return strokes + self.length + math.hypot(*self.tool)
 
 
 def uniform_link(offset: Vector, mass: float, radius: float) -> Link:

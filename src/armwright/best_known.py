@@ -13,9 +13,10 @@ import numpy as np
 
 from armwright.evaluation import Array
 from armwright.objectives import PAPER_OBJECTIVES
+from armwright.parameters import Design, FloatParameter
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem import Problem
-from armwright.space import Design, FloatParameter, paper_space
+from armwright.space import paper_space
 from armwright.task import Task, builtin_names, load_task
 
 BEYOND = 5e-4  # of the best known hypervolume: any other front fills the gaps of a finite one by less

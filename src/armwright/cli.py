@@ -672,6 +672,57 @@ def actuators(json_: Annotated[bool, typer.Option("--json", help="Print as JSON.
 
 
 @app.command()
+def draft(
+    words: Annotated[list[str], typer.Argument(metavar="WORDS...", help="What the arm has to do, in any language.")],
+    model: ModelName = None,
+    base_url: BaseUrl = None,
+    temperature: Annotated[float | None, typer.Option(help="Sent to the model only if given.")] = None,
+    model_seed: Annotated[int | None, typer.Option(help="Sent to the model only if given.")] = None,
+    origin: Annotated[
+        str, typer.Option(help="What answers: model, or scripted for a stand-in; written into the files.")
+    ] = "model",
+    max_calls: Annotated[int | None, typer.Option(help="Ask no more after so many calls.")] = None,
+    max_cost: Annotated[float | None, typer.Option(help="Ask no more after so many USD.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("."),
+    force: Annotated[bool, typer.Option("--force", help="Replace files of the same name.")] = False,
+    print_prompt: Annotated[
+        bool, typer.Option("--print-prompt", help="Print exactly what would be sent, and end.")
+    ] = False,
+    json_: Annotated[bool, typer.Option("--json", help="Print what came of it as JSON alone to stdout.")] = False,
+) -> None:
+    """Have a language model draft a task file, and a space file where one is needed, from WORDS. Nothing is run."""
+    from armwright import console as view
+    from armwright.drafting import Drafter, drafting_model
+    from armwright.llm.drafts import draft_prompt
+
+    said = " ".join(words)
+    if print_prompt:
+        print(draft_prompt(said), end="")
+        return
+    console = view.stderr_console() if json_ else view.stdout_console()
+    drafter = Drafter(
+        drafting_model(model, base_url),
+        out,
+        force,
+        temperature=temperature,
+        seed=model_seed,
+        max_calls=max_calls,
+        max_cost=max_cost,
+        origin=origin,
+    )
+    console.print(drafter.forecast(said))
+    try:
+        drafted = drafter.draft(said)
+    except KeyboardInterrupt:
+        console.print("\nstopped; no task was written")
+        sys.exit(INTERRUPTED)
+    if json_:
+        _print_json(drafted.record())
+        return
+    view.show_draft(console, drafted)
+
+
+@app.command()
 def init(
     file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
     points: Annotated[

@@ -2,6 +2,7 @@
 
 import math
 import shlex
+import textwrap
 import time
 from collections import Counter
 from collections.abc import Callable, Generator, Sequence
@@ -17,6 +18,7 @@ from rich.text import Text
 
 from armwright.baselines import Baseline, baselines, baselines_of
 from armwright.catalogue import ActuatorRecord
+from armwright.drafting import Draft
 from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
@@ -292,6 +294,29 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
             f"  {baseline.method}, {baseline.runs} runs of 200 counted trials: E_hv {baseline.e_hv:.2f} (σ_hv "
             f"{baseline.sigma_hv:.2f}), at the end {baseline.final:.2f}, {baseline.share:.1%} of the best known"
         )
+
+
+def show_draft(console: Console, draft: Draft) -> None:
+    """What came of somebody's words, what was assumed, and what to do next."""
+    show_task(console, draft.task, None, ())
+    if draft.space is None:
+        console.print("the default design space fits; no space file is needed")
+    else:
+        console.print("design space, otherwise the default:")
+        console.print(textwrap.indent(draft.space_body, "  "), end="")
+    console.print(
+        "assumed:" if draft.assumed else f"{draft.by} names nothing that it assumed; look for it all the more"
+    )
+    for line in draft.assumed:
+        console.print(f"  - {line}")
+    account = draft.account
+    cost = "cost not known" if account.cost_usd is None else f"{account.cost_usd:.4f} USD"
+    console.print(
+        f"{draft.by}: {account.calls} {'call' if account.calls == 1 else 'calls'}, {account.input_tokens:,} tokens in, "
+        f"{account.output_tokens:,} out, {cost}, {account.seconds:.1f} s"
+    )
+    console.print(f"wrote {' and '.join(map(str, draft.files))}: a draft. Check the numbers, edit it, then run:")
+    console.print(f"  armwright tasks {shlex.quote(str(draft.files[0]))}\n  {draft.command}")
 
 
 def stdout_console() -> Console:

@@ -10,10 +10,10 @@ import numpy as np
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.history import FrontMember, History
+from armwright.parameters import FloatParameter
 from armwright.pareto import knee_number
 from armwright.results import read_summary, unmet
 from armwright.run_folder import read_run
-from armwright.space import FloatParameter
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 _WEIGHT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
@@ -62,10 +62,10 @@ def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
     And what the constraints bound.
     """
     space = history.problem.space
-    reals = {p.name: float(member.design.params[p.name]) for p in space.parameters if isinstance(p, FloatParameter)}
-    links, first = member.arm.links, member.arm.joints[0].actuator
-    mass = sum(link.total_mass for link in links) + (0.0 if first is None else first.mass)
-    arm = {"length": sum(link.length for link in links), "mass": mass}
+    reals = {
+        p.name: float(member.design.params.get(p.name, 0.0)) for p in space.parameters if isinstance(p, FloatParameter)
+    }
+    arm = {"length": member.arm.length, "mass": member.arm.mass}
     objectives = {o.name: value for o, value in zip(history.problem.objectives, member.values, strict=True)}
     return {**reals, **arm, **bounded_numbers(history, member.number), **objectives}
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
 from armwright.exceptions import TaskError
-from armwright.kinematics.arrays import ArmArrays, Floats, stack_arms
+from armwright.kinematics.arrays import ArmArrays, stack_arms
 from armwright.kinematics.devices import Device
 from armwright.kinematics.solve import solve_postures
 
@@ -17,18 +17,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """N arms of J joints at T targets."""
+    """N arms of up to J joints at T targets; 0 for joints that an arm does not have."""
 
     arms: ArmArrays
     targets: Array  # (T, 3) [m]
     payload: Array  # (T,) that the tip carries there [kg]
-    q: Array  # (N, T, J) kept joint angles [rad]; 0 for a fixed joint
+    q: Array  # (N, T, J) kept joint angles [rad], or ways [m]; 0 for a fixed joint
     reached: Array  # (N, T, 3) position of the tip [m]
     position_error: Array  # (N, T) distance from the target [m]
-    joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m]; 0 for a fixed joint
+    joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
 
     def __len__(self) -> int:
         return len(self.q)
+
+    @property
+    def motor_torques(self) -> Array:
+        """(N, T, J) at the actuators: of a sliding joint its force times its travel [N m]."""
+        return self.joint_torques * self.arms.travel[:, None]
 
 
 def evaluate(arms: Sequence[Arm], targets: ArrayLike, device: Device = "cpu", payload: ArrayLike = 0.0) -> Evaluation:
@@ -48,7 +53,7 @@ def evaluate_arrays(
 ) -> Evaluation:
     """The same for arms that are stacked already, in their precision.
 
-    start: angles [rad] that broadcast to (N, T, D); None for the straight start.
+    start: values [rad] or [m] that broadcast to (N, T, D); None for the straight start.
     """
     targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
@@ -60,10 +65,10 @@ def evaluate_arrays(
         arms=arrays,
         targets=targets,
         payload=loads,
-        q=_of_all_joints(postures.q, arrays),
+        q=postures.q.astype(np.float64),
         reached=reached,
         position_error=np.linalg.norm(reached - targets, axis=-1),
-        joint_torques=_of_all_joints(postures.torque, arrays),
+        joint_torques=postures.torque.astype(np.float64),
     )
 
 
@@ -73,12 +78,3 @@ def _payloads(payload: ArrayLike, t: int) -> Array:
     if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
         raise TaskError(f"payload must be one number >= 0 kg, or one for each of the {t} targets, not {payload}")
     return np.broadcast_to(loads, (t,)).copy()
-
-
-def _of_all_joints(values: Floats, arrays: ArmArrays) -> Array:
-    """(N, T, D) values of the moving joints as (N, T, J), with 0 for the fixed ones."""
-    if arrays.dof == arrays.n_joints:
-        return values.astype(np.float64)
-    every = np.zeros((*values.shape[:2], arrays.n_joints))
-    every[..., list(arrays.joint_numbers)] = values
-    return every

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation
 from armwright.feasibility import counted, feasible_mask, violation
+from armwright.parameters import Design
 from armwright.pareto import default_reference_point, front_mask, front_numbers, hypervolume_history
 from armwright.problem import Problem
-from armwright.space import Design
 
 RANDOM = "random"
 BBO = "bbo"

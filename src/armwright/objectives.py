@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.kinematics.arrays import Actuation
+from armwright.kinematics.arrays import FIXED, Actuation
 
 TORQUE_SCALE = 40.0  # α of the paper
 REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
@@ -59,7 +59,7 @@ def _position_error(evaluation: Evaluation) -> Array:
 
 
 def _torque_norm(evaluation: Evaluation) -> Array:
-    return np.linalg.norm(evaluation.joint_torques, axis=-1)
+    return np.linalg.norm(evaluation.motor_torques, axis=-1)
 
 
 def _actuation(evaluation: Evaluation, name: str) -> Actuation:
@@ -71,8 +71,7 @@ def _actuation(evaluation: Evaluation, name: str) -> Actuation:
 
 def _torque_use(evaluation: Evaluation) -> Array:
     effort = _actuation(evaluation, "torque_use").effort
-    moving = evaluation.joint_torques[..., list(evaluation.arms.joint_numbers)]
-    return np.abs(moving / effort[:, None]).max(axis=-1)
+    return np.abs(evaluation.motor_torques / effort[:, None]).max(axis=-1)
 
 
 def _price(evaluation: Evaluation) -> Array:
@@ -83,9 +82,7 @@ def _price(evaluation: Evaluation) -> Array:
 
 
 def _mass(evaluation: Evaluation) -> Array:
-    arms = evaluation.arms
-    at_base = 0.0 if arms.actuation is None else arms.actuation.base_mass
-    return arms.mass.sum(axis=1, dtype=np.float64) + at_base
+    return evaluation.arms.mass.sum(axis=1, dtype=np.float64) + evaluation.arms.base_mass
 
 
 POSITION_ERROR = Objective(
@@ -128,7 +125,7 @@ PEAK_TORQUE = Objective(
     unit="N m",
     symbol="E_peak",
     words="the largest of the joint torques' absolute values [N m] that hold the kept posture up against gravity",
-    each=lambda evaluation: np.abs(evaluation.joint_torques).max(axis=-1),
+    each=lambda evaluation: np.abs(evaluation.motor_torques).max(axis=-1),
     over="max",
 )
 RMS_TORQUE = Objective(
@@ -168,17 +165,26 @@ PRICE = Objective(
     each=_price,
     over="arm",
 )
+JOINTS = Objective(
+    name="joints",
+    label="Joints",
+    unit="joints",
+    symbol="E_joints",
+    words="the number of joints that move",
+    each=lambda evaluation: (evaluation.arms.motion < FIXED).sum(axis=1).astype(np.float64),
+    over="arm",
+)
 LENGTH = Objective(
     name="length",
     label="Length",
     unit="m",
     symbol="E_length",
     words="the sum of the lengths of all links",
-    each=lambda evaluation: np.linalg.norm(evaluation.arms.offset.astype(np.float64), axis=-1).sum(axis=1),
+    each=lambda evaluation: evaluation.arms.length,
     over="arm",
 )
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
-_ALL = (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE)
+_ALL = (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS)
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 
 

@@ -13,7 +13,8 @@ from armwright.feasibility import ranked
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.objectives import PAPER_OBJECTIVES, Objective, named_objectives
-from armwright.space import Design, DesignSpace, paper_space
+from armwright.parameters import Design
+from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
 from armwright.tolerance import moved
 
@@ -69,7 +70,11 @@ class Problem:
 
     def evaluation(self, designs: Sequence[Design]) -> Evaluation:
         """The physics of N designs at all targets."""
-        return self.evaluate_arrays(arrays_of(self.space, self.space.matrix(designs)))
+        return self.evaluation_of_rows(self.space.matrix(designs))
+
+    def evaluation_of_rows(self, rows: Array) -> Evaluation:
+        """The same of designs as rows (N, P), which may lie outside the space: what is built knows no ranges."""
+        return self.evaluate_arrays(arrays_of(self.space, rows))
 
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
@@ -84,14 +89,15 @@ class Problem:
 
         Only the postures of a chunk of them are in memory at a time.
         """
+        matrix = self.space.settled(matrix)
         size = max(1, POSTURES_AT_ONCE[self.device] // len(self.task.points))
         found = np.empty((len(matrix), len(self.objectives) + len(self.constraints)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
-            found[rows] = self._as_built(matrix[rows])
+            found[rows] = self.judged(self.evaluation_of_rows(matrix[rows]))
             if self.tolerance > 0.0:
                 for copies in moved(self.space, matrix[rows], self.tolerance):
-                    found[rows] = np.maximum(found[rows], self._as_built(copies))
+                    found[rows] = np.maximum(found[rows], self.judged(self.evaluation_of_rows(copies)))
         return self.split(found)
 
     def ranked_matrix(self, matrix: Array) -> Array:
@@ -139,13 +145,9 @@ class Problem:
         found = self.judged(self.evaluation(designs))
         if self.tolerance > 0.0:
             for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
-                found = np.maximum(found, self.judged(self.evaluation(self.space.designs(copies))))
+                found = np.maximum(found, self.judged(self.evaluation_of_rows(copies)))
         return self.split(found)
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
         """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
         return self.judge(designs)[0]
-
-    def _as_built(self, rows: Array) -> Array:
-        """(n, M + C) of designs as rows, each built exactly as it stands there."""
-        return self.judged(self.evaluate_arrays(arrays_of(self.space, rows)))

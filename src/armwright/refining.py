@@ -11,10 +11,10 @@ import moocore
 import numpy as np
 
 from armwright.history import POLISH, FrontMember, History
+from armwright.parameters import Design
 from armwright.pareto import hypervolume
 from armwright.search.refinement import Refined, refine
 from armwright.seeding import derived_seed
-from armwright.space import Design
 
 EVALUATIONS = 1000  # for each design
 POLISHING = 3  # the place of its seeds under the run's seed

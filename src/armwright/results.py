@@ -332,10 +332,10 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
             "targets": [
                 {
                     "target": evaluation.targets[t].tolist(),
-                    "q": evaluation.q[row, t].tolist(),
+                    "q": evaluation.q[row, t, : len(member.arm.joints)].tolist(),
                     "reached": evaluation.reached[row, t].tolist(),
                     "position_error": float(evaluation.position_error[row, t]),
-                    "joint_torques": evaluation.joint_torques[row, t].tolist(),
+                    "joint_torques": evaluation.joint_torques[row, t, : len(member.arm.joints)].tolist(),
                 }
                 for t in range(len(evaluation.targets))
             ],

@@ -23,8 +23,9 @@ from optuna.trial import Trial, create_trial
 
 from armwright.exceptions import MissingExtraError, SettingsError, did_you_mean
 from armwright.history import RANDOM, FinishedTrial
+from armwright.parameters import Design, FloatParameter, Parameter, ParameterValue
 from armwright.seeding import derived_seed
-from armwright.space import Design, DesignSpace, FloatParameter
+from armwright.space import DesignSpace
 
 SamplerFactory = Callable[[int], BaseSampler]
 
@@ -140,13 +141,15 @@ def _check_gp() -> None:
 
 
 def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:
-    """The space in Optuna's words."""
-    return {
-        p.name: FloatDistribution(p.low, p.high)
-        if isinstance(p, FloatParameter)
-        else CategoricalDistribution(p.choices)
-        for p in space.parameters
-    }
+    """The space in Optuna's words, tied parameters left out."""
+    free = [p for p in space.parameters if p.name not in dict(space.tie)]
+    return {p.name: _distribution(p) for p in free}
+
+
+def _distribution(parameter: Parameter) -> BaseDistribution:
+    if isinstance(parameter, FloatParameter):
+        return FloatDistribution(parameter.low, parameter.high, step=parameter.step or None)
+    return CategoricalDistribution(parameter.choices)
 
 
 class BlackBox:
@@ -181,10 +184,11 @@ class BlackBox:
     def restore(self, trials: Iterable[FinishedTrial]) -> None:
         """Adds finished trials, as a resumed run finds them on disk."""
         for trial in trials:
+            params = self._space.searched(trial.design)
             self._study.add_trial(
                 create_trial(
-                    params=dict(trial.design.params),
-                    distributions=self._distributions,
+                    params=params,
+                    distributions={name: self._distributions[name] for name in params},
                     values=list(trial.values),
                     user_attrs=_attributes(trial.source, trial.proposal),
                     system_attrs=dict(trial.sampler_notes.get("trial", {})),
@@ -200,11 +204,12 @@ class BlackBox:
         seed = derived_seed(self._seed, SAMPLING, number)
         sampler = self._factory(seed)
         self._study.sampler = _random(seed) if source == RANDOM else sampler
-        trial = self._study.ask(self._distributions)
+        trial = self._study.ask()
+        design = self._suggested(trial)
         self._enlist(sampler, trial)
         for name, value in _attributes(source, None).items():
             trial.set_user_attr(name, value)
-        return trial, Design(trial.params)
+        return trial, design
 
     def inject(self, design: Design, number: int, source: str, proposal: str | None) -> tuple[Trial, Design]:
         """A trial for a design from elsewhere, which the sampler will learn from, and the design as the space has it.
@@ -215,8 +220,9 @@ class BlackBox:
         # unknown category RUNNING for ever.
         checked = self._space.design(design.params)
         sampler = self._study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
-        self._study.enqueue_trial(dict(checked.params), user_attrs=_attributes(source, proposal))
-        trial = self._study.ask(self._distributions)
+        self._study.enqueue_trial(self._space.searched(checked), user_attrs=_attributes(source, proposal))
+        trial = self._study.ask()
+        self._suggested(trial)
         self._enlist(sampler, trial)
         return trial, checked
 
@@ -237,6 +243,20 @@ class BlackBox:
             "study": {name: note for name, note in self._study_notes.items() if before.get(name) != note},
         }
         return {place: noted for place, noted in notes.items() if noted}
+
+    def _suggested(self, trial: Trial) -> Design:
+        """The design that a trial suggests: parameter by parameter, as some decide which of the others matter."""
+        params: dict[str, ParameterValue] = {}
+        for parameter in self._space.parameters:
+            if not self._space.is_searched(parameter.name, self._space.completed(params).params):
+                continue
+            if isinstance(parameter, FloatParameter):
+                params[parameter.name] = trial.suggest_float(
+                    parameter.name, parameter.low, parameter.high, step=parameter.step or None
+                )
+            else:
+                params[parameter.name] = trial.suggest_categorical(parameter.name, parameter.choices)
+        return self._space.completed(params)
 
     def _enlist(self, sampler: BaseSampler, trial: Trial) -> None:
         """Gives the trial a generation, where the sampler has such.

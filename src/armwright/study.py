@@ -16,6 +16,7 @@ from typing import Any, Literal
 from armwright.control import Channel
 from armwright.exceptions import ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, FinishedTrial, FrontMember, History
+from armwright.parameters import Design
 from armwright.pareto import Array, FrontTracker
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
@@ -24,7 +25,6 @@ from armwright.refining import Refinement, refine_one
 from armwright.results import discard_results, read_summary, results_are_there, summarize, write_results
 from armwright.run_folder import Method, RunConfig, RunFolder, record_objectives, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_name
-from armwright.space import Design
 from armwright.turns import Asker, Nobody, Recorded, Schedule, Turn, Turns, asking_turns, past_turns
 from armwright.verification import verify_front
 

@@ -5,22 +5,30 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.space import DesignSpace, FloatParameter
+from armwright.parameters import FloatParameter
+from armwright.space import DesignSpace
 
 TOLERANCE = 1e-3  # [m]
 SHORTEST = 1e-6  # [m] of a link
 
 
 def moved(space: DesignSpace, rows: NDArray[np.float64], tolerance: float = TOLERANCE) -> Iterator[NDArray[np.float64]]:
-    """2 (3 + D) times (N, P): designs as rows with one length or coordinate of the base off by ±tolerance [m].
+    """Designs as rows (N, P) with one length or coordinate of the base off by ±tolerance [m], one after the other.
+
+    In the paper's space 2 (3 + D) times.
 
     A copy may lie a tolerance outside the design space: what is built knows no ranges.
     """
-    for column, parameter in enumerate(space.parameters):
-        if isinstance(parameter, FloatParameter):
-            for offset in (-tolerance, tolerance):
-                copies = rows.copy()
-                copies[:, column] += offset
-                if parameter.name.startswith("link_"):
-                    copies[:, column] = np.maximum(copies[:, column], SHORTEST)
-                yield copies
+    rows = space.settled(rows)
+    for column in measured_columns(space):
+        for offset in (-tolerance, tolerance):
+            copies = rows.copy()
+            copies[:, column] += offset
+            if not space.parameters[column].name.startswith("origin_"):
+                copies[:, column] = np.maximum(copies[:, column], SHORTEST)
+            yield copies
+
+
+def measured_columns(space: DesignSpace) -> list[int]:
+    """The places of the parameters that are lengths."""
+    return [i for i, p in enumerate(space.parameters) if isinstance(p, FloatParameter) and p.unit == "m"]

@@ -17,12 +17,12 @@ from armwright.evaluation import Array, evaluate_arrays
 from armwright.feasibility import counted
 from armwright.history import History
 from armwright.kinematics.arrays import arrays_of
+from armwright.parameters import Design
 from armwright.problem import Problem
-from armwright.space import Design
 from armwright.tolerance import moved
 
 STARTS = 20
-START_SPREAD = 0.05  # [rad] to either side of the straight start
+START_SPREAD = 0.05  # [rad], of sliding joints [m], to either side of the straight start
 ALLOWED_SHARE = 0.05  # of a value, by which the worst case may be worse; of a bound, by which it may break it
 ALLOWED_OF_REFERENCE = 0.005  # of the reference point's value; allowed at least
 
@@ -69,9 +69,8 @@ def verify(
     exact, exactly_broken = problem.split(_judged(problem, rows))
     copies = np.max([_judged(problem, copies) for copies in moved(problem.space, rows)], axis=0)
     off, broken_off = problem.split(copies)
-    starts = np.random.default_rng(0).uniform(
-        -START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), problem.space.joints)
-    )
+    dof = arrays_of(problem.space, rows).dof
+    starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), dof))
     started, broken_started = problem.split(np.max([_judged(problem, rows, start) for start in starts], axis=0))
     worst = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
     built = np.maximum(exactly_broken, broken_off)

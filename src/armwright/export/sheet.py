@@ -18,7 +18,7 @@ class SheetRow:
 
     length: of the link, joint to joint [m]. mass: of the link [kg]. lower, upper: limits [rad] or [m].
     used: the least and the largest value at the targets [rad] or [m]. torque: the largest absolute one that holds
-    it at any target [N m], or [N] where it slides; target: at which one, counted from 1.
+    it at any target [N m], or force [N] where it slides; target: at which one, counted from 1.
     actuator: its name; use: the share of its torque that is needed; price: [USD].
     """
 
@@ -56,7 +56,7 @@ def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
                 torque=torque,
                 target=worst + 1,
                 actuator="" if motor is None else motor.name,
-                use=None if motor is None else torque / motor.effort,
+                use=None if joint.effort is None else torque / joint.effort,
                 price=None if motor is None else motor.price,
             )
         )

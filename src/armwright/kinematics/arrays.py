@@ -1,70 +1,75 @@
 """Arms stacked into arrays, as the kernels take them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import AXES, Actuator, Arm, Link, Vector
+from armwright.arm import AXES, Arm, Joint
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
-from armwright.space import JOINT_AXES, CategoricalParameter, DesignSpace
+from armwright.modules import DIRECTIONS, MODULES, MOUNTS
+from armwright.parameters import CategoricalParameter
+from armwright.space import DesignSpace
 
-MOST_JOINTS = 8
-_AXIS_NUMBERS = {kind: AXES.index(axis) for kind, axis in JOINT_AXES.items()}
+MOST_JOINTS = 16
 LARGEST_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
+SLIDES, FIXED = 3, 6  # motions: 0 to 2 turn about local x, y, z, 3 to 5 slide along them, 6 does not move
 
 Precision = Literal["float32", "float64"]
+Motions = Literal["turning", "any"]  # what all joints of some arms do
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
+Array = NDArray[np.float64]
 
 FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
-ARRAYS = (*FLOATS, "axis")  # of `ArmArrays`, with a row for each arm
+ARRAYS = (*FLOATS, "motion")  # of `ArmArrays`, that the kernels read
 
 
 @dataclass(frozen=True)
 class Actuation:
-    """What turns the joints of N arms of D moving joints.
+    """What moves the joints of N arms of up to D joints.
 
-    effort: (N, D) the torque that may be asked of each [N m].
+    effort: (N, D) the torque that may be asked of each actuator [N m]; infinite where there is no joint to move.
     price: (N,) of all together [USD]; NaN where one has none.
-    base_mass: (N,) of the first, which stands with the base and loads no joint [kg].
     """
 
-    effort: NDArray[np.float64]
-    price: NDArray[np.float64]
-    base_mass: NDArray[np.float64]
+    effort: Array
+    price: Array
 
     def __getitem__(self, rows: slice) -> "Actuation":
-        return Actuation(self.effort[rows], self.price[rows], self.base_mass[rows])
+        return Actuation(self.effort[rows], self.price[rows])
 
 
 @dataclass(frozen=True)
 class ArmArrays:
-    """N arms of D moving joints each. A fixed joint moves nothing: its link is part of the one before it.
+    """N arms of up to D joints. A shorter arm ends with fixed joints that have neither length nor mass.
 
-    All floats are of one precision. joint_numbers: (D,) places of the moving joints in the arm's own list of joints.
+    All floats that the kernels read are of one precision; the others are float64.
     """
 
     base: Floats  # (N, 3) [m]
-    axis: Ints  # (N, D) 0, 1, 2 for local x, y, z
-    lower: Floats  # (N, D) [rad]
-    upper: Floats  # (N, D) [rad]
-    offset: Floats  # (N, D, 3) from a joint to the next [m]
+    motion: Ints  # (N, D) 0 to 2: turns about local x, y, z; 3 to 5: slides along them; 6: fixed
+    lower: Floats  # (N, D) [rad] or [m]; of a fixed joint ±1, so that nothing divides by 0
+    upper: Floats  # (N, D) [rad] or [m]
+    offset: Floats  # (N, D, 3) from a joint to the next, or to the tip of the tool [m]
     com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next [m]
     mass: Floats  # (N, D) [kg]
-    joint_numbers: tuple[int, ...]
-    n_joints: int
+    n_joints: Ints  # (N,) how many of the D an arm has
+    travel: Array  # (N, D) of a joint for each radian of its actuator: 1 where it turns [m/rad]
+    length: Array  # (N,) of all links [m]
+    base_mass: Array  # (N,) of what stands with the base [kg]
     actuation: Actuation | None = None  # where all moving joints have actuators
 
     def __len__(self) -> int:
         return len(self.base)
 
     def __getitem__(self, rows: slice) -> "ArmArrays":
-        actuation = None if self.actuation is None else self.actuation[rows]
-        return replace(self, **{name: getattr(self, name)[rows] for name in ARRAYS}, actuation=actuation)
+        parts: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        cut: dict[str, Any] = {name: None if part is None else part[rows] for name, part in parts.items()}
+        return ArmArrays(**cut)
 
     @property
     def precision(self) -> Precision:
@@ -72,8 +77,17 @@ class ArmArrays:
 
     @property
     def dof(self) -> int:
-        """The number D of moving joints."""
-        return self.axis.shape[1]
+        """The number D of joints that there is room for."""
+        return self.motion.shape[1]
+
+    @property
+    def motions(self) -> Motions:
+        return "turning" if np.all(self.motion < SLIDES) else "any"
+
+    @property
+    def starts_at_zero(self) -> bool:
+        """Whether no joint's limits exclude 0."""
+        return bool(np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0))
 
 
 def checked_precision(name: str) -> Precision:
@@ -85,104 +99,252 @@ def checked_precision(name: str) -> Precision:
 
 
 def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArrays:
-    """The arms as arrays. They must share which of their joints are fixed."""
+    """The arms as arrays."""
     if not arms:
         raise ArmError("no arms were given")
-    kinds = tuple(joint.kind for joint in arms[0].joints)
-    if "prismatic" in kinds:
-        raise ArmError(f"joint {kinds.index('prismatic') + 1} is prismatic; the kernels take revolute and fixed joints")
-    moving = tuple(number for number, kind in enumerate(kinds) if kind == "revolute")
-    if not 1 <= len(moving) <= MOST_JOINTS:
-        raise ArmError(f"the kernels take 1 to {MOST_JOINTS} moving joints, not {len(moving)}")
     for arm in arms:
-        _check_alike(arm, kinds)
-    rigid = [_rigid_groups(arm, moving) for arm in arms]
-    joints = [[arm.joints[number] for number in moving] for arm in arms]
+        _check(arm)
+    n, dof = len(arms), max(len(arm.joints) for arm in arms)
+    motion = np.full((n, dof), FIXED, dtype=np.int32)
+    lower, upper, travel = np.full((3, n, dof), 1.0)
+    lower *= -1.0
+    mass = np.zeros((n, dof))
+    offset, com = np.zeros((2, n, dof, 3))
+    for i, arm in enumerate(arms):
+        own = slice(len(arm.joints))
+        motion[i, own] = [_motion(joint) for joint in arm.joints]
+        lower[i, own] = [-1.0 if joint.kind == "fixed" else joint.lower for joint in arm.joints]
+        upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
+        travel[i, own] = [joint.travel for joint in arm.joints]
+        offset[i, own] = [link.offset for link in arm.links]
+        offset[i, len(arm.joints) - 1] += arm.tool
+        com[i, own] = [link.total_com for link in arm.links]
+        mass[i, own] = [link.total_mass for link in arm.links]
     return ArmArrays(
-        base=np.array([base for base, _ in rigid], dtype=precision),
-        axis=np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.int32),
-        lower=-_never_above([[-j.lower for j in row] for row in joints], precision),
-        upper=_never_above([[j.upper for j in row] for row in joints], precision),
-        offset=np.array([[link.offset for link in links] for _, links in rigid], dtype=precision),
-        com=np.array([[link.total_com for link in links] for _, links in rigid], dtype=precision),
-        mass=np.array([[link.total_mass for link in links] for _, links in rigid], dtype=precision),
-        joint_numbers=moving,
-        n_joints=len(kinds),
-        actuation=_actuation([[joint.actuator for joint in row] for row in joints]),
+        base=np.array([arm.base for arm in arms], dtype=precision),
+        motion=motion,
+        lower=-_never_above(-lower, precision),
+        upper=_never_above(upper, precision),
+        offset=offset.astype(precision),
+        com=com.astype(precision),
+        mass=mass.astype(precision),
+        n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
+        travel=travel,
+        length=np.array([arm.length for arm in arms]),
+        base_mass=np.array([arm.base_mass for arm in arms]),
+        actuation=_actuation(arms, dof),
     )
 
 
-def _actuation(rows: Sequence[Sequence[Actuator | None]]) -> Actuation | None:
-    """None where a joint has no actuator."""
-    chosen = [[actuator for actuator in row if actuator is not None] for row in rows]
-    if any(len(few) < len(row) for few, row in zip(chosen, rows, strict=True)):
-        return None
-    prices = [[np.nan if actuator.price is None else actuator.price for actuator in row] for row in chosen]
-    return Actuation(
-        effort=np.array([[actuator.effort for actuator in row] for row in chosen]),
-        price=np.array(prices).sum(axis=1),
-        base_mass=np.array([row[0].mass for row in chosen]),
+def _motion(joint: Joint) -> int:
+    return {"revolute": 0, "prismatic": SLIDES, "fixed": FIXED}[joint.kind] + (
+        0 if joint.kind == "fixed" else AXES.index(joint.axis)
     )
 
 
-def arrays_of(space: DesignSpace, matrix: NDArray[np.float64], precision: Precision = "float32") -> ArmArrays:
+def _check(arm: Arm) -> None:
+    if len(arm.joints) > MOST_JOINTS:
+        raise ArmError(f"the kernels take up to {MOST_JOINTS} joints, not {len(arm.joints)}")
+    if all(joint.kind == "fixed" for joint in arm.joints):
+        raise ArmError("an arm needs a joint that moves")
+    for number, joint in enumerate(arm.joints, start=1):
+        if joint.kind == "revolute" and max(-joint.lower, joint.upper) > LARGEST_ANGLE:
+            raise ArmError(f"joint {number} turns beyond ±2π rad: [{joint.lower:g}, {joint.upper:g}]")
+
+
+def _actuation(arms: Sequence[Arm], dof: int) -> Actuation | None:
+    """None where a moving joint has no actuator."""
+    efforts, prices = np.full((len(arms), dof), np.inf), np.zeros(len(arms))
+    for i, arm in enumerate(arms):
+        for j, joint in enumerate(arm.joints):
+            if joint.kind == "fixed":
+                continue
+            if joint.actuator is None:
+                return None
+            efforts[i, j] = joint.actuator.effort
+            prices[i] += np.nan if joint.actuator.price is None else joint.actuator.price
+    return Actuation(efforts, prices)
+
+
+def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32") -> ArmArrays:
     """The arms that designs build, equal to the bit to `stack_arms` of their arms, without building them one by one.
 
-    matrix: (N, P) designs as rows (`DesignSpace.matrix`).
+    matrix: (N, P) designs as rows (`DesignSpace.matrix`); values beyond the space's ranges are built, too.
     """
-    n, dof = len(matrix), space.joints
-    links = matrix[:, 3 + dof : 3 + 2 * dof]
-    lower, upper = _limits(*space.joint_range, precision)
-    offset = np.zeros((n, dof, 3), dtype=precision)
-    offset[..., 2] = links
-    mass, middle = space.mass.masses(links), links / 2
-    actuation = None
+    n = len(matrix)
+    read = _Reader(space, matrix)
+    there = read.there
+    letter = read.choices("joint", tuple(MODULES).index, space.joint_types[0])  # (N, M)
+    plan = _PLAN[letter]  # (N, M, 2) local motions; the link follows the second place
+    wide = any(len(MODULES[kind].joints) > 1 for kind in space.joint_types)
+    plan = plan if wide else plan[..., 1:]
+    there = np.broadcast_to(there[..., None], plan.shape) & (plan != _NONE)  # (N, M, K)
+    plan = np.where(there, plan, FIXED)
+    axis, sign = _mounted(read, plan)
+    slides = (plan >= SLIDES) & (plan < FIXED)
+    lower, upper = _ranges(space, read, plan)
+    lower, upper = np.where(sign < 0.0, 0.0 - upper, lower), np.where(sign < 0.0, 0.0 - lower, upper)
+    links = np.where(read.there, read.reals("link"), 0.0)  # (N, M)
+    mass = np.where(read.there, space.mass.masses(links), 0.0)
+    middle = links / 2
+    moving = (plan < FIXED).sum(axis=2)  # (N, M) joints of a module that need an actuator
+    rails = np.where(slides[..., -1], space.mass.masses(read.reals("stroke", _single(space.stroke))), 0.0)
+    carried, actuation = rails, None
     if space.actuators:
-        chosen = _chosen_actuators(space, matrix)
+        chosen = read.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
         efforts, masses, prices = _catalogue(space)
-        actuation = Actuation(efforts[chosen], prices[chosen].sum(axis=1), masses[chosen[:, 0]])
-        ends = np.concatenate([masses[chosen[:, 1:]], np.zeros((n, 1))], axis=1)  # a link carries the next joint's
-        total = mass + ends
-        middle = np.where(ends > 0.0, (mass * middle + ends * links) / np.where(total > 0.0, total, 1.0), middle)
-        mass = total
-    com = np.zeros((n, dof, 3), dtype=precision)
-    com[..., 2] = middle
+        carried = rails + moving * masses[chosen]
+        price = np.where(moving > 0, moving * prices[chosen], 0.0).sum(axis=1)
+        actuation = Actuation(np.where(plan < FIXED, efforts[chosen][..., None], np.inf), price)
+    ends = np.concatenate([carried[:, 1:], np.zeros((n, 1))], axis=1)  # a link carries what the next module begins with
+    total = mass + ends
+    middle = np.where(ends > 0.0, (mass * middle + ends * links) / np.where(total > 0.0, total, 1.0), middle)
+    direction = _direction(space, read)  # (N, M, 3)
+    shape = plan.shape
+    offset, com, masses_ = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
+    offset[..., -1, :] = direction * links[..., None]
+    com[..., -1, :] = direction * middle[..., None]
+    masses_[..., -1] = total
+    travel = np.where(slides, space.travel, 1.0)
+    motion = np.where(plan < FIXED, plan // SLIDES * SLIDES + axis, FIXED)
+    flat = {
+        "motion": motion, "lower": lower, "upper": upper, "offset": offset, "com": com, "mass": masses_,
+        "travel": travel,
+    }  # fmt: skip
+    if actuation is not None:
+        flat["effort"] = actuation.effort
+    places = shape[1] * shape[2]
+    flat = {name: values.reshape(n, places, *values.shape[3:]) for name, values in flat.items()}
+    there = there.reshape(n, places)
+    n_joints = there.sum(axis=1).astype(np.int32)
+    flat = _compact(flat, there)
+    if any(space.tool):
+        flat["offset"][np.arange(n), n_joints - 1] += _tool(space, read)
     return ArmArrays(
         base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
-        axis=_chosen(space, matrix, "joint_", _AXIS_NUMBERS).astype(np.int32),
-        lower=np.full((n, dof), lower, dtype=precision),
-        upper=np.full((n, dof), upper, dtype=precision),
-        offset=offset,
-        com=com,
-        mass=np.ascontiguousarray(mass, dtype=precision),
-        joint_numbers=tuple(range(dof)),
-        n_joints=dof,
-        actuation=actuation,
+        motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
+        lower=-_never_above(-flat["lower"], precision),
+        upper=_never_above(flat["upper"], precision),
+        offset=flat["offset"].astype(precision),
+        com=flat["com"].astype(precision),
+        mass=flat["mass"].astype(precision),
+        n_joints=n_joints,
+        travel=flat["travel"],
+        length=np.cumsum(links, axis=1)[:, -1],
+        base_mass=carried[:, 0],
+        actuation=None if actuation is None else Actuation(flat["effort"], actuation.price),
     )
 
 
-def _chosen_actuators(space: DesignSpace, matrix: NDArray[np.float64]) -> NDArray[np.intp]:
-    """(N, D) places of the joints' actuators in the space's list."""
-    if len(space.actuators) == 1:
-        return np.zeros((len(matrix), space.joints), dtype=np.intp)
-    return _chosen(space, matrix, "motor_", {record.name: i for i, record in enumerate(space.actuators)})
+_NONE = -1  # no joint at this place of a module
+_PLAN = np.full((len(MODULES), 2), _NONE)  # local motions of each module's joints; a single one stands last
+for _row, _module in zip(_PLAN, MODULES.values(), strict=True):
+    for _place, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
+        _row[_place] = {"revolute": 0, "prismatic": SLIDES, "fixed": FIXED}[_kind]
+        _row[_place] += 0 if _kind == "fixed" else AXES.index(_axis)
+# (mounts, axes) which axis of the world a local one lies along, and whether it points the same way (1) or not (-1)
+_MOUNTED = np.array([[AXES.index(world[1]) for world in row] for row in MOUNTS.values()])  # pyright: ignore[reportArgumentType]
+_SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in MOUNTS.values()])
+_VECTORS = np.array(list(DIRECTIONS.values()))
 
 
-def _chosen(
-    space: DesignSpace, matrix: NDArray[np.float64], prefix: str, numbers: Mapping[str, int]
-) -> NDArray[np.intp]:
-    """(N, D) the numbers of the categories in the columns of the parameters whose names begin so."""
-    columns = [i for i, parameter in enumerate(space.parameters) if parameter.name.startswith(prefix)]
-    choices = [cast("CategoricalParameter", space.parameters[i]).choices for i in columns]
-    picked = [
-        np.array([numbers[choice] for choice in c])[matrix[:, i].astype(np.intp)]
-        for i, c in zip(columns, choices, strict=True)
-    ]
-    return np.stack(picked, axis=1)
+class _Reader:
+    """The columns of a matrix of designs, module by module.
+
+    there: (N, M) which modules a design has.  mount: (N,) the number of its mount.
+    """
+
+    def __init__(self, space: DesignSpace, matrix: Array) -> None:
+        self._space, self._matrix = space, matrix
+        self._at = {parameter.name: i for i, parameter in enumerate(space.parameters)}
+        self.n, self.modules = len(matrix), space.most_joints
+        self.there = np.ones((self.n, self.modules), dtype=bool)
+        if "n_joints" in self._at:
+            counts = self._numbers("n_joints", int)
+            self.there = np.arange(self.modules) < counts[:, None]
+        names = tuple(MOUNTS)
+        self.mount = np.full(self.n, names.index(space.mount[0]))
+        if "mount" in self._at:
+            self.mount = self._numbers("mount", names.index)
+
+    def _numbers(self, name: str, number: Any) -> Any:
+        """(N,) the number of each design's choice."""
+        choices = cast("CategoricalParameter", self._space.parameters[self._at[name]]).choices
+        return np.array([number(choice) for choice in choices])[self._matrix[:, self._at[name]].astype(np.intp)]
+
+    def choices(self, kind: str, number: Any, usual: str) -> NDArray[np.intp]:
+        """(N, M) the numbers of the choices of kind_1, kind_2, …; of `usual` where there are no such parameters."""
+        names = [f"{kind}_{j}" for j in range(1, self.modules + 1)]
+        columns = [
+            self._numbers(name, number) if name in self._at else np.full(self.n, number(usual)) for name in names
+        ]
+        return np.stack(columns, axis=1)
+
+    def reals(self, kind: str, usual: float = 0.0) -> Array:
+        """(N, M) the values of kind_1, kind_2, …; `usual` where there are no such parameters."""
+        names = [f"{kind}_{j}" for j in range(1, self.modules + 1)]
+        if all(name in self._at for name in names):
+            first = self._at[names[0]]
+            return self._matrix[:, first : first + self.modules]
+        return np.full((self.n, self.modules), usual)
+
+
+def _ranges(space: DesignSpace, read: _Reader, plan: NDArray[np.intp]) -> tuple[Array, Array]:
+    """(N, M, K) lower and upper limits in the modules' own axes."""
+    low, high = space.joint_range
+    if space.limit is not None:
+        upper = read.reals("limit", space.limit[0])[..., None]
+        lower = -upper
+    else:
+        lower, upper = np.full((1, 1, 1), low), np.full((1, 1, 1), high)
+    stroke = read.reals("stroke", _single(space.stroke))[..., None]
+    lower = np.where(plan < SLIDES, lower, np.where(plan < FIXED, 0.0, -1.0))
+    upper = np.where(plan < SLIDES, upper, np.where(plan < FIXED, stroke, 1.0))
+    return lower, upper
+
+
+def _single(value: Any) -> float:
+    return value if isinstance(value, (int, float)) else value[0]
+
+
+def _mounted(read: _Reader, plan: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+    """(N, M, K) the world's axis of each joint, and 1 where it points the same way as the module's own, else -1."""
+    own = plan % SLIDES
+    return _MOUNTED[read.mount[:, None, None], own], _SIGNS[read.mount[:, None, None], own]
+
+
+def _direction(space: DesignSpace, read: _Reader) -> Array:
+    """(N, M, 3) where the links leave to, in the world's axes."""
+    chosen = read.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
+    return _turned(_VECTORS[chosen], read.mount)
+
+
+def _tool(space: DesignSpace, read: _Reader) -> Array:
+    """(N, 3) the tool's offset, in the world's axes."""
+    return _turned(np.broadcast_to(np.array(space.tool), (read.n, 1, 3)), read.mount)[:, 0]
+
+
+def _turned(vectors: Array, mount: NDArray[np.intp]) -> Array:
+    """(N, M, 3) vectors in the base's own axes, in the world's."""
+    turned = np.zeros(vectors.shape)
+    for axis in range(3):
+        world, sign = _MOUNTED[mount, axis], _SIGNS[mount, axis]
+        np.put_along_axis(turned, np.broadcast_to(world[:, None, None], (*vectors.shape[:2], 1)),
+                          (sign[:, None] * vectors[..., axis])[..., None], axis=2)  # fmt: skip
+    return turned
+
+
+def _compact(arrays: dict[str, Any], there: NDArray[np.bool_]) -> dict[str, Any]:
+    """Arrays (N, D, ...) with the joints that are there first, in their order."""
+    if there.all():
+        return arrays
+    order = np.argsort(~there, axis=1, kind="stable")
+    rows = np.arange(len(there))[:, None]
+    return {name: values[rows, order] for name, values in arrays.items()}
 
 
 @cache
-def _catalogue(space: DesignSpace) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array]:
     """Effort [N m], mass [kg] and price [USD] of each of a space's actuators."""
     actuators = space.arm_actuators
     return (
@@ -192,50 +354,7 @@ def _catalogue(space: DesignSpace) -> tuple[NDArray[np.float64], NDArray[np.floa
     )
 
 
-@cache
-def _limits(lower: float, upper: float, precision: Precision) -> tuple[Any, Any]:
-    return -_never_above([[-lower]], precision)[0, 0], _never_above([[upper]], precision)[0, 0]
-
-
-def _never_above(limits: list[list[float]], precision: Precision) -> Any:
+def _never_above(limits: Array, precision: Precision) -> Any:
     """In this precision: float32 of 2.4 rad is 1e-7 rad more, which no kept angle may be, so it is rounded down."""
-    near = np.array(limits, dtype=precision)
-    return np.where(near > np.array(limits), np.nextafter(near, near.dtype.type(-np.inf)), near)
-
-
-def _check_alike(arm: Arm, kinds: tuple[str, ...]) -> None:
-    if tuple(joint.kind for joint in arm.joints) != kinds:
-        raise ArmError("arms that are evaluated together must have the same number and kinds of joints")
-    for number, joint in enumerate(arm.joints, start=1):
-        if joint.kind == "revolute" and max(-joint.lower, joint.upper) > LARGEST_ANGLE:
-            raise ArmError(f"joint {number} turns beyond ±2π rad: [{joint.lower:g}, {joint.upper:g}]")
-        if joint.kind == "revolute" and not joint.lower <= 0.0 <= joint.upper:
-            raise ArmError(f"joint {number}: the inverse kinematics starts at 0 rad, which its limits exclude")
-
-
-def _rigid_groups(arm: Arm, moving: tuple[int, ...]) -> tuple[Vector, Sequence[Link]]:
-    """The first moving joint's position, and one link for each moving joint with all fixed ones after it."""
-    if len(moving) == len(arm.joints):
-        return arm.base, arm.links
-    base = np.array(arm.base)
-    for link in arm.links[: moving[0]]:
-        base = base + link.offset
-    ends = (*moving[1:], len(arm.joints))
-    return _vector(base), [_join(arm.links[start:end]) for start, end in zip(moving, ends, strict=True)]
-
-
-def _join(links: Sequence[Link]) -> Link:
-    if len(links) == 1:
-        return links[0]
-    offset, moment, mass = np.zeros(3), np.zeros(3), 0.0
-    for link in links:
-        moment = moment + link.total_mass * (offset + np.array(link.total_com))
-        offset = offset + link.offset
-        mass += link.total_mass
-    com = moment / mass if mass > 0.0 else offset
-    return Link(_vector(offset), mass, _vector(com), links[0].radius)
-
-
-def _vector(values: NDArray[np.float64]) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z
+    near = limits.astype(precision)
+    return np.where(near > limits, np.nextafter(near, near.dtype.type(-np.inf)), near)

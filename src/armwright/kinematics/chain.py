@@ -22,7 +22,7 @@ def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:
         if joint.kind == "revolute":
             frame = frame @ rotation(joint.axis, value)
         place = place + frame @ np.array(link.offset)
-    return np.array([*places, place])
+    return np.array([*places, place + frame @ np.array(arm.tool)])
 
 
 def rotation(axis: Axis, angle: float) -> Array:

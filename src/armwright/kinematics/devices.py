@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any, Literal, cast, get_args
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
-from armwright.kinematics.arrays import Precision
+from armwright.kinematics.arrays import Motions, Precision
 
 Device = Literal["cpu", "cuda"]
 
@@ -43,10 +43,10 @@ def cores() -> int:
 _loading = threading.Lock()
 
 
-def load(precision: Precision, lanes: int, device: Device) -> tuple[Any, Any]:
+def load(precision: Precision, lanes: int, motions: Motions, device: Device) -> tuple[Any, Any]:
     """Warp and one variant of the kernels, compiled and loaded on a device, so that threads only launch."""
     with _loading:
-        return _warp(), _load(precision, lanes, device)
+        return _warp(), _load(precision, lanes, motions, device)
 
 
 def _has_cuda() -> bool:
@@ -65,11 +65,11 @@ def _warp() -> Any:
 
 
 @cache
-def _load(precision: Precision, lanes: int, device: Device) -> Any:
+def _load(precision: Precision, lanes: int, motions: Motions, device: Device) -> Any:
     with _said_where_it_is_kept():
         from armwright.kinematics.kernels import kernels_of
 
-        kernels = kernels_of(precision, lanes)
+        kernels = kernels_of(precision, lanes, motions)
         for kernel in (kernels.descend, kernels.hold):
             kernel.module.load(device)
     return kernels

@@ -4,7 +4,8 @@ One source, from which `kernels_of` makes variants: in single or in double preci
 thread solves one arm for as many targets as there are lanes, one in each lane of a vector, so that a CPU's vector
 instructions do the work of eight; a GPU has its own threads for that, and takes one lane. What differs between lanes
 is arithmetic, never a branch: a condition is a mask of zeros and ones. The axes of an arm are the same in all lanes,
-so they may branch.
+so they may branch: in functions that return at once. That joints may slide, too, costs an eighth of all time, so arms
+that only turn have a variant of their own.
 
 The equations are those of docs/method.md; the inverse kinematics is the solver of Chan & Dubey (1995) and
 Sugiura et al. (2007). Angles, positions and torques are of the variant's precision. The 3 x 3 system is float64 in
@@ -22,7 +23,7 @@ from typing import Any
 import warp as wp
 
 from armwright.arm import GRAVITY
-from armwright.kinematics.arrays import MOST_JOINTS, Precision
+from armwright.kinematics.arrays import FIXED, MOST_JOINTS, SLIDES, Motions, Precision
 
 # At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
 _OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
@@ -43,8 +44,8 @@ class Kernels:
 
 
 @cache
-def kernels_of(precision: Precision, lanes: int) -> Kernels:
-    """The kernels that solve `lanes` targets a thread in this precision.
+def kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kernels:
+    """The kernels that solve `lanes` targets a thread in this precision, for arms whose joints move so.
 
     One long function on purpose: what Warp compiles takes its types and constants from the function around it.
     T targets stand in G groups: target g x lanes + i in lane i of group g, and the last one fills up its group.
@@ -59,7 +60,8 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     longest_step = real(0.1)  # [m] of the error that one update tries to close
     least_manipulability = real(0.1)  # below it the update is damped
     full_damping = real(0.001)
-    limit_margin = real(math.radians(1.0))  # keeps the limit gradient finite
+    turn_margin = real(math.radians(1.0))  # keeps the limit gradient finite
+    slide_margin = real(1e-3)  # [m]
     centring_gain = real(0.01)
     largest = real(1e30)
 
@@ -67,7 +69,7 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     class Arms:
         dof: int
         base: wp.array(dtype=Vector3)  # (N,)
-        axis: wp.array2d(dtype=int)  # (N, D)
+        motion: wp.array2d(dtype=int)  # (N, D)
         lower: wp.array2d(dtype=real)  # (N, D)
         upper: wp.array2d(dtype=real)  # (N, D)
         offset: wp.array2d(dtype=Vector3)  # (N, D)
@@ -127,13 +129,73 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     sine_cosine = polynomial_sine_cosine if precision == "float32" else library_sine_cosine
 
     @wp.func
-    def turned(axis: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
-        """One world component of the frame's axes x, y, z, turned about its own `axis`; last, that axis."""
-        if axis == 0:
+    def turned_by_turning(motion: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
+        """One world component of the frame's axes x, y, z, moved by a joint; last, of the axis of that joint."""
+        if motion == 0:
             return x, wp.cw_mul(c, y) + wp.cw_mul(s, z), wp.cw_mul(c, z) - wp.cw_mul(s, y), x
-        if axis == 1:
+        if motion == 1:
             return wp.cw_mul(c, x) - wp.cw_mul(s, z), y, wp.cw_mul(c, z) + wp.cw_mul(s, x), y
         return wp.cw_mul(c, x) + wp.cw_mul(s, y), wp.cw_mul(c, y) - wp.cw_mul(s, x), z, z
+
+    @wp.func
+    def turned_by_any(motion: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
+        """The same for joints that slide or do not move, too; the axis of a fixed one means nothing."""
+        if motion < SLIDES:
+            return turned_by_turning(motion, x, y, z, s, c)
+        if motion == SLIDES:
+            return x, y, z, x
+        if motion == SLIDES + 1:
+            return x, y, z, y
+        return x, y, z, z
+
+    @wp.func
+    def slid_by_turning(motion: int, place: Lane, way: Lane, axis: Lane):
+        """One component of a joint's place: a sliding one has gone its way along its axis."""
+        return place
+
+    @wp.func
+    def slid_by_any(motion: int, place: Lane, way: Lane, axis: Lane):
+        if motion < SLIDES or motion == FIXED:
+            return place
+        return place + wp.cw_mul(way, axis)
+
+    @wp.func
+    def column_of_turning(motion: int, ax: Lane, ay: Lane, az: Lane, ry: Lane, rz: Lane):
+        """The first component of a column of J, of a joint with this axis and the tip at r; the others likewise."""
+        return wp.cw_mul(ay, rz) - wp.cw_mul(az, ry)
+
+    @wp.func
+    def column_of_any(motion: int, ax: Lane, ay: Lane, az: Lane, ry: Lane, rz: Lane):
+        if motion < SLIDES:
+            return wp.cw_mul(ay, rz) - wp.cw_mul(az, ry)
+        if motion < FIXED:
+            return ax
+        return Lane(zero)
+
+    @wp.func
+    def margin_of_turning(motion: int):
+        """From where on the limit gradient H grows no more, before the limit."""
+        return turn_margin
+
+    @wp.func
+    def margin_of_any(motion: int):
+        if motion < SLIDES:
+            return turn_margin
+        return slide_margin
+
+    @wp.func
+    def load(motion: int, ax: Lane, ay: Lane, az: Lane, lever_x: Lane, lever_y: Lane, mass: Lane):
+        """The derivative of mass times height by a joint with this axis."""
+        if motion < SLIDES:
+            return wp.cw_mul(ax, lever_y) - wp.cw_mul(ay, lever_x)
+        if motion < FIXED:
+            return wp.cw_mul(mass, az)
+        return Lane(zero)
+
+    turned, slid, column_of, margin_of = {
+        "turning": (turned_by_turning, slid_by_turning, column_of_turning, margin_of_turning),
+        "any": (turned_by_any, slid_by_any, column_of_any, margin_of_any),
+    }[motions]
 
     @wp.func
     def determinant(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide):
@@ -172,9 +234,9 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
 
     @wp.func
-    def limit_fraction(away: Lane, half: real):
-        """H as a fraction n / d, for joints `away` from the middle of a range of half width `half` [rad]."""
-        inside = wp.min(wp.max(away, Lane(limit_margin - half)), Lane(half - limit_margin))
+    def limit_fraction(away: Lane, half: real, margin: real):
+        """H as a fraction n / d, for joints `away` from the middle of a range of half width `half` [rad] or [m]."""
+        inside = wp.min(wp.max(away, Lane(margin - half)), Lane(half - margin))
         room = Lane(half * half) - wp.cw_mul(inside, inside)
         return (two * half * half) * wp.abs(inside), wp.cw_mul(room, room)
 
@@ -217,11 +279,14 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
             zx, zy, zz = Lane(zero), Lane(zero), Lane(one)
             px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
             for j in range(arms.dof):
+                motion = arms.motion[arm, j]
                 s, c = sine_cosine(q[j])
-                axis = arms.axis[arm, j]
-                xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
-                xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
-                xz, yz, zz, az = turned(axis, xz, yz, zz, s, c)
+                xx, yx, zx, ax = turned(motion, xx, yx, zx, s, c)
+                xy, yy, zy, ay = turned(motion, xy, yy, zy, s, c)
+                xz, yz, zz, az = turned(motion, xz, yz, zz, s, c)
+                px = slid(motion, px, q[j], ax)
+                py = slid(motion, py, q[j], ay)
+                pz = slid(motion, pz, q[j], az)
                 ux[j] = ax
                 uy[j] = ay
                 uz[j] = az
@@ -252,11 +317,12 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
             axx, axy, axz, ayy, ayz, azz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
             bxx, bxy, bxz, byy, byz, bzz = Wide(), Wide(), Wide(), Wide(), Wide(), Wide()
             for j in range(arms.dof):
+                motion = arms.motion[arm, j]
                 lower = arms.lower[arm, j]
                 upper = arms.upper[arm, j]
                 half = real(0.5) * (upper - lower)
                 away = q[j] - Lane(real(0.5) * (lower + upper))
-                n, d = limit_fraction(away, half)
+                n, d = limit_fraction(away, half, margin_of(motion))
                 rises = at_least(wp.cw_mul(n, limit_d[j]), wp.cw_mul(limit_n[j], d))
                 w = wp.cw_div(d, d + wp.cw_mul(rises, n))  # 1 / (1 + H) where H rises, else 1
                 limit_n[j] = n
@@ -267,9 +333,9 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
                 rx = px - ox[j]
                 ry = py - oy[j]
                 rz = pz - oz[j]
-                jx = wp.cw_mul(uy[j], rz) - wp.cw_mul(uz[j], ry)
-                jy = wp.cw_mul(uz[j], rx) - wp.cw_mul(ux[j], rz)
-                jz = wp.cw_mul(ux[j], ry) - wp.cw_mul(uy[j], rx)
+                jx = column_of(motion, ux[j], uy[j], uz[j], ry, rz)
+                jy = column_of(motion, uy[j], uz[j], ux[j], rz, rx)
+                jz = column_of(motion, uz[j], ux[j], uy[j], rx, ry)
                 dx -= wp.cw_mul(jx, y)
                 dy -= wp.cw_mul(jy, y)
                 dz -= wp.cw_mul(jz, y)
@@ -318,11 +384,14 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         zx, zy, zz = Lane(zero), Lane(zero), Lane(one)
         px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
         for j in range(arms.dof):
+            motion = arms.motion[arm, j]
             s, c = sine_cosine(q[arm, group, j])
-            axis = arms.axis[arm, j]
-            xx, yx, zx, _x = turned(axis, xx, yx, zx, s, c)
-            xy, yy, zy, _y = turned(axis, xy, yy, zy, s, c)
-            xz, yz, zz, _z = turned(axis, xz, yz, zz, s, c)
+            xx, yx, zx, ax = turned(motion, xx, yx, zx, s, c)
+            xy, yy, zy, ay = turned(motion, xy, yy, zy, s, c)
+            xz, yz, zz, az = turned(motion, xz, yz, zz, s, c)
+            px = slid(motion, px, q[arm, group, j], ax)
+            py = slid(motion, py, q[arm, group, j], ay)
+            pz = slid(motion, pz, q[arm, group, j], az)
             offset = arms.offset[arm, j]
             px += offset[0] * xx + offset[1] * yx + offset[2] * zx
             py += offset[0] * xy + offset[1] * yy + offset[2] * zy
@@ -340,9 +409,9 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
     ):
         """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
 
-        targets: (G, 4) [m], last the payload at the tip [kg].  q_last, q_kept: (N, G, D) [rad].
+        targets: (G, 4) [m], last the payload at the tip [kg].  q_last, q_kept: (N, G, D) [rad] or [m].
         reached: (N, G, 3) [m].
-        torque: (N, G, D), +dV/dq [N m].
+        torque: (N, G, D), +dV/dq [N m] or [N].
         """
         arm, group = wp.tid()
         tx, ty, tz = targets[group, 0], targets[group, 1], targets[group, 2]
@@ -354,22 +423,26 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
         reached[arm, group, 2] = chosen(farther, kz, lz)
 
         base = arms.base[arm]
-        ux, uy = Joints(), Joints()  # joint axes; only what a vertical force needs
+        ux, uy, uz = Joints(), Joints(), Joints()  # joint axes
         ox, oy = Joints(), Joints()  # joint positions
         mx, my = Joints(), Joints()  # mass times position of what joint j carries up to the next
-        xx, xy = Lane(one), Lane(zero)
-        yx, yy = Lane(zero), Lane(one)
-        zx, zy = Lane(zero), Lane(zero)
+        xx, xy, xz = Lane(one), Lane(zero), Lane(zero)
+        yx, yy, yz = Lane(zero), Lane(one), Lane(zero)
+        zx, zy, zz = Lane(zero), Lane(zero), Lane(one)
         px, py = Lane(base[0]), Lane(base[1])
         for j in range(arms.dof):
             q = chosen(farther, q_kept[arm, group, j], q_last[arm, group, j])
             q_kept[arm, group, j] = q
+            motion = arms.motion[arm, j]
             s, c = sine_cosine(q)
-            axis = arms.axis[arm, j]
-            xx, yx, zx, ax = turned(axis, xx, yx, zx, s, c)
-            xy, yy, zy, ay = turned(axis, xy, yy, zy, s, c)
+            xx, yx, zx, ax = turned(motion, xx, yx, zx, s, c)
+            xy, yy, zy, ay = turned(motion, xy, yy, zy, s, c)
+            xz, yz, zz, az = turned(motion, xz, yz, zz, s, c)
+            px = slid(motion, px, q, ax)
+            py = slid(motion, py, q, ay)
             ux[j] = ax
             uy[j] = ay
+            uz[j] = az
             ox[j] = px
             oy[j] = py
             com = arms.com[arm, j]
@@ -390,6 +463,8 @@ def kernels_of(precision: Precision, lanes: int) -> Kernels:
             beyond_y += my[j]
             lever_x = beyond_x - wp.cw_mul(mass_beyond, ox[j])
             lever_y = beyond_y - wp.cw_mul(mass_beyond, oy[j])
-            torque[arm, group, j] = gravity * (wp.cw_mul(ux[j], lever_y) - wp.cw_mul(uy[j], lever_x))
+            torque[arm, group, j] = gravity * load(
+                arms.motion[arm, j], ux[j], uy[j], uz[j], lever_x, lever_y, mass_beyond
+            )
 
     return Kernels(lanes, Lane, Arms, descend, hold)

@@ -34,9 +34,9 @@ LARGEST_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: a c
 class Postures:
     """The kept postures of N arms at T targets."""
 
-    q: Floats  # (N, T, D) joint angles [rad]
+    q: Floats  # (N, T, D) joint angles [rad], or ways [m]
     reached: Floats  # (N, T, 3) position of the tip [m]
-    torque: Floats  # (N, T, D) that holds the posture against gravity, +dV/dq [N m]
+    torque: Floats  # (N, T, D) that holds the posture against gravity, +dV/dq [N m] or [N]
 
 
 def solve_postures(
@@ -52,8 +52,8 @@ def solve_postures(
     """Inverse kinematics from a start, and the gravity torque of the posture kept.
 
     targets: (T, 3) [m]; how many is a question of memory alone.
-    start: angles [rad] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without it
-    all arms start straight, at 0.
+    start: values [rad] or [m] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without
+    it all arms start straight, at 0.
     payload: (T,) point masses that the tip carries at the targets [kg]; without it none.
     precision: of the results. "float64" takes arms of either precision, "float32" only its own.
     The same arm, target and start give the same bits on the same device, whatever is solved beside them.
@@ -63,6 +63,7 @@ def solve_postures(
     arms = _in_precision(arms, checked_precision(precision))
     device = resolve_device(device, many=True)
     n, t, dof = len(arms), len(targets), arms.dof
+    start = None if start is None and arms.starts_at_zero else np.zeros(1) if start is None else start
     starts = None if start is None else _broadcast(start, (n, t, dof))
     loaded = np.column_stack([targets, np.zeros(t) if payload is None else payload])
     solved = Postures(*(np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof)))
@@ -92,7 +93,7 @@ def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_befo
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
     moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
     lanes = LANES["cpu"]
-    wp, kernels = load(arms.precision, lanes, "cpu")
+    wp, kernels = load(arms.precision, lanes, arms.motions, "cpu")
     at, q_last, h_last = (
         wp.array(_in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
         for values in (np.zeros((1, 1, 4)), q[:, None], h_before[:, None])
@@ -129,7 +130,7 @@ def _solve(
     if device == "cpu" and len(arms) <= _most_kept(arms, len(at), lanes):
         results = _kept_arrays(arms, at, updates, lanes).solve(arms, at, begin)
     else:
-        wp, kernels = load(arms.precision, lanes, device)
+        wp, kernels = load(arms.precision, lanes, arms.motions, device)
         at_ = wp.array(at, dtype=kernels.Lane, device=device, copy=False)
         q_last = wp.zeros((len(arms), len(at), arms.dof), dtype=kernels.Lane, device=device)
         if begin is not None:
@@ -143,7 +144,7 @@ class _KeptArrays:
     """What the kernels read and write on the CPU for some arms at a time, made once and filled again for others."""
 
     def __init__(self, arms: ArmArrays, at: NDArray[Any], updates: int, lanes: int) -> None:
-        wp, kernels = load(arms.precision, lanes, "cpu")
+        wp, kernels = load(arms.precision, lanes, arms.motions, "cpu")
         most, groups, dof = _most_kept(arms, len(at), lanes), len(at), arms.dof
         rows = {name: getattr(arms, name) for name in ARRAYS}
         self._arms = {name: np.zeros((most, *some.shape[1:]), dtype=some.dtype) for name, some in rows.items()}
@@ -181,7 +182,7 @@ _kept = threading.local()
 def _kept_arrays(arms: ArmArrays, at: NDArray[Any], updates: int, lanes: int) -> _KeptArrays:
     """This thread's arrays for arms with as many joints and targets."""
     sets: dict[tuple[Any, ...], _KeptArrays] = _kept.__dict__.setdefault("sets", {})
-    key = (arms.dof, arms.precision, len(at), updates, lanes)
+    key = (arms.dof, arms.precision, arms.motions, len(at), updates, lanes)
     if key not in sets:
         if len(sets) == MOST_KEPT:
             sets.clear()

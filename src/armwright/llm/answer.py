@@ -16,8 +16,9 @@ from typing import Any, cast
 from armwright.exceptions import DesignError
 from armwright.llm.lines import designs_in_lines, plain_number, words_of_lists
 from armwright.llm.words import one_line, without_thoughts
+from armwright.modules import JOINT_WORDS
+from armwright.parameters import CategoricalParameter, Design, Parameter, exact
 from armwright.problem import Problem
-from armwright.space import JOINT_WORDS, CategoricalParameter, Design, Parameter, exact
 
 LONGEST_ANSWER = 100_000  # characters; the end counts
 MOST_OBJECTS = 1000  # braces tried in a free answer, from its end
@@ -125,6 +126,8 @@ def _property(parameter: Parameter) -> dict[str, Any]:
     if isinstance(parameter, CategoricalParameter):
         return {"type": "string", "enum": list(parameter.choices)}
     words = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}"
+    if parameter.step > 0.0:
+        words += f", in steps of {exact(parameter.step)}"
     return {"type": "number", "description": words}
 
 
@@ -157,6 +160,9 @@ def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
     expected = [_number(content.pop(name, None)) for name in names]
     kinds = {parameter.name: parameter for parameter in problem.space.parameters}
     params = {name: _value(kinds.get(name), value) for name, value in content.items()}
+    n_joints = kinds.get("n_joints")
+    if n_joints is not None and "n_joints" not in params:  # lists say it by their length
+        params["n_joints"] = str(sum(name.startswith("joint_") for name in params))
     design = problem.space.design(params)
     known = [value for value in expected if isinstance(value, float) and math.isfinite(value)]
     return Answer(design, reason, tuple(known) if len(known) == len(expected) else None)
@@ -165,9 +171,11 @@ def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
 def _value(parameter: Parameter | None, value: Any) -> Any:
     """The value as the design space wants it, where only its form differs."""
     if isinstance(parameter, CategoricalParameter):
-        word = value.strip().strip("'\"").lower() if isinstance(value, str) else None
+        counted = isinstance(value, int) and not isinstance(value, bool)
+        word = str(value).strip().strip("'\"").lower() if counted or isinstance(value, str) else None
+        spoken = {kind: words.partition(",")[0] for kind, words in JOINT_WORDS.items()}
         for choice in parameter.choices:
-            if word in (choice.lower(), JOINT_WORDS[choice].partition(",")[0]):  # pyright: ignore[reportArgumentType]
+            if word in (choice.lower(), spoken.get(choice)):  # pyright: ignore[reportArgumentType, reportCallIssue]
                 return choice
         return _short(value)
     return _number(value, "" if parameter is None else parameter.unit)

@@ -231,8 +231,8 @@ class Chat(Speaker):
             self._pending.discard(future)
 
 
-def cost_words(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> str:
-    """About what so many tokens will cost, by the prices that the calls will be counted by."""
+def estimated_cost(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> float | None:
+    """About what so many tokens will cost [USD], by the prices that calls are counted by; None where none is known."""
     place = _place(model, base_url)
     vendor, _, name = model.partition(":")
     usage = Usage(input_tokens=input_tokens, output_tokens=output_tokens)
@@ -242,10 +242,19 @@ def cost_words(model: str, base_url: str | None, input_tokens: int, output_token
         else:
             price = calc_price(usage, model_ref=place.name, provider_api_url=place.address)
     except LookupError:
-        if place is None:
-            return "price not known"
-        return "on a server of your own" if place.is_near else f"at {place.address}; its price is not known"
-    return f"about {price.total_price:.2f} USD by public prices"
+        return None
+    return float(price.total_price)
+
+
+def cost_words(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> str:
+    """The same in words."""
+    cost = estimated_cost(model, base_url, input_tokens, output_tokens)
+    if cost is not None:
+        return f"about {cost:.2f} USD by public prices"
+    place = _place(model, base_url)
+    if place is None:
+        return "price not known"
+    return "on a server of your own" if place.is_near else f"at {place.address}; its price is not known"
 
 
 @dataclass(frozen=True)

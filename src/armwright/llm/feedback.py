@@ -12,11 +12,14 @@ from armwright.arm import GRAVITY
 from armwright.evaluation import Evaluation
 from armwright.history import History
 from armwright.llm.answer import LONGEST_REASON
+from armwright.llm.lines import LISTS, NOTHING
 from armwright.llm.words import one_line
+from armwright.parameters import Design
+from armwright.space import DesignSpace
 
 N_PARETO = 5  # members of the front shown
 N_RANDOM = 5  # other finished designs shown
-AT_LIMIT = 1e-3  # [rad] from a limit, from which a joint counts as standing at it
+AT_LIMIT = 1e-3  # [rad] or [m] from a limit, from which a joint counts as standing at it
 LARGE = 1e6  # from which on numbers are written with an exponent
 NOISE = 1e-9  # below it a number counts as 0
 
@@ -36,8 +39,8 @@ class Digits:
     def of(cls, history: History) -> "Digits":
         """By the space's longest arm, and by the largest objectives so far."""
         space = history.problem.space
-        reach = space.joints * space.link[1]
-        weight = space.joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
+        reach = space.longest_reach
+        weight = space.most_joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
         heaviest = GRAVITY * reach * weight  # [N m], more than any torque
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres
@@ -81,13 +84,14 @@ class Feedback:
     def _record(self, number: int, shown: list[int]) -> Record:
         row = [*self.front, *self.others].index(number)
         evaluation, at = self._evaluation, self.digits
+        joints = _joint_labels(self._history, number)
         return {
             **_parameters(self._history, number, at.length),
             "e_each": points(self._each[row, shown], at.shares) if at.shares else "",
             "p_ik": points(evaluation.reached[row, shown], at.length),
-            "tau_ik": points(evaluation.joint_torques[row, shown], at.torque),
-            "limits": _limits(self._history, evaluation, row),
-            "load": _load(evaluation.joint_torques[row]),
+            "tau_ik": points(evaluation.motor_torques[row, shown, : len(joints)], at.torque),
+            "limits": _limits(evaluation, row, joints),
+            "load": _load(evaluation.motor_torques[row], joints),
             "e_all": vector(self._history.trials[number].values, at.objectives),
             "broken": _broken(self._history, number),
         }
@@ -140,7 +144,7 @@ def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
         "origin": vector(design.origin, decimals),
         "joints": "(" + ", ".join(design.joints) + ")",
         "links": vector(design.links, decimals),
-        "motors": "(" + ", ".join(design.motors) + ")" if design.motors else "",
+        "extras": _extras(history.problem.space, design, decimals),
     }
 
 
@@ -155,25 +159,47 @@ def _broken(history: History, number: int) -> str:
     return ("; ".join(words) or "none") if constraints else ""
 
 
-def _limits(history: History, evaluation: Evaluation, row: int) -> str:
+def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str, str]]:
+    """What a design has beside base, joints and links, as the lines of an answer: name and value."""
+    names = {parameter.name for parameter in space.parameters}
+    found = [("MOUNT", design.mount)] if design.mount is not None else []
+    for group, kind in LISTS.items():
+        if group in ("joints", "links") or f"{kind}_1" not in names:
+            continue
+        values = [design.params.get(f"{kind}_{j}", NOTHING) for j in range(1, len(design.joints) + 1)]
+        shown = [value if isinstance(value, str) else f"{value:.{decimals}f}" for value in values]
+        found.append((group.upper(), f"({', '.join(shown)})"))
+    return found
+
+
+def _joint_labels(history: History, number: int) -> list[str]:
+    """What each joint of a design's arm is called: as its module, of several there each with a letter."""
+    places = history.problem.space.joint_modules(history.trials[number].design)
+    return [
+        f"joint_{place + 1}" + ("" if places.count(place) == 1 else "abc"[places[:j].count(place)])
+        for j, place in enumerate(places)
+    ]
+
+
+def _limits(evaluation: Evaluation, row: int, joints: Sequence[str]) -> str:
     """Which joints stand at which limit, and at how many of the targets."""
-    lower, upper = history.problem.space.joint_range
-    q = evaluation.q[row]  # (T, D) [rad]
+    lower, upper = evaluation.arms.lower[row], evaluation.arms.upper[row]
+    q = evaluation.q[row]  # (T, D) [rad] or [m]
     found: list[str] = []
-    for j in range(q.shape[1]):
-        for word, stands in (("upper", q[:, j] > upper - AT_LIMIT), ("lower", q[:, j] < lower + AT_LIMIT)):
+    for j, name in enumerate(joints):
+        for word, stands in (("upper", q[:, j] > upper[j] - AT_LIMIT), ("lower", q[:, j] < lower[j] + AT_LIMIT)):
             if stands.any():
-                found.append(f"joint_{j + 1} {word} at {int(stands.sum())} of {len(q)}")
+                found.append(f"{name} {word} at {int(stands.sum())} of {len(q)}")
     return ", ".join(found) or "none"
 
 
-def _load(torques: NDArray[np.float64]) -> str:
+def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:
     """Each joint's share of the torques' absolute sum over the targets; torques: (T, D) [N m]."""
     carried = np.abs(torques).sum(axis=0)
     if not carried.any():
         return "no torque at any joint"
     shares = 100.0 * carried / carried.sum()
-    return ", ".join(f"joint_{j + 1} {share:.0f} %" for j, share in enumerate(shares))
+    return ", ".join(f"{name} {share:.0f} %" for name, share in zip(joints, shares, strict=False))
 
 
 def _draw(numbers: Sequence[int], n: int, rng: np.random.Generator) -> list[int]:

@@ -1,32 +1,40 @@
-"""Designs written as lines: ORIGIN, JOINTS, LINKS and MOTORS, as a prompt asks for them in free text.
+"""Designs written as lines: ORIGIN, JOINTS, LINKS and more, as a prompt asks for them in free text.
 
 A line is read only where every word of it is understood; where numbers are mixed with other words, it is no value.
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from armwright.space import JOINT_WORDS
+from armwright.modules import JOINT_WORDS
 
 AXES = ("x", "y", "z")
-GROUPS = ("origin", "joints", "links", "motors")
+LISTS = {  # a value for each module, and what its parameters are called
+    "joints": "joint", "links": "link", "motors": "motor", "directions": "direction", "strokes": "stroke",
+    "ranges": "limit",
+}  # fmt: skip
+GROUPS = ("origin", "mount", *LISTS)
+NOTHING = "-"  # stands in a list where a module has no such value
 LONGEST_LINE = 2000  # characters; a longer one holds no values
 
 _MINUS = str.maketrans({"−": "-", "﹣": "-", "-": "-", "＋": "+"})
 _NUMBER = r"(?<![\w.])[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|(?:nan|inf(?:inity)?)(?![A-Za-z]))"
 _PLAIN = re.compile(_NUMBER, re.IGNORECASE)
 _ITEM = re.compile(rf"({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
-_NAMED = re.compile(rf"((?:origin|link)_\w+)\s*[:=]\s*({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
-_NAMES_ALONE = re.compile(r"\((?:(?:origin|link|joint)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE)
+_NAMED = re.compile(rf"((?:origin|link|stroke|limit)_\w+)\s*[:=]\s*({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
+_NAMES_ALONE = re.compile(
+    r"\((?:(?:origin|link|joint|stroke|limit|direction|motor)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE
+)
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
 _LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # what may stand between values
 
+_WORDS = "|".join([*(group.upper() for group in GROUPS), "EXPECTED", "REASON"])
 # At the beginning of a line in any form of list or emphasis; in capitals, also further on in it.
 _NAME = re.compile(
-    r"(?:^[ \t>*_#`|•–-]{0,20}(?:\d+[.)] ?)?[*_`]{0,3}(?P<first>(?i:ORIGIN|JOINTS|LINKS|MOTORS|EXPECTED|REASON))"
-    r"|(?<=[\s;,])[*_`]{0,3}(?P<later>ORIGIN|JOINTS|LINKS|MOTORS|EXPECTED|REASON))[ \t*_`]*[:=]",
+    rf"(?:^[ \t>*_#`|•–-]{{0,20}}(?:\d+[.)] ?)?[*_`]{{0,3}}(?P<first>(?i:{_WORDS}))"
+    rf"|(?<=[\s;,])[*_`]{{0,3}}(?P<later>{_WORDS}))[ \t*_`]*[:=]",
     re.MULTILINE,
 )
 
@@ -61,7 +69,9 @@ def words_of_lists(content: Mapping[str, Any]) -> dict[str, Any]:
             values.update(_values(name, value) or {name: value})
         elif name in GROUPS and isinstance(value, (list, tuple)):
             items: list[Any] = list(value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-            values.update({_parameter(name, place): item for place, item in enumerate(items)})
+            values.update(
+                {_parameter(name, place): item for place, item in enumerate(items) if item not in (None, NOTHING)}
+            )
         else:
             values[name] = value
     return values
@@ -89,9 +99,17 @@ def _values(name: str, words: str) -> dict[str, Any] | None:
     words = _LATEX.sub(" ", words.translate(_MINUS))
     if name == "joints":
         return _joints(words)
+    if name == "mount":
+        found = re.findall(r"[A-Za-z]+(?:[-+][xy])?", words)
+        return {"mount": found[0].lower()} if len(found) == 1 else None
     if name == "motors":
-        names = re.findall(r"[A-Za-z0-9][A-Za-z0-9._-]*", re.sub(r"motor_\d+\s*[:=]", "", words))
-        return {_parameter(name, place): motor.rstrip(".") for place, motor in enumerate(names)} or None
+        names = re.findall(
+            r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*", _spaced(re.sub(r"motor_\d+\s*[:=]", "", words))
+        )
+        return _listed(name, [motor.rstrip(".") for motor in names])
+    if name == "directions":
+        signed = re.findall(r"[-+] ?[xyzXYZ]", re.sub(r"direction_\d+\s*[:=]", "", words))
+        return _listed(name, [direction.replace(" ", "").lower() for direction in signed])
     if name == "origin":
         words = re.sub(r"(?<!\w)([xyz])\s*[:=]", r"origin_\1 =", words)
     elif name == "links":
@@ -101,6 +119,8 @@ def _values(name: str, words: str) -> dict[str, Any] | None:
         rest = _LEFT_OVER.fullmatch(_NAMED.sub("", words))
         return {key.lower(): _with_unit(number, unit) for key, number, unit in named} if rest else None
     words = _in_brackets(_NAMES_ALONE.sub("", words), r"\d|nan|inf")
+    if name in ("strokes", "ranges"):
+        words = re.sub(r"(?<!\S)-(?!\S)", "nan", _spaced(words))
     if name == "expected":
         words = re.sub(r"[A-Za-z]\w*\s*[:=]", "", words)
     found = _ITEM.findall(words)
@@ -108,7 +128,20 @@ def _values(name: str, words: str) -> dict[str, Any] | None:
         return None
     if name == "expected":
         return {"expected": [float(number) for number, _ in found]}
+    if name in ("strokes", "ranges"):
+        return _listed(name, [NOTHING if number == "nan" else _with_unit(number, unit) for number, unit in found])
     return {_parameter(name, place): _with_unit(*item) for place, item in enumerate(found)}
+
+
+def _spaced(words: str) -> str:
+    """With blanks around what separates the values of a list."""
+    return re.sub(r"[,;|()\[\]{}]", " ", words)
+
+
+def _listed(group: str, values: Sequence[Any]) -> dict[str, Any] | None:
+    """The values by parameter, those left out that a module does not have."""
+    listed = {_parameter(group, place): value for place, value in enumerate(values) if value != NOTHING}
+    return listed or None
 
 
 def _joints(words: str) -> dict[str, Any] | None:
@@ -136,10 +169,10 @@ def _in_brackets(words: str, value: str) -> str:
 
 
 def _with_unit(number: str, unit: str) -> float | str:
-    return float(number) if unit in ("", "m") else f"{number} {unit}"
+    return float(number) if unit in ("", "m", "rad") else f"{number} {unit}"
 
 
 def _parameter(group: str, place: int) -> str:
     if group == "origin":
         return f"origin_{AXES[place]}" if place < len(AXES) else f"origin_{place + 1}"
-    return f"{group[:-1]}_{place + 1}"
+    return f"{LISTS.get(group, group)}_{place + 1}"

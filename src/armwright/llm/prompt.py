@@ -18,11 +18,13 @@ from armwright.exceptions import SettingsError, did_you_mean
 from armwright.history import History
 from armwright.kinematics.solve import UPDATES
 from armwright.llm.feedback import Feedback, Record, points, proposal_records, vector
+from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
+from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
 from armwright.problem import Problem
-from armwright.space import JOINT_WORDS
 from armwright.task import Task
+from armwright.tolerance import measured_columns
 
 PROMPTS = ("plus", "minus")
 Memory = Literal["none", "own"]
@@ -38,8 +40,16 @@ LARGEST_TEMPLATE = 256 * 1024  # [bytes]
 
 # What a template may use; the answer to `armwright prompt --variables`.
 VARIABLES = {
-    "space": "the design space: joints, joint_types, joint_range, origin_x, origin_y, origin_z, link, mass_note",
+    "space": "the design space: fewest_joints, most_joints, joint_types, joint_range, origin_x, origin_y, origin_z, "
+    "link, mass_note, and all else that a space file can hold",
+    "n_joints": "how many joints an arm has, as text; D where that is searched",
+    "turning": "the joint types that turn",
+    "sliding": "the joint types that slide",
+    "straight": "whether all links stand in one vertical line at first",
+    "asked": "what a design has beside base, joints and links: name in capitals, and name of a parameter",
+    "n_copies": "how many copies of a design a tolerance makes",
     "joint_words": "what each joint type is, by its letter",
+    "mount_words": "how an arm stands, by the mount",
     "gravity": "[m/s²], along -z",
     "task": "the task: name, and more",
     "description": "what the task says of itself, on one line",
@@ -58,11 +68,11 @@ VARIABLES = {
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
     "n_front": "how many of them are Pareto-optimal",
-    "front": "members of the front, by rising first objective: number, origin, joints, links, e_each, p_ik, tau_ik, "
-    "limits, load, e_all, broken (which constraints, or none; empty where there are none); as long as no design is "
-    "feasible (n_feasible), those nearest to it",
+    "front": "members of the front, by rising first objective: number, origin, joints, links, extras, e_each, p_ik, "
+    "tau_ik, limits, load, e_all, broken (which constraints, or none; empty where there are none); as long as no "
+    "design is feasible (n_feasible), those nearest to it",
     "others": "some other designs, with the same",
-    "proposed": "--memory own: earlier proposals: number, origin, joints, links, expected, e_all, broken, on_front, "
+    "proposed": "--memory own: earlier proposals: number, origin, joints, links, extras, expected, e_all, broken, "
     "reason",
     "n_proposed": "how many proposals there were",
     "proposals": "how many designs to propose",
@@ -234,10 +244,25 @@ def estimated_tokens(text: str) -> int:
 
 
 def _common(history: History, memory: str, proposals: int, form: Form) -> dict[str, Any]:
-    problem = history.problem
+    problem, space = history.problem, history.problem.space
+    names = {parameter.name for parameter in space.parameters}
+    turning = [kind for kind in space.joint_types if MODULES[kind].turns]
+    asked = [("MOUNT", "mount")] if "mount" in names else []
+    asked += [
+        (group.upper(), kind)
+        for group, kind in LISTS.items()
+        if group not in ("joints", "links") and f"{kind}_1" in names
+    ]
     return {
-        "space": problem.space,
+        "space": space,
+        "n_joints": str(space.most_joints) if space.fewest_joints == space.most_joints else "D",
+        "turning": turning,
+        "sliding": [kind for kind in space.joint_types if MODULES[kind].slides],
+        "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
+        "asked": asked,
+        "n_copies": len(measured_columns(space)) * 2,
         "joint_words": JOINT_WORDS,
+        "mount_words": MOUNT_WORDS,
         "gravity": GRAVITY,
         "task": problem.task,
         "description": one_line(problem.task.description, LONGEST_DESCRIPTION),

@@ -16,7 +16,7 @@ from jinja2.runtime import BlockReference, Context, LoopContext, Macro
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 from jinja2.utils import Cycler, Joiner, Namespace
 
-from armwright.space import exact
+from armwright.parameters import exact
 
 LARGEST_PROMPT = 1_000_000  # characters
 MOST_STEPS = 100_000  # rounds of loops and calls of macros in one prompt

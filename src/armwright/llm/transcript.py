@@ -24,7 +24,7 @@ class Call:
 
     proposal: the id of the proposal that it belongs to; empty for a check.
     step: check (may the model be used at all), reasoning (the free answer), parameters (that answer as values), or
-        answer (both at once).
+        answer (both at once), draft (a task and a space from words).
     known: how many finished trials the question was made from.
     origin: who answered: `model`, `manual` (people) or `scripted` (a stand-in, in tests and examples).
     requests: requests sent to the server; above 1 where an answer was refused and asked for again.

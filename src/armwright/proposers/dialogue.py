@@ -2,7 +2,7 @@
 
 import threading
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,7 +32,9 @@ class Dialogue:
 
     def summary(self) -> ProposerSummary:
         """Calls, tokens and cost of the whole run, earlier sessions included."""
-        calls = self._transcript.calls
+        return self._summary(self._transcript.calls)
+
+    def _summary(self, calls: Sequence[Call]) -> ProposerSummary:
         costs = [call.cost_usd for call in calls if call.requests]
         return ProposerSummary(
             name=self.name,

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from armwright.history import History
+from armwright.parameters import Design
 from armwright.problem import Problem
-from armwright.space import Design
 
 
 @dataclass(frozen=True)

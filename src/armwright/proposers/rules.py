@@ -14,10 +14,10 @@ import numpy as np
 from armwright.evaluation import Array
 from armwright.history import FrontMember, History
 from armwright.objectives import PAPER_OBJECTIVES, TORQUE
+from armwright.parameters import Design
 from armwright.pareto import hypervolume_history
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.proposers.structures import OPENING, fitted
-from armwright.space import Design
 
 PULL = 0.1  # [m] of base motion if all targets were missed in one direction
 REACHED = 0.005  # [m]; a nearer target pulls no more
@@ -134,12 +134,12 @@ def trim(history: History, inside: list[FrontMember], rng: np.random.Generator) 
     A link counts by its length times the torque of the joints up to it.
     """
     member = inside[int(rng.integers(len(inside)))]
-    carried = np.abs(history.evaluation([member.number]).joint_torques[0]).mean(axis=0)  # (D,) [N m]
+    carried = by_module(history, member, np.abs(history.evaluation([member.number]).motor_torques[0]).mean(axis=0))
     links = np.array(member.design.links)
     j = int(np.argmax(links * np.cumsum(carried)))
     links[j] *= TRIM
     space = history.problem.space
-    design = space.clipped(towards_missed(history, member), member.design.joints, links, member.design.motors)
+    design = space.clipped(towards_missed(history, member), member.design.joints, links, member.design)
     return design, f"trims link {j + 1} of trial {member.number}, which weighs most on its joints; {described(design)}"
 
 
@@ -147,12 +147,12 @@ def swap(history: History, inside: list[FrontMember], rng: np.random.Generator) 
     """A design of the front whose least used joint gets another axis: Y where it can, as yaw costs no torque."""
     member = inside[int(rng.integers(len(inside)))]
     angles = history.evaluation([member.number]).q[0]  # (T, D) [rad]
-    j = int(np.argmin(np.ptp(angles, axis=0)))
+    j = int(np.argmin(by_module(history, member, np.ptp(angles, axis=0))))
     joints, types = member.design.joints, history.problem.space.joint_types
     others = [kind for kind in types if kind != joints[j]] or [joints[j]]
     other = "Y" if "Y" in others and rng.random() < 0.5 else others[int(rng.integers(len(others)))]
     design = history.problem.space.clipped(
-        towards_missed(history, member), joints[:j] + other + joints[j + 1 :], member.design.links, member.design.motors
+        towards_missed(history, member), joints[:j] + other + joints[j + 1 :], member.design.links, member.design
     )
     return design, f"turns joint {j + 1} of trial {member.number}, the least used, into {other}; {described(design)}"
 
@@ -181,24 +181,31 @@ def between(a: Design, b: Design, share: float, history: History) -> Design:
     origin, links = (
         share * np.array(u) + (1.0 - share) * np.array(v) for u, v in ((a.origin, b.origin), (a.links, b.links))
     )
-    return history.problem.space.clipped(origin, a.joints, links, a.motors)
+    return history.problem.space.clipped(origin, a.joints, links, a)
 
 
 def scaled(history: History, member: FrontMember, scale: float) -> Design:
     """The member with all links scaled about its shoulder, its base moved towards what it misses."""
-    height = standing(member.design, history.evaluation([member.number]).q[0])
+    angles = by_module(history, member, np.abs(history.evaluation([member.number]).q[0]).mean(axis=0))
+    height = standing(member.design, angles)
     origin = towards_missed(history, member) + np.array([0.0, 0.0, (1.0 - scale) * height])
     links = scale * np.array(member.design.links)
-    return history.problem.space.clipped(origin, member.design.joints, links, member.design.motors)
+    return history.problem.space.clipped(origin, member.design.joints, links, member.design)
+
+
+def by_module(history: History, member: FrontMember, values: Array) -> Array:
+    """(M,) the largest of the values (J,) of each module's joints."""
+    places = np.array(history.problem.space.joint_modules(member.design))
+    return np.array([values[: len(places)][places == place].max() for place in range(len(member.design.joints))])
 
 
 def standing(design: Design, angles: Array) -> float:
     """The height [m] of the links that stay upright at all targets, up to the first bent R or P joint.
 
-    angles: (T, D) [rad].
+    angles: (M,) mean absolute ones [rad].
     """
     height = 0.0
-    for kind, bend, link in zip(design.joints, np.abs(angles).mean(axis=0), design.links, strict=True):
+    for kind, bend, link in zip(design.joints, angles, design.links, strict=True):
         if kind != "Y" and bend > BENT:
             break
         height += link
@@ -222,8 +229,8 @@ def distinct(design: Design, history: History, rng: np.random.Generator) -> Desi
         if design not in tried:
             break
         origin = np.array(design.origin) + rng.normal(0.0, spread, 3)
-        links = np.array(design.links) * np.exp(rng.normal(0.0, spread, space.joints))
-        design = space.clipped(origin, design.joints, links, design.motors)
+        links = np.array(design.links) * np.exp(rng.normal(0.0, spread, len(design.links)))
+        design = space.clipped(origin, design.joints, links, design)
         spread *= 1.5
     return design
 

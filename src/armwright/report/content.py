@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import AXES, Arm
+from armwright.arm import AXES, Arm, Joint, Link
 from armwright.best_known import known_front
 from armwright.comparison import method_words
 from armwright.decision import bounded_numbers, numbers_of
@@ -22,14 +22,16 @@ from armwright.export.urdf import to_urdf
 from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
+from armwright.parameters import FloatParameter
 from armwright.pareto import front_numbers, hypervolume, hypervolume_history
 from armwright.report.repeat import repeat_command
 from armwright.report.style import FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, TARGET, look
 from armwright.results import read_summary
 from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
-from armwright.space import FloatParameter
 
 KINDS = ("revolute", "prismatic", "fixed")
+NO_JOINT = Joint("fixed", "z")  # fill up shorter arms
+NO_LINK = Link((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 1.0)
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -147,23 +149,27 @@ def _designs(history: History, numbers: range) -> Arrays:
         "params": space.matrix([trial.design for trial in trials]),
         "broken": history.broken[numbers.start : numbers.stop],
         "q": evaluation.q.astype(np.float32),
-        **_arm_arrays(arms),
+        **_arm_arrays(arms, evaluation.arms.dof),
     }
 
 
-def _arm_arrays(arms: Sequence[Arm]) -> Arrays:
-    """The arms, joint by joint, as `Arm` has them."""
-    joints, links = [arm.joints for arm in arms], [arm.links for arm in arms]
+def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
+    """The arms, joint by joint, as `Arm` has them; `joints` (n,) of the J that there is room for are an arm's own."""
+    own = [arm.joints + (NO_JOINT,) * (room - len(arm.joints)) for arm in arms]
+    links = [arm.links + (NO_LINK,) * (room - len(arm.links)) for arm in arms]
 
     def floats(rows: Any) -> NDArray[np.float32]:
         return np.array(rows, dtype=np.float32)
 
     return {
         "base": floats([arm.base for arm in arms]),
-        "kind": np.array([[KINDS.index(j.kind) for j in row] for row in joints], dtype=np.uint8),
-        "axis": np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.uint8),
-        "lower": floats([[j.lower for j in row] for row in joints]),
-        "upper": floats([[j.upper for j in row] for row in joints]),
+        "tool": floats([arm.tool for arm in arms]),
+        "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
+        "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
+        "axis": np.array([[AXES.index(j.axis) for j in row] for row in own], dtype=np.uint8),
+        "lower": floats([[j.lower for j in row] for row in own]),
+        "upper": floats([[j.upper for j in row] for row in own]),
+        "travel": floats([[j.travel for j in row] for row in own]),
         "offset": floats([[link.offset for link in row] for row in links]),
         "com": floats([[link.total_com for link in row] for row in links]),
         "mass": floats([[link.total_mass for link in row] for row in links]),
@@ -203,9 +209,12 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         ],
         "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
         "parameters": [
-            {"name": p.name, "low": p.low, "high": p.high, "unit": p.unit}
-            if isinstance(p, FloatParameter)
-            else {"name": p.name, "choices": list(p.choices)}
+            {"name": p.name, "needs": space.needs(p.name)}
+            | (
+                {"low": p.low, "high": p.high, "unit": p.unit}
+                if isinstance(p, FloatParameter)
+                else {"choices": list(p.choices)}
+            )
             for p in space.parameters
         ],
         "masses": space.mass_note,

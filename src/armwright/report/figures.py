@@ -313,7 +313,7 @@ def _stack(axes: Any, layers: Mapping[str, np.ndarray]) -> None:
 def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
-        places = joint_positions(member.arm, evaluation.q[row, target])
+        places = joint_positions(member.arm, evaluation.q[row, target, : len(member.arm.joints)])
         axes.plot(*places.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
         for joint, place in zip(member.arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
@@ -339,7 +339,11 @@ def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
 
 def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.ndarray, float]:
     """The middle and the half side of the cube that holds the targets and every posture of the members [m]."""
-    places = [joint_positions(member.arm, q) for row, member in enumerate(members) for q in evaluation.q[row]]
+    places = [
+        joint_positions(member.arm, q[: len(member.arm.joints)])
+        for row, member in enumerate(members)
+        for q in evaluation.q[row]
+    ]
     points = np.vstack([evaluation.targets, *places])
     low, high = points.min(axis=0), points.max(axis=0)
     return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))

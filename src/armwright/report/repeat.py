@@ -7,7 +7,7 @@ from typing import Any
 
 from armwright.objectives import OBJECTIVES
 from armwright.run_folder import FrontMethod, Method, RunConfig
-from armwright.space import paper_space
+from armwright.space import builtin_spaces, load_space
 from armwright.task import builtin_names, load_task
 from armwright.tolerance import TOLERANCE
 
@@ -36,9 +36,10 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
     alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in as_told)
     words = [name if alike else OWN_TASK]
     said: dict[str, Any] = {}
-    paper = paper_space(config.space.joints).model_dump(exclude={"name"})
-    if config.space.model_dump(exclude={"name"}) != paper or config.space.joints != paper_space().joints:
-        said["space"] = OWN_SPACE
+    known = {name: load_space(name).model_dump(exclude={"name"}) for name in builtin_spaces()}
+    alike = [name for name, content in known.items() if content == config.space.model_dump(exclude={"name"})]
+    if "paper" not in alike:
+        said["space"] = alike[0] if alike else OWN_SPACE
     if isinstance(config.method, FrontMethod):
         begun = config.method.begin_with or {}
         said |= {"budget": spent, "from": begun.get("run"), "proposer": begun.get("proposer", {}).get("name")}

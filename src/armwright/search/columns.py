@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.space import CategoricalParameter, FloatParameter, Parameter
+from armwright.parameters import GRID_DIGITS, CategoricalParameter, FloatParameter, Parameter
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ class Columns:
         self.choices = np.array([len(p.choices) for p in parameters if isinstance(p, CategoricalParameter)], dtype=int)
         ranges = [(p.low, p.high) for p in parameters if isinstance(p, FloatParameter)]
         self._low, self._high = np.array(ranges).reshape(-1, 2).T
+        self._step = np.array([p.step for p in parameters if isinstance(p, FloatParameter)])
         self._places = np.cumprod([1, *self.choices])[:-1]
 
     def __len__(self) -> int:
@@ -44,7 +45,15 @@ class Columns:
     def from_units(self, units: Array) -> Array:
         """(N, R) real columns from numbers that may lie outside [0, 1]: they are reflected into it, then clipped."""
         reflected = 1.0 - np.abs(1.0 - np.abs(units))
-        return np.clip(self._low + reflected * (self._high - self._low), self._low, self._high)
+        return self._on_grid(np.clip(self._low + reflected * (self._high - self._low), self._low, self._high))
+
+    def _on_grid(self, reals: Array) -> Array:
+        """(N, R) real columns, those that have a grid at its nearest value."""
+        if not self._step.any():
+            return reals
+        step = np.where(self._step > 0.0, self._step, 1.0)
+        grid = np.round(self._low + step * np.round((reals - self._low) / step), GRID_DIGITS)
+        return np.where(self._step > 0.0, grid, reals)
 
     def structures(self, rows: Array) -> NDArray[np.int64]:
         """(N,) one number for each combination of categories, such as an arm's joint sequence."""

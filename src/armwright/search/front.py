@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from armwright.parameters import Parameter
 from armwright.pareto import hypervolume
 from armwright.search.columns import Array, Columns
 from armwright.search.survival import Rows, front, leaders, nearest, survivors, thinned
 from armwright.search.variation import offspring
 from armwright.seeding import derived_seed
-from armwright.space import Parameter
 
 FRONT_LIMITS = (800, 1000)  # designs; a front longer than the second is thinned to the first
 CAPACITIES = (100, 1000)  # designs in the pool, at first and at last

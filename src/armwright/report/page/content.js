@@ -76,9 +76,18 @@ export class Content {
   broken(i) { return this._part("broken", i); } // by how much, one a constraint: <= 0 is met
   isFeasible(i) { return this.broken(i).every((value) => value <= 0); }
 
+  // Those that matter: the arm has their module, and it is of a type that they are for.
   params(i) {
-    const numbers = this._part("params", i);
-    return this.head.parameters.map((p, k) => ({ ...p, value: p.choices ? p.choices[numbers[k]] : numbers[k] }));
+    const numbers = this._part("params", i), known = {};
+    return this.head.parameters.map((p, k) => ({ ...p, value: p.choices ? p.choices[numbers[k]] : numbers[k] })).filter((p) => {
+      if (p.needs) {
+        const [module, types] = p.needs;
+        if (module > Number(known.n_joints ?? module)) return false;
+        if (p.name !== `joint_${module}` && !types.includes(known[`joint_${module}`])) return false;
+      }
+      known[p.name] = p.value;
+      return true;
+    });
   }
 
   // Joint types in order, as one word.
@@ -92,17 +101,16 @@ export class Content {
   }
 
   arm(i) {
-    const arm = {};
-    for (const name of ["base", "kind", "axis", "lower", "upper", "offset", "com", "mass", "radius"]) {
-      arm[name] = this._part(name, i);
-    }
+    const arm = { base: this._part("base", i), tool: this._part("tool", i) }, n = this._part("joints", i)[0];
+    for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
+    for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
     return arm;
   }
 
   // Joint values [rad] or [m] at a target.
   q(i, target) {
     const all = this._part("q", i), size = all.length / this.targets.length;
-    return all.subarray(target * size, (target + 1) * size);
+    return all.subarray(target * size, target * size + this._part("joints", i)[0]);
   }
 
   isSolid(i) { return this.head.result.solid === null ? null : this.head.result.solid.includes(i); }

@@ -67,7 +67,7 @@ export function drawDesign() {
   }
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
-  $("design-note").textContent = `Angles q in rad; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.`;
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.`;
 }
 
 // What the design has where it is bounded.
@@ -84,8 +84,9 @@ function drawLinks(arm) {
   const { joint } = content.head.colours;
   $("links").replaceChildren(...Array.from(arm.axis, (axis, j) => {
     const long = linkLength(arm, j);
-    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${"xyz"[axis]})` },
-      `${"RPY"[axis]} ${millimetres(long)}`);
+    const moves = [`${"RPY"[axis]}`, `slides ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
+    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves})` },
+      `${moves} ${millimetres(long)}`);
     bar.style.flex = `${1e6 * Math.max(long, 1e-6)} 1 0`;
     bar.style.background = joint["xyz"[axis]];
     return bar;

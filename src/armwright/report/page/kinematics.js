@@ -19,7 +19,8 @@ function rotated(m, k, angle) {
   return out;
 }
 
-// joints: positions of the joints and, last, of the tip [m]; axes: of the joints, in the world; centres: of mass.
+// joints: positions of the joints and, last, of the tip [m]; end: of the last link; axes: of the joints, in the world;
+// centres: of mass.
 export function chain(arm, q) {
   let frame = [1, 0, 0, 0, 1, 0, 0, 0, 1], place = Array.from(arm.base);
   const joints = [], axes = [], centres = [];
@@ -32,10 +33,10 @@ export function chain(arm, q) {
     centres.push(add(place, turned(frame, at(arm.com, j))));
     place = add(place, turned(frame, at(arm.offset, j)));
   }
-  return { joints: [...joints, place], axes, centres };
+  return { joints: [...joints, add(place, turned(frame, arm.tool))], end: place, axes, centres };
 }
 
-// Torques [N m], of sliding joints forces [N], that hold the arm and its payload [kg] up against gravity.
+// Torques of the joints' motors [N m] that hold the arm and its payload [kg] up against gravity.
 export function holding(arm, posed, payload) {
   const { joints, axes } = posed, tip = joints.at(-1);
   const loads = [...posed.centres.map((place, k) => [arm.mass[k], place]), [payload, tip]];
@@ -46,7 +47,7 @@ export function holding(arm, posed, payload) {
       const [x, y] = [place[0] - joints[i][0], place[1] - joints[i][1]];
       sum += mass * GRAVITY * (arm.kind[i] === REVOLUTE ? a[0] * y - a[1] * x : a[2]);
     }
-    return sum;
+    return sum * arm.travel[i];
   });
 }
 

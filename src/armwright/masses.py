@@ -1,0 +1,80 @@
+"""How heavy links are, by their lengths."""
+
+import math
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, model_validator
+
+
+class MassPerMetre(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """Links of one section and material: mass grows with length."""
+
+    kind: Literal["per_metre"] = "per_metre"
+    kg: float = Field(default=0.0121, ge=0.0, le=1e4)
+
+    def mass(self, length: float) -> float:
+        """Of a link of `length` [m], in [kg]."""
+        return self.kg * length
+
+    def masses(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of links of these lengths [m], in [kg]."""
+        return self.kg * lengths
+
+    def words(self) -> str:
+        return f"{self.kg:g} kg per metre of link"
+
+
+class MassPerLink(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """Modules of one mass, whatever their length."""
+
+    kind: Literal["per_link"]
+    kg: float = Field(default=0.002, ge=0.0, le=1e4)
+
+    def mass(self, length: float) -> float:
+        """Of any link, in [kg]."""
+        return self.kg
+
+    def masses(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of links of these lengths [m], in [kg]."""
+        return np.full_like(lengths, self.kg)
+
+    def words(self) -> str:
+        return f"{self.kg:g} kg for each link, whatever its length"
+
+
+class MassOfTube(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """Links cut from a round tube (or bar, where the wall is half the diameter) of a real material."""
+
+    kind: Literal["tube"]
+    density: float = Field(gt=0.0, le=3e4)  # [kg/m³]
+    outer_diameter: float = Field(gt=0.0, le=1.0)  # [m]
+    wall: float = Field(gt=0.0)  # [m]
+
+    @model_validator(mode="after")
+    def _check_wall(self) -> Self:
+        if self.wall > self.outer_diameter / 2:
+            raise ValueError(f"wall = {self.wall:g} m is more than half of outer_diameter = {self.outer_diameter:g} m")
+        return self
+
+    def mass(self, length: float) -> float:
+        """Of a link of `length` [m], in [kg]."""
+        outer = self.outer_diameter / 2
+        inner = outer - self.wall
+        return self.density * math.pi * (outer**2 - inner**2) * length
+
+    def masses(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of links of these lengths [m], in [kg]."""
+        outer = self.outer_diameter / 2
+        inner = outer - self.wall
+        return self.density * math.pi * (outer**2 - inner**2) * lengths
+
+    def words(self) -> str:
+        return (
+            f"a tube of {self.outer_diameter * 1e3:g} mm outer diameter and {self.wall * 1e3:g} mm wall, "
+            f"{self.density:g} kg/m³ ({self.mass(1.0):.3g} kg per metre)"
+        )
+
+
+MassModel = Annotated[MassPerMetre | MassPerLink | MassOfTube, Field(discriminator="kind")]
