@@ -525,7 +525,10 @@ def pick_(
 def export(
     run: Annotated[Path, typer.Argument(help="A run folder.")],
     design: Annotated[int | None, typer.Option(help="Its number; without it, the knee of the front.")] = None,
-    format_: Annotated[str, typer.Option("--format", help="urdf, mjcf, sheet (Markdown) or sheet-csv.")] = "urdf",
+    format_: Annotated[
+        str,
+        typer.Option("--format", help="urdf, xacro, srdf, ros2_control, sdf, mjcf, sheet (Markdown) or sheet-csv."),
+    ] = "urdf",
     out: Annotated[Path | None, typer.Option(help="File; without it, to stdout.")] = None,
 ) -> None:
     """Write one design of RUN for a simulator or a workshop. Any design of the run, not only those of the front."""

@@ -345,8 +345,9 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
 def _rows(history: History) -> Iterable[dict[str, Any]]:
     for trial in history:
         objectives = _objectives(history, trial.values)
+        params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
         broken = dict(zip((c.words for c in history.problem.constraints), trial.constraints, strict=True))
-        yield {"number": trial.number, "source": trial.source, **trial.design.params, **objectives, **broken}
+        yield {"number": trial.number, "source": trial.source, **params, **objectives, **broken}
 
 
 def _constraints(history: History, number: int) -> dict[str, Any]:

@@ -163,6 +163,7 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
 
     return {
         "base": floats([arm.base for arm in arms]),
+        "stands": floats([arm.tool_axis for arm in arms]),
         "tool": floats([arm.tool for arm in arms]),
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
         "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),

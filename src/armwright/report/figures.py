@@ -17,7 +17,7 @@ from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
-from armwright.kinematics.chain import joint_positions
+from armwright.kinematics.chain import joint_positions, link_lines
 from armwright.objectives import POSITION_ERROR, TORQUE, Objective
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
@@ -313,8 +313,10 @@ def _stack(axes: Any, layers: Mapping[str, np.ndarray]) -> None:
 def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
-        places = joint_positions(member.arm, evaluation.q[row, target, : len(member.arm.joints)])
-        axes.plot(*places.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
+        q = evaluation.q[row, target, : len(member.arm.joints)]
+        places = joint_positions(member.arm, q)
+        for line in link_lines(member.arm, q):
+            axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
         for joint, place in zip(member.arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
         goal = evaluation.targets[target]

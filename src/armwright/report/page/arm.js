@@ -1,7 +1,7 @@
 // The selected arm in space, in one posture for each target.
 
 import { postures, REACHED } from "./design.js";
-import { chain } from "./kinematics.js";
+import { PRISMATIC, chain, length, rail } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, millimetres, number, onTheme, shown } from "./words.js";
 
@@ -247,10 +247,11 @@ function rod(from, to, radius, material) {
 
 function drawPosture(group, arm, q, paints) {
   empty(group);
-  const { joints, axes } = chain(arm, q);
+  const posed = chain(arm, q), { joints, ends, axes } = posed;
   for (let j = 0; j < q.length; j++) {
     const radius = thick(arm, j), wide = 1.45 * radius;
-    group.add(rod(joints[j], joints[j + 1], radius, paints.link));
+    group.add(rod(joints[j], ends[j], radius, paints.link));
+    if (arm.kind[j] === PRISMATIC) group.add(rod(...rail(arm, posed, q, j), 0.5 * radius, paints.base));
     const along = axes[j].map((v) => v * 1.25 * wide);
     const joint = rod(joints[j].map((v, k) => v - along[k]), joints[j].map((v, k) => v + along[k]), wide, paints.joints[arm.axis[j]]);
     joint.userData.joint = j;
@@ -258,8 +259,9 @@ function drawPosture(group, arm, q, paints) {
     group.add(joint);
   }
   const radius = thick(arm, 0);
-  const [bx, by, bz] = joints[0];
-  group.add(rod([bx, by, bz - 2.05 * radius], [bx, by, bz - 1.15 * radius], 2.4 * radius, paints.base));
+  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.stands[k]); // the base's plate
+  group.add(rod(behind(2.05 * radius), behind(1.15 * radius), 2.4 * radius, paints.base));
+  if (length(arm.tool) > 0) group.add(rod(ends.at(-1), joints.at(-1), 0.6 * radius, paints.base));
   const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
   tip.userData.joint = q.length;
   group.add(tip);
@@ -283,7 +285,7 @@ export function drawArm() {
     posed.forEach((one, t) => {
       if (t === state.target) return;
       for (let j = 0; j < one.q.length; j++) {
-        groups.ghost.add(rod(one.joints[j], one.joints[j + 1], 0.55 * thick(arm, j), materials.ghost));
+        groups.ghost.add(rod(one.joints[j], one.ends[j], 0.55 * thick(arm, j), materials.ghost));
       }
     });
   }

@@ -95,13 +95,16 @@ export class Content {
     return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
   }
 
-  // Names of the joints' actuators in order, where there is a choice.
-  motors(i) {
-    return this.params(i).filter((p) => p.choices && p.name.startsWith("motor_")).map((p) => p.value);
+  // One parameter's value; undefined where it does not matter.
+  param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
+
+  // The choices of kind_1, kind_2, … in order, where there are any: "motor", "direction".
+  chosen(i, kind) {
+    return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }
 
   arm(i) {
-    const arm = { base: this._part("base", i), tool: this._part("tool", i) }, n = this._part("joints", i)[0];
+    const arm = { base: this._part("base", i), tool: this._part("tool", i), stands: this._part("stands", i) }, n = this._part("joints", i)[0];
     for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
     for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
     return arm;

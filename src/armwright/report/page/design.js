@@ -54,10 +54,11 @@ export function drawDesign() {
     return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
   });
   const feasible = head.constraints.length ? ` ${constraintWords(i)}` : "";
-  const motors = content.motors(i).length ? ` Motors: ${content.motors(i).join(", ")}.` : "";
+  const motors = content.chosen(i, "motor").length ? ` Motors: ${content.chosen(i, "motor").join(", ")}.` : "";
+  const mount = content.param(i, "mount");
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m. ${onFront}${feasible}${iteration}${motors}`;
+  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${feasible}${iteration}${motors}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -84,9 +85,10 @@ function drawLinks(arm) {
   const { joint } = content.head.colours;
   $("links").replaceChildren(...Array.from(arm.axis, (axis, j) => {
     const long = linkLength(arm, j);
-    const moves = [`${"RPY"[axis]}`, `slides ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
-    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves})` },
-      `${moves} ${millimetres(long)}`);
+    const moves = [`turns about ${"xyz"[axis]}`, `slides along ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
+    const word = content.joints(state.design), letter = word.length === arm.axis.length ? word[j] : ["RPY"[axis], "slide", "F"][arm.kind[j]];
+    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves} at first)` },
+      `${letter} ${millimetres(long)}`);
     bar.style.flex = `${1e6 * Math.max(long, 1e-6)} 1 0`;
     bar.style.background = joint["xyz"[axis]];
     return bar;

@@ -44,7 +44,8 @@ export function forget() {
 
 // What a design of the front can be chosen by.
 function numbersOf(i) {
-  const found = new Map(content.params(i).filter((p) => !p.choices).map((p) => [p.name, p.value]));
+  const names = content.head.parameters.filter((p) => !p.choices).map((p) => p.name);
+  const found = new Map(names.map((name) => [name, content.param(i, name) ?? 0]));
   for (const [name, value] of Object.entries(content.head.arms[i])) found.set(name, value);
   content.objectives.forEach((o, k) => found.set(o.name, content.values(i)[k]));
   return found;
