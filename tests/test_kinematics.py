@@ -18,12 +18,13 @@ from armwright.exceptions import ArmError, SettingsError
 from armwright.export.urdf import to_urdf
 from armwright.kinematics import solve
 from armwright.kinematics.arrays import ArmArrays, stack_arms
-from armwright.kinematics.solve import Postures, solve_postures, update_once
+from armwright.kinematics.solve import Postures
 from armwright.parameters import Design
 from armwright.space import DesignSpace, paper_space
 from armwright.task import load_task
 from tests import reference
 from tests.arms import general_arms, paper_arms
+from tests.moving import moving, solve_postures, update_once
 from tests.reference import Array, Chains
 
 MAKERS = pytest.mark.parametrize("arms_of", [paper_arms, general_arms])
@@ -33,7 +34,7 @@ ArmMaker = Callable[[int, int, int], list[Arm]]
 
 def chains_as_stacked(arms: list[Arm], arrays: ArmArrays) -> Chains:
     """The reference's chains with the limits as the kernels have them: in float32, rounded to the inside."""
-    lower, upper = (np.float64(limits)[:, None] for limits in (arrays.lower, arrays.upper))
+    lower, upper = (np.float64(limits)[:, None, moving(arrays)] for limits in (arrays.lower, arrays.upper))
     return replace(reference.chains(arms), lower=lower, upper=upper)
 
 

@@ -17,7 +17,7 @@ from armwright.control import Channel
 from armwright.exceptions import ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, FinishedTrial, FrontMember, History
 from armwright.parameters import Design
-from armwright.pareto import Array, FrontTracker, default_reference_point
+from armwright.pareto import Array, FrontTracker
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
@@ -147,12 +147,13 @@ class Study:
         self._channel = Channel(None if folder is None else folder.path)
         overlap = self.method.in_flight is not None
         self._asker = None if proposer is None else Asker(proposer, config.seed, None if overlap else self._asking)
-        self.black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives))
-        self.trials = folder.open_trials(problem.space, len(problem.objectives)) if folder is not None else []
+        n_objectives, names = len(problem.objectives), [constraint.words for constraint in problem.constraints]
+        self.black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
+        self.trials = folder.open_trials(problem.space, n_objectives, len(names)) if folder is not None else []
         self.black_box.restore(self.trials)
-        self._tracker = FrontTracker(len(problem.objectives), config.reference_point)
-        for trial in self.trials:
-            self._tracker.add(trial.values)
+        self._tracker = FrontTracker(n_objectives, config.reference_point)
+        for row in self._history().counted:
+            self._tracker.add(row)
         self._freeze_reference_point()
 
     @property
@@ -256,9 +257,9 @@ class Study:
         refinement = self._refinement(number) if turn is None else None
         trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
-        values = tuple(self.problem.evaluate([design])[0].tolist())
+        values, constraints = (tuple(found[0].tolist()) for found in self.problem.judge([design]))
         evaluated = time.perf_counter()
-        noted = self.black_box.tell(trial, values)
+        noted = self.black_box.tell(trial, values, constraints)
         told = time.perf_counter()
         seconds = {
             "total": round(told - started, 6),
@@ -266,13 +267,14 @@ class Study:
             "evaluation": round(evaluated - sampled, 6),
             "proposing": round(proposed - started, 6),
         }
-        finished = _finished(number, source, design, values, turn, noted, seconds)
+        finished = replace(_finished(number, source, design, values, turn, noted, seconds), constraints=constraints)
         if refinement is not None:
             finished = replace(finished, refines=refinement.refines, evaluations=1 + refinement.evaluations)
         if self.folder is not None:
             self.folder.append(finished)
         self.trials.append(finished)
-        self._tracker.add(values)
+        if finished.is_feasible:
+            self._tracker.add(values)
         self._freeze_reference_point()
         self._report("finished", number, source, turns, finished.fault, "" if turn is None else turn.note)
 
@@ -284,7 +286,8 @@ class Study:
         due = (number - self.method.n_init) // every
         if sum(trial.refines is not None for trial in self.trials) >= due:
             return None
-        return refine_one(self._history(), self.config.seed)
+        history = self._history()
+        return refine_one(history, self.config.seed) if history.front else None  # else nothing is feasible yet
 
     def _ask(self, number: int, turn: Turn | None, refinement: Refinement | None) -> tuple[Any, Design, str]:
         """Optuna's trial with the design to evaluate, and where it comes from."""
@@ -303,7 +306,7 @@ class Study:
     def _freeze_reference_point(self) -> None:
         """Writes a reference point that the task left open into config.yaml as soon as it is known."""
         if self.config.reference_point is None and len(self.trials) >= self.method.n_init:
-            reference_point = default_reference_point(self._history().values[: self.method.n_init])
+            reference_point = self._history().found_reference_point()
             self.config = self.config.model_copy(update={"reference_point": reference_point})
             self._tracker.set_reference_point(reference_point)
             if self.folder is not None:

@@ -34,6 +34,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     payload: what the tip carries at all targets, or at each [kg].
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two.
+    constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
@@ -41,6 +42,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     payload: float | tuple[float, ...] = 0.0
     obstacles: tuple[Obstacle, ...] = ()
     objectives: tuple[str, ...] | None = None
+    constraints: tuple[str, ...] = ()
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
     description: str = Field(default="", max_length=10_000)
@@ -204,6 +206,12 @@ targets:
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
 # rms_torque, mass, length, collision, closeness.
 # objectives: [worst_error, peak_torque, mass]
+
+# What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number
+# in its unit.
+# constraints:
+#   - worst_error <= 0.01
+#   - mass <= 3
 
 # Worst values that still count, for the hypervolume: [position error summed over the targets in m,
 # torque summed over the targets in N m, times 40], or one for each of the objectives. Without it, 1.1 x the worst

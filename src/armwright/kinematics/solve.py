@@ -90,6 +90,9 @@ def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_befo
 
     targets: (N, 3) [m].  q, the limit gradients h_before, and both results: (N, D). All is of the arms' precision.
     """
+    shape = (len(arms), arms.dof)
+    if q.shape != shape or h_before.shape != shape:
+        raise ArmError(f"q and h_before must have the shape {shape}: arms, joints; not {q.shape} and {h_before.shape}")
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
     moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
     lanes = LANES["cpu"]

@@ -64,14 +64,17 @@ VARIABLES = {
     "target_high": "the largest x, y and z of all targets",
     "updates": "updates of the inverse kinematics",
     "objectives": "what is minimised, each with symbol, label, unit, words, over (sum, max, mean square or arm)",
+    "constraints": "what a design has to keep, each with quantity (as an objective), relation, bound",
+    "n_feasible": "how many of the evaluated designs keep all of these",
     "tolerance": "[m] by which base and links may be off, the worst case of which counts; 0: designs as they stand",
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
     "n_front": "how many of them are Pareto-optimal",
     "front": "members of the front, by rising first objective: number, origin, joints, links, extras, e_each, p_ik, "
-    "tau_ik, limits, load, e_all",
+    "tau_ik, limits, load, e_all, broken (which constraints, or none; empty where there are none); as long as no "
+    "design is feasible (n_feasible), those nearest to it",
     "others": "some other designs, with the same",
-    "proposed": "--memory own: earlier proposals: number, origin, joints, links, extras, expected, e_all, on_front, "
+    "proposed": "--memory own: earlier proposals: number, origin, joints, links, extras, expected, e_all, broken, "
     "reason",
     "n_proposed": "how many proposals there were",
     "proposals": "how many designs to propose",
@@ -272,6 +275,8 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "n_targets": len(problem.task.points),
         "updates": UPDATES,
         "objectives": problem.objectives,
+        "constraints": problem.constraints,
+        "n_feasible": int(history.feasible.sum()),
         "tolerance": problem.tolerance,
         "reference_point": history.reference_point,
         "n_finished": len(history),

@@ -23,7 +23,7 @@ from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.solids import draw_obstacles
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, Look, look
+from armwright.report.style import FRONT, INFEASIBLE, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, Look, look
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
@@ -73,12 +73,14 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     """Solution 1 (least position error), the knee, Solution 2 (least torque), all within the reference box.
 
     Before them the most precise design of all, where it lies beyond the box. Of other objectives, the first and the
-    last one take the places of position error and torque.
+    last one take the places of position error and torque. As long as no design is feasible: the nearest.
     """
     reference, objectives = _reference(history), history.problem.objectives
-    numbers = front_numbers(history.values)
+    numbers = front_numbers(history.counted)
+    if not numbers:
+        return [("Nearest to feasible", history.member(number)) for number in history.nearest(1)]
     first, last = (f"least {objective.label.lower()}" for objective in (objectives[0], objectives[-1]))
-    solutions = solution_numbers(history.values, reference)
+    solutions = solution_numbers(history.counted, reference)
     if solutions is None:
         lowest = min(numbers, key=lambda n: history.values[n, -1])
         titled = {numbers[0]: f"{first.capitalize()} of all", lowest: f"{last.capitalize()} of all"}
@@ -87,7 +89,7 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     if numbers[0] != solutions[0]:
         best = "Most precise" if objectives[0] is POSITION_ERROR else first.capitalize()
         titled = {numbers[0]: f"{best} of all, beyond the reference point", **titled}
-    knee = knee_number(history.values, reference)
+    knee = knee_number(history.counted, reference)
     if knee is not None:
         titled.setdefault(knee, "Knee of the front")
     titled.setdefault(solutions[1], f"Solution 2: {last}")
@@ -98,7 +100,7 @@ def draw_hypervolume(history: History) -> Figure:
     """The hypervolume over the counted trials, with the trials of the proposer marked where they enlarged it."""
     figure, axes = one_panel(5.2, 3.2)
     curve = history.hypervolume
-    start = hypervolume(history.values[: history.n_init], _reference(history))
+    start = hypervolume(history.counted[: history.n_init], _reference(history))
     iterations = np.arange(len(curve) + 1)
     axes.step(iterations, [start, *curve], where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     gains = np.diff(np.array([start, *curve])) > 0.0
@@ -123,7 +125,7 @@ def draw_hypervolume(history: History) -> Figure:
     axes.set_ylim(bottom=0)
     axes.legend(loc="lower right")
     if len(curve) and curve[-1] == 0.0:
-        _say(axes, "No design lies within the reference box.")
+        _say(axes, _nothing(history))
     return figure
 
 
@@ -157,7 +159,7 @@ def draw_samples(history: History) -> Figure:
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     panels[0].set_ylabel(_label(history, 1))
-    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_sources(history)) + 1)
+    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_legend(history)))
     return figure
 
 
@@ -173,7 +175,7 @@ def draw_credit(history: History) -> Figure:
     volume.set_title(f"{history.problem.task.name}, reference point {_pair(_reference(history))}")
     members.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     if not np.any(history.hypervolume > 0.0):
-        _say(volume, "No design lies within the reference box.")
+        _say(volume, _nothing(history))
     areas = [Patch(**_fill(look(source)), label=look(source).label) for source in reversed(_sources(history))]
     figure.legend(handles=areas, loc="outside right center", title="found by", alignment="left")
     return figure
@@ -208,7 +210,7 @@ def draw_front(history: History) -> Figure:
     axes.set_xlabel(_label(history, 0))
     axes.set_ylabel(_label(history, 1))
     axes.legend(handles=_legend(history), loc="upper right")
-    area = hypervolume(history.values, reference)
+    area = hypervolume(history.counted, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     return figure
 
@@ -262,9 +264,14 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
 
 def _scatter(axes: Any, history: History, reference: Sequence[float], faint: bool = False) -> None:
     values = history.values
+    broken = values[~history.feasible]
+    if len(broken):
+        axes.scatter(
+            broken[:, 0], broken[:, 1], s=14, facecolors="none", edgecolors=INFEASIBLE, linewidths=0.7, zorder=2
+        )
     for source in _sources(history):
         style = look(source)
-        rows = values[[trial.source == source for trial in history]]
+        rows = values[history.feasible & np.array([trial.source == source for trial in history])]
         axes.scatter(
             rows[:, 0],
             rows[:, 1],
@@ -274,7 +281,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
             zorder=3,
             **_paint(style),
         )
-    front = values[front_numbers(values)]
+    front = values[front_numbers(history.counted)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # of more objectives there is no line to draw
         x = [inside[0, 0], *inside[:, 0], reference[0]]
@@ -285,12 +292,12 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
     axes.set_xlim(0, SHOWN * reference[0])
     axes.set_ylim(0, SHOWN * reference[1])
     if not len(inside):
-        _say(axes, "No design lies within the reference box.")
+        _say(axes, _nothing(history))
 
 
 def _best_known(axes: Any, history: History) -> None:
     """A line at the best known hypervolume of the task, where there is one."""
-    found = standing(history.problem, history.values, _reference(history))
+    found = standing(history.problem, history.counted, _reference(history))
     if found is not None:
         words = f"best known ({found.hypervolume:.2f})"
         axes.axhline(found.hypervolume, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=words)
@@ -364,6 +371,19 @@ def _legend(history: History) -> list[Line2D]:
         Line2D([], [], linestyle="", marker=look(s).marker, color=look(s).colour, markersize=5, label=look(s).label)
         for s in _sources(history)
     ]
+    if not history.feasible.all():
+        marks.append(
+            Line2D(
+                [],
+                [],
+                linestyle="",
+                marker="o",
+                markerfacecolor="none",
+                color=INFEASIBLE,
+                markersize=4,
+                label="infeasible",
+            )
+        )
     line = Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front")
     return [*marks, line] if len(history.problem.objectives) == 2 else marks
 
@@ -424,6 +444,13 @@ def _reference(history: History) -> tuple[float, ...]:
     if reference is None:
         raise RunFolderError(f"figures need the {history.n_init} random trials; the run has only {len(history)} so far")
     return reference
+
+
+def _nothing(history: History) -> str:
+    """Why no design counts."""
+    if not history.feasible.any():
+        return "No design meets all constraints."
+    return "No design lies within the reference box."
 
 
 def _say(axes: Any, words: str) -> None:

@@ -74,6 +74,8 @@ export class Content {
   source(i) { return this.head.sources[this._part("source", i)[0]]; }
   look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }
+  broken(i) { return this._part("broken", i); } // by how much, one a constraint: <= 0 is met
+  isFeasible(i) { return this.broken(i).every((value) => value <= 0); }
 
   // Those that matter: the arm has their module, and it is of a type that they are for.
   params(i) {
