@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.exceptions import ArmError, FailureError, SettingsError
-from armwright.kinematics.arrays import ARRAYS, FLOATS, ArmArrays, Floats, Precision, checked_precision
+from armwright.kinematics.arrays import ARRAYS, FIXED, FLOATS, ArmArrays, Floats, Precision, checked_precision
 from armwright.kinematics.devices import Device, cores, load, resolve_device
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
@@ -53,7 +53,7 @@ def solve_postures(
 
     targets: (T, 3) [m]; how many is a question of memory alone.
     start: values [rad] or [m] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without
-    it all arms start straight, at 0.
+    it all arms start straight, at 0; fixed joints stay there.
     payload: (T,) point masses that the tip carries at the targets [kg]; without it none.
     precision: of the results. "float64" takes arms of either precision, "float32" only its own.
     The same arm, target and start give the same bits on the same device, whatever is solved beside them.
@@ -64,7 +64,9 @@ def solve_postures(
     device = resolve_device(device, many=True)
     n, t, dof = len(arms), len(targets), arms.dof
     start = None if start is None and arms.starts_at_zero else np.zeros(1) if start is None else start
-    starts = None if start is None else _broadcast(start, (n, t, dof))
+    starts = None
+    if start is not None:
+        starts = np.where(arms.motion[:, None] == FIXED, 0.0, _broadcast(start, (n, t, dof)))
     loaded = np.column_stack([targets, np.zeros(t) if payload is None else payload])
     solved = Postures(*(np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof)))
     parts = _parts(n, t, LANES[device])
