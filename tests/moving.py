@@ -24,18 +24,15 @@ def of_all(values: np.ndarray, arrays: ArmArrays) -> np.ndarray:
 
 def solve_postures(arrays: ArmArrays, targets: np.ndarray, *args: Any, start: Any = None, **options: Any) -> Postures:
     own = moving(arrays)
-    given = None
     if start is not None:
         start = np.asarray(start, dtype=np.float64)
-        given = of_all(
-            np.broadcast_to(start, (*start.shape[:-1], len(own))) if start.ndim else start.reshape(1), arrays
-        )
-    found = solve.solve_postures(arrays, targets, *args, start=given, **options)
+        if start.ndim and start.shape[-1] == len(own):
+            start = of_all(start, arrays)
+    found = solve.solve_postures(arrays, targets, *args, start=start, **options)
     assert not np.delete(found.q, own, axis=-1).any()
     assert not np.delete(found.torque, own, axis=-1).any()
-    return Postures(
-        np.ascontiguousarray(found.q[..., own]), found.reached, np.ascontiguousarray(found.torque[..., own])
-    )
+    q, torque = (np.ascontiguousarray(values[..., own]) for values in (found.q, found.torque))
+    return Postures(q, found.reached, torque)
 
 
 def update_once(
