@@ -17,6 +17,7 @@ from armwright.problem import Problem
 
 RANDOM = "random"
 BBO = "bbo"
+START = "start"  # an arm that is there already
 POLISH = "polish"  # a design of the front, refined
 FRONT = "front"  # of a search for the whole front
 
@@ -26,7 +27,7 @@ class FinishedTrial:
     """One evaluated design.
 
     constraints: how far it breaks each constraint of the task, <= 0: not at all.
-    source: `random`, `bbo`, `polish`, `front`, or the name of the proposer.
+    source: `random`, `start`, `bbo`, `polish`, `front`, or the name of the proposer.
     proposal, reason, expected: the proposal's id and reason, and the objectives that were expected of it, where a
         proposer made the design (and said so).
     fault: why a trial that was a proposer's became a black-box one.

@@ -61,6 +61,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     proposer: its name and settings; None for black-box trials only.
     in_flight: how many questions go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials the next free one refines a design of the front; None: never.
+    start: designs that the first of the n_init trials are, in place of random ones.
     """
 
     proposer: dict[str, Any] | None
@@ -70,6 +71,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     n_total: int = Field(ge=1)
     in_flight: int | None = Field(default=None, ge=1)
     polish_every: int | None = Field(default=None, ge=1)
+    start: tuple[dict[str, float | str], ...] = ()
 
     @property
     def n_trials(self) -> int:

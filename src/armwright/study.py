@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from armwright.control import Channel
 from armwright.exceptions import ModelError, SettingsError, StoppedError
-from armwright.history import BBO, POLISH, RANDOM, FinishedTrial, FrontMember, History
+from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMember, History
 from armwright.parameters import Design
 from armwright.pareto import Array, FrontTracker
 from armwright.problem import Problem
@@ -92,6 +92,7 @@ def optimize(
     n_total: int = 200,
     in_flight: int | None = None,
     polish_every: int | None = None,
+    start: Sequence[Design] = (),
     on_model_failure: str = "stop",
     verify: bool = True,
     seed: int = 0,
@@ -105,6 +106,7 @@ def optimize(
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
+    start: designs to begin with, such as an arm that is there already: the first of the n_init trials are theirs.
     verify: whether the front is verified where results are written (`verification.py`).
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials; a run
         that has begun always goes on.
@@ -115,7 +117,9 @@ def optimize(
         proposer = choose_proposer(proposer).proposer
     elif isinstance(proposer, type):
         raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
-    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every)
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every, start)
+    for design in method.start:
+        problem.space.design(design)  # says what is wrong before anything is begun
     config = study_config(problem, method, seed)
     with ExitStack() as stack:
         folder = None
@@ -297,6 +301,9 @@ class Study:
             assert self.proposer is not None
             source = self.proposer.name
             return *self.black_box.inject(turn.proposal.design, number, source, turn.proposal.id), source
+        if number < len(self.method.start):
+            given = Design(self.method.start[number])
+            return *self.black_box.inject(given, number, START, None), START
         source = RANDOM if number < self.method.n_init else BBO
         return *self.black_box.draw(number, source), source
 
@@ -361,8 +368,11 @@ def study_method(
     n_total: int,
     in_flight: int | None,
     polish_every: int | None,
+    start: Sequence[Design] = (),
 ) -> Method:
     """How `optimize` searches with these arguments; SettingsError where they do not go together."""
+    if len(start) > n_init:
+        raise SettingsError(f"{len(start)} designs to start with are more than the n_init = {n_init} first trials")
     if in_flight is not None and proposer is not None and not proposer.overlaps:
         raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
     return Method(
@@ -373,6 +383,7 @@ def study_method(
         n_total=whole("n_total", n_total, 1),
         in_flight=None if in_flight is None else whole("in_flight", in_flight, 1),
         polish_every=None if polish_every is None else whole("polish_every", polish_every, 1),
+        start=tuple(dict(design.params) for design in start),
     )
 
 

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from armwright.history import BBO, RANDOM
+from armwright.history import BBO, RANDOM, START
 
 
 class Look(NamedTuple):
@@ -17,6 +17,7 @@ class Look(NamedTuple):
 
 _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
+    START: Look("start", "#111111", "P", 36),
     BBO: Look("black box", "#0072B2", "o", 20),
     "polish": Look("polish", "#009E73", "D", 28, "...."),
     "front": Look("front search", "#0072B2", "o", 14),
