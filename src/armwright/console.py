@@ -71,6 +71,10 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     _show_standing(console, summary["best_known"])
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
     console.print(f"{summary['n_trials']} trials{more}{broken}: {sources}; {_seconds(summary['seconds'])}")
+    if summary["same_arms"]:
+        console.print(
+            f"{summary['same_arms']} trials were the same arm as an earlier one, and were not evaluated again"
+        )
     _show_proposer(console, summary["proposer"])
     scaled = TORQUE in history.problem.objectives
     words = f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; " if scaled else ""

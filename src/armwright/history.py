@@ -34,7 +34,8 @@ class FinishedTrial:
     asked: the trial that a proposal was asked for, where it came for another (overlap, several proposals a call).
     feedback: how many finished trials the proposer knew, where not all before this one.
     refines: the trial whose design was refined for this one.
-    evaluations: designs that were evaluated to find it (a refined one: many).
+    evaluations: designs that were evaluated to find it (a refined one: many; the same arm as an earlier one: none).
+    same_as: the earlier trial whose arm it is, and whose values it has (`canonical.py`).
     seconds: wall time by part (proposing, sampling, evaluation).
     sampler_notes: what the sampler noted on its trial and study (a genetic one: generations), needed to resume.
     """
@@ -51,6 +52,7 @@ class FinishedTrial:
     feedback: int | None = None
     refines: int | None = None
     evaluations: int = 1
+    same_as: int | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     constraints: tuple[float, ...] = ()

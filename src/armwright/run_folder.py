@@ -332,7 +332,8 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     asked: int | None = None
     feedback: int | None = None
     refines: int | None = None
-    evaluations: int = Field(default=1, ge=1)
+    evaluations: int = Field(default=1, ge=0)
+    same_as: int | None = None
     params: dict[str, float | str]
     values: list[float] = Field(min_length=1)
     constraints: list[float] = []
@@ -352,6 +353,7 @@ def _trial_line(trial: FinishedTrial) -> bytes:
         feedback=trial.feedback,
         refines=trial.refines,
         evaluations=trial.evaluations,
+        same_as=trial.same_as,
         params=dict(trial.design.params),
         values=list(trial.values),
         constraints=list(trial.constraints),
@@ -456,6 +458,7 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int
         feedback=record.feedback,
         refines=record.refines,
         evaluations=record.evaluations,
+        same_as=record.same_as,
         seconds=record.seconds,
         sampler_notes=record.sampler_notes,
     )

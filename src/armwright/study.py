@@ -7,12 +7,13 @@ trials before it, so a killed run goes on where it stopped and ends as if it had
 import operator
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from armwright.canonical import SameArms
 from armwright.control import Channel
 from armwright.exceptions import ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMember, History
@@ -155,6 +156,10 @@ class Study:
         self.black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
         self.trials = folder.open_trials(problem.space, n_objectives, len(names)) if folder is not None else []
         self.black_box.restore(self.trials)
+        self._same_arms = SameArms(problem)
+        self._first_of: dict[Hashable, int] = {}  # the first trial of each arm
+        for trial in self.trials:
+            self._first_of.setdefault(self._same_arms.key(trial.design), trial.number)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
         for row in self._history().counted:
             self._tracker.add(row)
@@ -261,7 +266,8 @@ class Study:
         refinement = self._refinement(number) if turn is None else None
         trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
-        values, constraints = (tuple(found[0].tolist()) for found in self.problem.judge([design]))
+        same_as = self._first_of.setdefault(self._same_arms.key(design), number)
+        values, constraints = self._judged(design) if same_as == number else self._known(same_as)
         evaluated = time.perf_counter()
         noted = self.black_box.tell(trial, values, constraints)
         told = time.perf_counter()
@@ -272,8 +278,12 @@ class Study:
             "proposing": round(proposed - started, 6),
         }
         finished = replace(_finished(number, source, design, values, turn, noted, seconds), constraints=constraints)
+        if same_as != number:
+            finished = replace(finished, same_as=same_as, evaluations=0)
         if refinement is not None:
-            finished = replace(finished, refines=refinement.refines, evaluations=1 + refinement.evaluations)
+            finished = replace(
+                finished, refines=refinement.refines, evaluations=finished.evaluations + refinement.evaluations
+            )
         if self.folder is not None:
             self.folder.append(finished)
         self.trials.append(finished)
@@ -281,6 +291,15 @@ class Study:
             self._tracker.add(values)
         self._freeze_reference_point()
         self._report("finished", number, source, turns, finished.fault, "" if turn is None else turn.note)
+
+    def _judged(self, design: Design) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Values and constraints of a design."""
+        values, constraints = self.problem.judge([design])
+        return tuple(values[0].tolist()), tuple(constraints[0].tolist())
+
+    def _known(self, number: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Those of an earlier trial's."""
+        return self.trials[number].values, self.trials[number].constraints
 
     def _refinement(self, number: int) -> Refinement | None:
         """A design of the front refined, where one is due."""
