@@ -480,7 +480,6 @@ def test_refused_arms_are_named() -> None:
         return Arm((0.0, 0.0, 0.0), joints, (link,) * len(joints))
 
     refused = [
-        ([arm(turning), arm(fixed, fixed)], "needs a joint that moves"),
         ([arm(*[turning] * 17)], "up to 16 joints, not 17"),
         ([arm(turning, Joint("revolute", "x", -1.0, 6.5))], r"joint 2 turns beyond ±2π rad: \[-1, 6.5\]"),
         ([arm(Joint("revolute", "x", -6.5, 1.0))], r"joint 1 turns beyond ±2π rad: \[-6.5, 1\]"),

@@ -150,8 +150,6 @@ def _motion(joint: Joint) -> int:
 def _check(arm: Arm) -> None:
     if len(arm.joints) > MOST_JOINTS:
         raise ArmError(f"the kernels take up to {MOST_JOINTS} joints, not {len(arm.joints)}")
-    if all(joint.kind == "fixed" for joint in arm.joints):
-        raise ArmError("an arm needs a joint that moves")
     for number, joint in enumerate(arm.joints, start=1):
         if joint.kind == "revolute" and max(-joint.lower, joint.upper) > LARGEST_ANGLE:
             raise ArmError(f"joint {number} turns beyond ±2π rad: [{joint.lower:g}, {joint.upper:g}]")
@@ -203,12 +201,15 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
         actuation = Actuation(np.where(plan < FIXED, efforts[chosen][..., None], np.inf), price)
     ends = np.concatenate([carried[:, 1:], np.zeros((n, 1))], axis=1)  # a link carries what the next module begins with
     total = mass + ends
-    middle = np.where(ends > 0.0, (mass * middle + ends * links) / np.where(total > 0.0, total, 1.0), middle)
     direction = _direction(space, read)  # (N, M, 3)
+    centre = direction * middle[..., None]
+    end_place = direction * links[..., None] + _shift(space, read, plan, rails, carried)
+    both = (mass[..., None] * centre + ends[..., None] * end_place) / np.where(total > 0.0, total, 1.0)[..., None]
+    centre = np.where(ends[..., None] > 0.0, both, centre)
     shape = plan.shape
     offset, com, masses_ = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
     offset[..., -1, :] = direction * links[..., None]
-    com[..., -1, :] = direction * middle[..., None]
+    com[..., -1, :] = centre
     masses_[..., -1] = total
     travel = np.where(slides, space.travel, 1.0)
     motion = np.where(plan < FIXED, plan // SLIDES * SLIDES + axis, FIXED)
@@ -327,6 +328,19 @@ def _direction(space: DesignSpace, read: _Reader) -> Array:
     """(N, M, 3) where the links leave to, in the world's axes."""
     chosen = read.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
     return _turned(_VECTORS[chosen], read.mount)
+
+
+def _shift(space: DesignSpace, read: _Reader, plan: NDArray[np.intp], rails: Array, carried: Array) -> Array | float:
+    """(N, M, 3) from the end of each link to the centre of what the next module begins with, in the world's axes."""
+    if not rails.any():
+        return 0.0
+    ways = np.where(rails > 0.0, rails / np.where(carried > 0.0, carried, 1.0), 0.0) * (
+        read.reals("stroke", _single(space.stroke)) / 2
+    )
+    local = np.eye(3)[plan[..., -1] % SLIDES] * ways[..., None]
+    shifts = np.zeros_like(local)
+    shifts[:, :-1] = _turned(local, read.mount)[:, 1:]
+    return shifts
 
 
 def _tool(space: DesignSpace, read: _Reader) -> Array:

@@ -17,7 +17,7 @@ from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
-from armwright.kinematics.chain import joint_positions, link_lines
+from armwright.kinematics.chain import joint_positions, link_lines, rails
 from armwright.objectives import POSITION_ERROR, TORQUE, Objective
 from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
@@ -322,6 +322,8 @@ def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: 
     for target in targets:
         q = evaluation.q[row, target, : len(member.arm.joints)]
         places = joint_positions(member.arm, q)
+        for line in rails(member.arm, q):
+            axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
         for line in link_lines(member.arm, q):
             axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
         for joint, place in zip(member.arm.joints, places[:-1], strict=True):
