@@ -474,7 +474,7 @@ def test_problem_turned_about_the_vertical() -> None:
 def test_refused_arms_are_named() -> None:
     """The message names the joint and the limit."""
     link = uniform_link((0.0, 0.0, 0.2), 0.1, 0.015)
-    turning, fixed = Joint("revolute", "y", -2.0, 2.0), Joint("fixed", "y")
+    turning = Joint("revolute", "y", -2.0, 2.0)
 
     def arm(*joints: Joint) -> Arm:
         return Arm((0.0, 0.0, 0.0), joints, (link,) * len(joints))
