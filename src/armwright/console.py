@@ -240,7 +240,7 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
         console.print(f"  joints {member.design.joints}, links {links} m, base ({base}) m{motors}")
     first = picked[0].number
-    console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet")
+    console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
