@@ -228,7 +228,7 @@ def _draw_bought(axes: Any, reference: Sequence[float], bought: Sequence[Compare
     height = HIGHEST_LABEL  # names stand apart from the front's and from each other, the highest arm's first
     for arm, place in sorted(places, key=lambda known: -known[1][1]):
         at = np.minimum(place, edge)
-        beyond = "" if np.all(place <= edge) else f"\nbeyond, at {place[0]:.3g}, {place[1]:,.5g}"
+        beyond = "" if np.all(place <= edge) else f"\nbeyond, at {_short(place[0])}, {_short(place[1])}"
         axes.scatter(
             *at,
             s=EXISTING.size,
@@ -254,6 +254,10 @@ def _draw_bought(axes: Any, reference: Sequence[float], bought: Sequence[Compare
         )
         height -= 0.11 if beyond else 0.08
     return len(places)
+
+
+def _short(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:

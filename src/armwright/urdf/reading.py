@@ -67,7 +67,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     for joint in moving:
         _check_joint(joint, str(path))
     zeros = _zeros(chain, str(path))
-    return _arm(tree, base, last, moving, zeros, _chosen(tree, tip, last))
+    return _arm(tree, base, last, moving, zeros, _chosen(tree, base, tip, last, moving))
 
 
 def _arm(
@@ -127,13 +127,12 @@ def _check_joint(joint: UrdfJoint, where: str) -> None:
         )
 
 
-def _chosen(tree: "_Tree", tip: str | None, last: str) -> list[str]:
-    if tip is not None:
-        return []
-    fingers = sum(joint.moves for joint in tree.below(last))
-    notes = [f'the tip is the link "{last}" (--tip names another)']
-    if fingers:
-        notes.append(f"{fingers} {'joint beyond it stays' if fingers == 1 else 'joints beyond it stay'} at 0")
+def _chosen(tree: "_Tree", base: str, tip: str | None, last: str, moving: Sequence[UrdfJoint]) -> list[str]:
+    """What is said of the choice of a chain."""
+    notes = [] if tip is not None else [f'the tip is the link "{last}" (--tip names another)']
+    others = sum(joint.kind != "fixed" for joint in tree.below(base)) - len(moving)
+    if others:
+        notes.append(f"{others} {'other joint stays' if others == 1 else 'other joints stay'} at 0, such as fingers")
     return notes
 
 
