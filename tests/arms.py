@@ -20,6 +20,12 @@ def general_arms(n: int, dof: int, seed: int) -> list[Arm]:
     return [_general_arm(kinds, rng) for _ in range(n)]
 
 
+def moving_arms(n: int, dof: int, seed: int) -> list[Arm]:
+    """The same without fixed joints."""
+    rng = np.random.default_rng([seed, dof])
+    return [_general_arm(["revolute"] * dof, rng) for _ in range(n)]
+
+
 def _general_arm(kinds: list[str], rng: np.random.Generator) -> Arm:
     joints = tuple(_general_joint(kind, rng) for kind in kinds)
     return Arm(base=_vector(rng, 1.0), joints=joints, links=tuple(_general_link(rng) for _ in kinds))

@@ -133,9 +133,9 @@ def test_standing_beside_the_front(history: History) -> None:
     ]:
         better = sum(all(p <= v) and any(p < v) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
         worse = sum(all(v <= p) and any(v < p) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
-        assert standing(point.tolist(), history) == (better, worse)
-    assert standing((values.min(axis=0) - 1e-9).tolist(), history) == (len(values), 0)
-    assert standing((1.0, None), history) is None
+        assert standing(point.tolist(), (), history) == (better, worse)
+    assert standing((values.min(axis=0) - 1e-9).tolist(), (), history) == (len(values), 0)
+    assert standing((1.0, None), (), history) is None
 
 
 def test_the_run_keeps_the_arms_for_its_figures_and_its_page(run: Path, compared: ArmComparison, tab: Tab) -> None:
@@ -200,6 +200,18 @@ def test_what_is_not_known_of_an_arm_is_not_compared(tmp_path: Path) -> None:
     assert any("its price is not known" in note for note in ur5.notes)
     assert any("not every joint states an effort" in note for note in without.notes)
     assert write_figures(tmp_path / "run")
+
+
+def test_constraints_hold_for_arms_too(tmp_path: Path) -> None:
+    """What an arm breaks is said with its number, and it then stands nowhere; clearance of a URDF is not known."""
+    task = TASK.model_copy(update={"constraints": ("mass <= 19", "self_clearance >= 0.01")})
+    aw.optimize(aw.Problem(task, SPACE), proposer="none", n_init=10, n_total=10, out=tmp_path / "run")
+    ur5, panda = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
+    assert ur5.breaks == ("mass <= 19 (it has 21)",)
+    assert (ur5.dominates, ur5.dominated_by) == (None, None)
+    assert panda.breaks == ()
+    assert panda.dominates is not None
+    assert "whether it keeps self_clearance >= 0.01 is not known" in panda.notes
 
 
 def test_slides_are_geared_as_those_of_designs(tmp_path: Path) -> None:

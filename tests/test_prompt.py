@@ -52,6 +52,21 @@ GOLDEN = Path(__file__).parent / "golden"
 PAPER = FixedProblem(load_task("target-1"))
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})  # for other objectives than the paper's
 ONE_POINT = Task(name="one", targets=((0.2, 0.0, 0.3),), reference_point=(5.0, 5.0))
+IN_THE_WAY = Task.model_validate(
+    {
+        "name": "shelf",
+        "targets": [(0.5, 0.2, 0.1), (0.5, -0.2, 0.1)],
+        "obstacles": [
+            {"kind": "ground", "z": -0.25},
+            {"kind": "box", "name": "shelf", "center": (0.5, 0.0, 0.3), "size": (0.3, 0.6, 0.02), "yaw": 0.2},
+            {"kind": "box", "center": (0.0, 1.0, 0.3), "size": (0.3, 0.6, 0.02), "rpy": (0.1, 0.2, 0.3)},
+            {"kind": "sphere", "center": (0.1, 0.3, 0.1), "radius": 0.05},
+            {"kind": "cylinder", "center": (0.3, 0.3, 0.1), "radius": 0.02, "height": 1.0, "axis": (1.0, 1.0, 0.0)},
+        ],
+        "objectives": ("position_error", "closeness"),
+        "reference_point": (2.0, 0.5),
+    }
+)
 DESIGNS = paper_space().sample(30, seed=9)
 REASONS = ("a universal shoulder at the centre", "", "longer links, because the far corners were missed", "x")
 
@@ -63,6 +78,10 @@ def own(n: int) -> History:
         for i, design in enumerate(DESIGNS[:n])
     ]
     return fixed_history(PAPER, proposals=told)
+
+
+def bounded(*constraints: str) -> FixedProblem:
+    return FixedProblem(load_task("target-1").model_copy(update={"constraints": constraints}))
 
 
 def rendered(history: History, prompt: str = "plus", **how: Any) -> str:
@@ -85,10 +104,17 @@ CASES: dict[str, Callable[[], str]] = {
     "many-targets": lambda: rendered(fixed_history(FixedProblem(grid_task(200))), "minus"),
     "one-objective": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=ONE_OBJECTIVE))),
     "three-objectives": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES))),
+    "obstacles": lambda: rendered(fixed_history(FixedProblem(IN_THE_WAY)), "minus"),
     "one-target-one-joint": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
     "two-joints-two-designs": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
     "nothing-yet": lambda: rendered(fixed_history(PAPER, n=0), "minus"),
     "robust": lambda: rendered(fixed_history(FixedProblem(load_task("target-1"), tolerance=1e-3)), "minus"),
+    "constraints": lambda: rendered(fixed_history(bounded("worst_error <= 0.3", "length >= 0.7"))),
+    "constraints-none-feasible-own": lambda: rendered(
+        fixed_history(bounded("mass <= 0.001"), proposals=[proposal(DESIGNS[0], "light", (1.0, 2.0))]),
+        "minus",
+        memory="own",
+    ),
     "small": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, SMALL), n=3), "minus"),
     "parameters": lambda: parameters_prompt(PAPER, "I think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)"),
     "parameters-several-own": lambda: parameters_prompt(
@@ -111,6 +137,17 @@ def test_golden(name: str) -> None:
     if os.environ.get("ARMWRIGHT_REMAKE_GOLDEN"):
         file.write_text(text, encoding="utf-8")
     assert text == file.read_text(encoding="utf-8")
+
+
+def test_obstacles_that_do_not_count_are_told_so() -> None:
+    paper = IN_THE_WAY.model_copy(update={"objectives": None})
+    text = rendered(fixed_history(FixedProblem(paper)), "minus")
+    assert "5 obstacles, which are solid; positions and lengths in [m] (what touches them does not count):" in text
+    assert "Orientation and collisions do not matter." in text
+    without = paper.model_copy(update={"obstacles": ()})
+    assert "obstacle" not in rendered(fixed_history(FixedProblem(without)), "minus")
+    one = IN_THE_WAY.model_copy(update={"obstacles": IN_THE_WAY.obstacles[:1]})
+    assert "In the way is an obstacle, which is solid;" in rendered(fixed_history(FixedProblem(one)), "minus")
 
 
 def test_every_golden_file_has_its_case() -> None:

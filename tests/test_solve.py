@@ -95,8 +95,10 @@ def test_auto_is_settled_when_the_problem_is_made() -> None:
 COMPILE_FOR_CUDA = """
 import sys
 import warp as wp
+from armwright.kinematics.clearance_kernels import clearance_kernels_of
 from armwright.kinematics.kernels import kernels_of
-for kernel in (kernels_of("float32", 1).descend, kernels_of("float32", 1).hold):
+solving, measuring = kernels_of("float32", 1), clearance_kernels_of("float32")
+for kernel in (solving.descend, solving.hold, measuring.place, measuring.part, measuring.clear):
     print(*wp.compile_aot_module(kernel.module, arch=90, module_dir=sys.argv[1], use_ptx=True))
 """
 
@@ -107,7 +109,7 @@ def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     written = [path.read_text() for path in tmp_path.glob("*.ptx")]
-    assert len(written) == 2
+    assert len(written) == 5
     assert all(".entry" in text and "sm_90" in text for text in written)
 
 

@@ -21,7 +21,11 @@ if TYPE_CHECKING:
     from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
     from armwright.export.mjcf import to_mjcf
+    from armwright.export.ros2_control import to_ros2_control
+    from armwright.export.sdf import to_sdf
+    from armwright.export.srdf import to_srdf
     from armwright.export.urdf import to_urdf
+    from armwright.export.xacro import to_xacro
     from armwright.front import FrontRun, find_front
     from armwright.history import FinishedTrial, FrontMember, History
     from armwright.parameters import Design
@@ -93,7 +97,11 @@ _PLACES = {
     "read_run": "run_folder",
     "read_urdf": "urdf.reading",
     "to_mjcf": "export.mjcf",
+    "to_ros2_control": "export.ros2_control",
+    "to_sdf": "export.sdf",
+    "to_srdf": "export.srdf",
     "to_urdf": "export.urdf",
+    "to_xacro": "export.xacro",
     "uniform_link": "arm",
     "verify_run": "results",
     "write_figures": "report.figures",
@@ -149,7 +157,11 @@ __all__ = [
     "read_run",
     "read_urdf",
     "to_mjcf",
+    "to_ros2_control",
+    "to_sdf",
+    "to_srdf",
     "to_urdf",
+    "to_xacro",
     "uniform_link",
     "verify_run",
     "write_figures",

@@ -14,14 +14,17 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from armwright.arm import Arm, Joint, Vector
+from armwright.constraints import Quantity
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.history import FrontMember, History
 from armwright.kinematics.arrays import FIXED, stack_arms
 from armwright.objectives import (
     MISSED,
+    OF_CLEARANCE,
     PEAK_TORQUE,
     POSITION_ERROR,
+    PRICE,
     REACHED,
     TORQUE,
     TORQUE_USE,
@@ -55,6 +58,7 @@ class ComparedArm:
     values: of the problem's objectives; None where one cannot be known, such as a price.
     measures: the same by the names of `MEASURES`.
     dominates, dominated_by: how many designs of the run's front, as of `standing`; None without a run, too.
+    breaks: the task's constraints that it does not keep; it then stands nowhere beside designs that do.
     notes: what was chosen, changed or missing.
     """
 
@@ -67,6 +71,7 @@ class ComparedArm:
     measures: Mapping[str, float | None]
     dominates: int | None = None
     dominated_by: int | None = None
+    breaks: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -163,6 +168,7 @@ class _BoughtRecord(BaseModel, frozen=True, extra="forbid"):
     measures: dict[str, float | None]
     dominates: int | None
     dominated_by: int | None
+    breaks: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -245,9 +251,16 @@ def _compared(
 ) -> ComparedArm:
     evaluation = problem.evaluate_arrays(stack_arms([arm]))
     values = tuple(_known(objective, evaluation) for objective in problem.objectives)
+    bounds = [(constraint, _known(constraint.quantity, evaluation)) for constraint in problem.constraints]
+    breaks = tuple(
+        f"{constraint.words} (it has {value:.3g})"
+        for constraint, value in bounds
+        if value is not None and float(constraint(evaluation)[0]) > 0.0
+    )
     unknown = [o.name for o, value in zip(problem.objectives, values, strict=True) if value is None]
     said = [*notes, *(f"its {name} is not known, so it cannot be placed among the designs" for name in unknown)]
-    stands = None if history is None else standing(values, history)
+    said += [f"whether it keeps {constraint.words} is not known" for constraint, value in bounds if value is None]
+    stands = None if history is None else standing(values, breaks, history)
     return ComparedArm(
         name=name,
         joints=int((evaluation.arms.motion < FIXED).sum()),
@@ -258,26 +271,31 @@ def _compared(
         measures={objective.name: _known(objective, evaluation) for objective in MEASURES},
         dominates=None if stands is None else stands[0],
         dominated_by=None if stands is None else stands[1],
+        breaks=breaks,
         notes=tuple(said),
     )
 
 
-def _known(objective: Objective, evaluation: Evaluation) -> float | None:
-    """None where the objective needs efforts or prices that the arm does not state."""
+def _known(quantity: Quantity, evaluation: Evaluation) -> float | None:
+    """None where it needs efforts or prices that the arm does not state, or its shape, of which only lines are read."""
     actuation = evaluation.arms.actuation
-    if objective.name == TORQUE_USE.name and actuation is None:
+    if quantity.name == TORQUE_USE.name and actuation is None:
         return None
-    if objective.name == "price" and (actuation is None or np.isnan(actuation.price).any()):
+    if quantity.name == PRICE.name and (actuation is None or np.isnan(actuation.price).any()):
         return None
-    return float(objective(evaluation)[0])
+    if quantity.name in {known.name for known in OF_CLEARANCE}:
+        return None
+    return float(quantity(evaluation)[0])
 
 
 def _of_front(history: History) -> list[ComparedArm]:
     """Of the front its most precise design, its knee, and the one with least of the last objective."""
     reference = history.reference_point or (np.inf,) * len(history.problem.objectives)
-    numbers = front_numbers(history.values)
-    first, last = solution_numbers(history.values, reference) or (numbers[0], numbers[-1])
-    knee = knee_number(history.values, reference)
+    numbers = front_numbers(history.counted)
+    if not numbers:
+        return []
+    first, last = solution_numbers(history.counted, reference) or (numbers[0], numbers[-1])
+    knee = knee_number(history.counted, reference)
     chosen = [number for number in dict.fromkeys((first, knee, last)) if number is not None]
     return [_of_design(history, history.member(number)) for number in chosen]
 
@@ -285,17 +303,18 @@ def _of_front(history: History) -> list[ComparedArm]:
 def _of_design(history: History, member: FrontMember) -> ComparedArm:
     name = f"#{member.number} {member.design.joints}"
     compared = _compared(history.problem, None, name, member.arm, member.arm.base)
-    return replace(compared, values=member.values, notes=())
+    return replace(compared, values=member.values, breaks=(), notes=())
 
 
-def standing(values: Sequence[float | None], history: History) -> tuple[int, int] | None:
-    """How many designs of the front an arm of these values dominates, and by how many it is; None where one is unknown.
+def standing(values: Sequence[float | None], breaks: Sequence[str], history: History) -> tuple[int, int] | None:
+    """How many designs of the front an arm of these values dominates, and by how many it is.
 
-    One arm dominates another that is worse in one objective and better in none.
+    One arm dominates another that is worse in one objective and better in none. None where a value is not known, and
+    for an arm that breaks a constraint.
     """
-    if None in values or not len(history):
+    if None in values or breaks or not history.front:
         return None
-    own, front = np.array(values, dtype=np.float64), history.values[front_numbers(history.values)]
+    own, front = np.array(values, dtype=np.float64), np.array([member.values for member in history.front])
     dominates = np.all(own <= front, axis=1) & np.any(own < front, axis=1)
     dominated_by = np.all(front <= own, axis=1) & np.any(front < own, axis=1)
     return int(dominates.sum()), int(dominated_by.sum())

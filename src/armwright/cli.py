@@ -146,6 +146,10 @@ def optimize(
         bool, typer.Option("--once", help="With manual:DIR: take the answers that are there, and exit at a question.")
     ] = False,
     robust: Robust = False,
+    start: Annotated[
+        list[Path] | None,
+        typer.Option(help="A design to begin with, such as designs/0042/design.json of a run; several may be given."),
+    ] = None,
     polish_every: Annotated[
         int | None,
         typer.Option(help="After so many counted trials, one refines a design of the front by 1000 evaluations."),
@@ -168,6 +172,7 @@ def optimize(
     """Search designs for TASK. The same command again resumes or shows the run; a larger --n-total extends it."""
     from armwright import console as view
     from armwright.proposers.choice import Wishes, choose_proposer
+    from armwright.starts import read_design
     from armwright.study import optimize as run_study
 
     words = view.stderr_console() if json_ else view.stdout_console()
@@ -196,6 +201,7 @@ def optimize(
                 n_total=n_total,
                 in_flight=(1 if in_flight is None else in_flight) if overlap else None,
                 polish_every=polish_every,
+                start=[read_design(file, problem.space) for file in start or ()],
                 on_model_failure=on_model_failure,
                 verify=verify,
                 seed=seed,
@@ -587,7 +593,10 @@ def pick_(
 def export(
     run: Annotated[Path, typer.Argument(help="A run folder.")],
     design: Annotated[int | None, typer.Option(help="Its number; without it, the knee of the front.")] = None,
-    format_: Annotated[str, typer.Option("--format", help="urdf, mjcf, sheet (Markdown) or sheet-csv.")] = "urdf",
+    format_: Annotated[
+        str,
+        typer.Option("--format", help="urdf, xacro, srdf, ros2_control, sdf, mjcf, sheet (Markdown) or sheet-csv."),
+    ] = "urdf",
     out: Annotated[Path | None, typer.Option(help="File; without it, to stdout.")] = None,
 ) -> None:
     """Write one design of RUN for a simulator or a workshop. Any design of the run, not only those of the front."""

@@ -26,7 +26,8 @@ from armwright.front import FrontProgress, FrontRun
 from armwright.history import FrontMember, History
 from armwright.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.polish import Polished
-from armwright.results import REPORT
+from armwright.problem import Problem
+from armwright.results import REPORT, unmet
 from armwright.study import Progress as StudyProgress
 from armwright.study import Run
 from armwright.task import Task as DesignTask
@@ -62,23 +63,31 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
         console.print(_credit_table(summary["credit"]))
     volume = summary["hypervolume"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    broken = f", {(~history.feasible).sum()} infeasible" if history.problem.constraints else ""
     sources = ", ".join(f"{count} {source}" for source, count in summary["by_source"].items())
     console.print(
         f"hypervolume {volume['final']:.3f} (mean over iterations {volume['mean']:.3f}; reference point {reference})"
     )
-    _show_emptiness(console, volume["final"], "more trials")
+    _show_emptiness(console, history, volume["final"], "more trials")
     _show_standing(console, summary["best_known"])
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
-    console.print(f"{summary['n_trials']} trials{more}: {sources}; {_seconds(summary['seconds'])}")
+    console.print(f"{summary['n_trials']} trials{more}{broken}: {sources}; {_seconds(summary['seconds'])}")
+    if summary["same_arms"]:
+        console.print(
+            f"{summary['same_arms']} trials were the same arm as an earlier one, and were not evaluated again"
+        )
     _show_proposer(console, summary["proposer"])
     scaled = TORQUE in history.problem.objectives
     words = f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; " if scaled else ""
-    console.print(f"{words}{history.problem.space.mass_note}{_payload_note(history.problem.task)}")
+    problem = history.problem
+    console.print(f"{words}{problem.space.mass_note}{_payload_note(problem.task)}{_obstacle_note(problem)}")
     _show_places(console, run.folder, figures)
 
 
 def show_front(console: Console, history: History, summary: dict[str, Any]) -> None:
-    """The front as a table, and how much of it is solid."""
+    """The front as a table, and how much of it is solid; nothing of an empty one."""
+    if not history.front:
+        return
     verified = summary["verification"]
     console.print(_front_table(history, None if verified is None else set(verified["solid_numbers"])))
     if verified is not None:
@@ -97,10 +106,11 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     volume, search = summary["hypervolume"], summary["search"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
     console.print(f"hypervolume {volume['final']:.3f} (reference point {reference}), {len(run.history)} designs")
-    _show_emptiness(console, volume["final"], "a larger --budget")
+    _show_emptiness(console, run.history, volume["final"], "a larger --budget")
     _show_standing(console, summary["best_known"])
     why = {"budget": "the budget is spent", "stall": "the hypervolume hardly grew any more"}[search["ended_by"]]
-    console.print(f"{search['evaluations']:,} evaluations in {search['seconds']:.1f} s; {why}")
+    broken = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
+    console.print(f"{search['evaluations']:,} evaluations{broken} in {search['seconds']:.1f} s; {why}")
     console.print(f"{run.history.problem.space.mass_note}")
     _show_places(console, run.folder, figures)
 
@@ -117,8 +127,10 @@ def show_polish(console: Console, polished: Polished) -> None:
     _show_standing(console, polished.summary["best_known"])
 
 
-def _show_emptiness(console: Console, hypervolume: float, more: str) -> None:
-    if hypervolume == 0.0:
+def _show_emptiness(console: Console, history: History, hypervolume: float, more: str) -> None:
+    if len(history) and not history.feasible.any():
+        console.print(f"{unmet(history)[0].upper()}{unmet(history)[1:]}. Give {more} or looser constraints.")
+    elif hypervolume == 0.0:
         console.print(
             f"The front lies wholly outside the reference point: no design counts yet. Give {more} or another one."
         )
@@ -276,8 +288,12 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
     console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
     if task.objectives is not None:
         console.print(f"  objectives: {', '.join(task.objectives)}")
+    if task.constraints:
+        console.print(f"  constraints: {', '.join(task.constraints)}")
     if task.payloads.any():
         console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
+    for obstacle in task.obstacles:
+        console.print(f"  obstacle: {obstacle.words()}")
     console.print(f"  reference point: {reference}")
     console.print(f"  provenance: {task.provenance}")
     if known is not None:
@@ -342,7 +358,10 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
         )
     names = ", ".join(objective.name for objective in objectives)
     for arm in comparison.arms:
-        stands = "" if comparison.run is None else f"; {_standing_words(arm, comparison.front)} ({names})"
+        broken = f"; breaks {', '.join(arm.breaks)}" if arm.breaks else ""
+        stands = (
+            broken if comparison.run is None or arm.breaks else f"; {_standing_words(arm, comparison.front)} ({names})"
+        )
         console.print(f"{arm.name}: base at {_point(tuple(round(value, 4) for value in arm.base))} m{stands}")
         for note in arm.notes:
             console.print(f"  {note}")
@@ -378,6 +397,13 @@ def stdout_console() -> Console:
 def stderr_console() -> Console:
     """Words on stderr, where stdout is for a program."""
     return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+
+
+def _obstacle_note(problem: Problem) -> str:
+    """That a task's obstacles count for nothing, where that is so."""
+    if not problem.task.obstacles or problem.heeds_clearance:
+        return ""
+    return "; the task's obstacles count in none of the objectives (collision and closeness heed them)"
 
 
 def _payload_note(task: DesignTask) -> str:

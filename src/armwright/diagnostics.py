@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from armwright.credit import front_by_source, masks_by_source
 from armwright.history import BBO, History
+from armwright.parameters import FloatParameter
 from armwright.pareto import Array
 from armwright.symmetry import TOLERANCE, distance_to_planes, symmetry_planes
 
@@ -115,12 +116,14 @@ def are_round(lengths: Sequence[float], step: float) -> bool:
 def repeated(history: History) -> tuple[Mask, Mask]:
     """(N,) and (N,): whether an earlier trial has the same design, and whether one has nearly the same."""
     designs = [trial.design for trial in history]
-    joints = np.array([design.joints for design in designs])
-    numbers = np.array([[*design.origin, *design.links] for design in designs])  # (N, 3 + D) [m]
+    space = history.problem.space
+    rows = space.matrix(designs)
+    real = np.array([isinstance(parameter, FloatParameter) for parameter in space.parameters])
+    numbers, choices = rows[:, real], rows[:, ~real]  # [m]; places among the choices
     repeats, near_repeats = np.zeros((2, len(designs)), dtype=bool)
     for i in range(1, len(designs)):
         apart = np.abs(numbers[:i] - numbers[i]).max(axis=1)
-        apart[joints[:i] != joints[i]] = np.inf
+        apart[np.any(choices[:i] != choices[i], axis=1)] = np.inf
         repeats[i], near_repeats[i] = apart.min() == 0.0, apart.min() <= NEAR + EXACT
     return repeats, near_repeats
 

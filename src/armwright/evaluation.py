@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,15 +10,20 @@ from numpy.typing import ArrayLike, NDArray
 from armwright.arm import Arm
 from armwright.exceptions import TaskError
 from armwright.kinematics.arrays import ArmArrays, stack_arms
+from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
 from armwright.kinematics.solve import solve_postures
+from armwright.obstacles import Obstacle
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """N arms of up to J joints at T targets; 0 for joints that an arm does not have."""
+    """N arms of up to J joints at T targets; 0 for joints that an arm does not have.
+
+    Clearances are computed when they are first asked for.
+    """
 
     arms: ArmArrays
     targets: Array  # (T, 3) [m]
@@ -26,6 +32,8 @@ class Evaluation:
     reached: Array  # (N, T, 3) position of the tip [m]
     position_error: Array  # (N, T) distance from the target [m]
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
+    obstacles: tuple[Obstacle, ...] = ()
+    device: Device = "cpu"
 
     def __len__(self) -> int:
         return len(self.q)
@@ -35,13 +43,39 @@ class Evaluation:
         """(N, T, J) at the actuators: of a sliding joint its force times its travel [N m]."""
         return self.joint_torques * self.arms.travel[:, None]
 
+    @property
+    def self_clearance(self) -> Array:
+        """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none."""
+        return self._clearances[0]
 
-def evaluate(arms: Sequence[Arm], targets: ArrayLike, device: Device = "cpu", payload: ArrayLike = 0.0) -> Evaluation:
+    @property
+    def obstacle_clearance(self) -> Array:
+        """(N, T) smallest distance of a link from an obstacle [m]; infinite where there is none."""
+        return self._clearances[1]
+
+    @property
+    def clearance(self) -> Array:
+        """(N, T) the smaller of both [m]; below 0 where the arm is in an obstacle or in itself."""
+        return np.minimum(*self._clearances)
+
+    @cached_property
+    def _clearances(self) -> tuple[Array, Array]:
+        return clearances(self.arms, self.q, self.obstacles, self.device)
+
+
+def evaluate(
+    arms: Sequence[Arm],
+    targets: ArrayLike,
+    device: Device = "cpu",
+    payload: ArrayLike = 0.0,
+    obstacles: Sequence[Obstacle] = (),
+) -> Evaluation:
     """Every arm at every target. Not reaching a target is a result, never an exception.
 
     targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
+    obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
     """
-    return evaluate_arrays(stack_arms(arms), targets, device, payload=payload)
+    return evaluate_arrays(stack_arms(arms), targets, device, payload=payload, obstacles=obstacles)
 
 
 def evaluate_arrays(
@@ -50,6 +84,7 @@ def evaluate_arrays(
     device: Device = "cpu",
     start: ArrayLike | None = None,
     payload: ArrayLike = 0.0,
+    obstacles: Sequence[Obstacle] = (),
 ) -> Evaluation:
     """The same for arms that are stacked already, in their precision.
 
@@ -69,6 +104,8 @@ def evaluate_arrays(
         reached=reached,
         position_error=np.linalg.norm(reached - targets, axis=-1),
         joint_torques=postures.torque.astype(np.float64),
+        obstacles=tuple(obstacles),
+        device=device,
     )
 
 

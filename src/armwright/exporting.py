@@ -7,11 +7,16 @@ from pathlib import Path
 from armwright.decision import pick
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.export.mjcf import to_mjcf
+from armwright.export.ros2_control import to_ros2_control
+from armwright.export.sdf import to_sdf
 from armwright.export.sheet import SheetRow, sheet_markdown, sheet_rows
+from armwright.export.srdf import to_srdf
 from armwright.export.urdf import to_urdf
+from armwright.export.xacro import to_xacro
 from armwright.history import FrontMember, History
 from armwright.results import as_csv
 from armwright.run_folder import read_run
+from armwright.space import DesignSpace
 
 
 def export_design(run: Path, number: int | None, kind: str) -> str:
@@ -51,9 +56,22 @@ def _sheet_csv(history: History, member: FrontMember) -> str:
     return as_csv(rows)
 
 
+def mass_per_metre(space: DesignSpace) -> float:
+    """By how much a link gets heavier with its length [kg/m]; every mass model is a straight line over it."""
+    return space.mass.mass(1.0) - space.mass.mass(0.0)
+
+
+def _xacro(history: History, member: FrontMember) -> str:
+    return to_xacro(member.arm, _name(history, member), mass_per_metre(history.problem.space))
+
+
 FORMATS: dict[str, Callable[[History, FrontMember], str]] = {
     "urdf": lambda history, member: to_urdf(member.arm, _name(history, member)),
     "mjcf": lambda history, member: to_mjcf(member.arm, _name(history, member)),
+    "sdf": lambda history, member: to_sdf(member.arm, _name(history, member)),
+    "xacro": _xacro,
+    "srdf": lambda history, member: to_srdf(member.arm, _name(history, member)),
+    "ros2_control": lambda history, member: to_ros2_control(member.arm, _name(history, member)),
     "sheet": _sheet,
     "sheet-csv": _sheet_csv,
 }

@@ -11,10 +11,12 @@ from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.arrays import FIXED, Actuation
 
 TORQUE_SCALE = 40.0  # α of the paper
+FAR = 1.0  # [m]; a clearance counts as no more
 REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
+COMFORTABLE = 0.1  # [m] of clearance, beyond which more of it is worth nothing
 MOST_OBJECTIVES = 5  # of which the hypervolume is still computed in no time
 
-Over = Literal["sum", "max", "mean square", "arm"]
+Over = Literal["sum", "max", "min", "mean square", "arm"]
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Objective:
     symbol: its name in formulas and prompts.
     words: what its share of one target is, for a reader who knows nothing of this program; of "arm", what it is.
     each: its share per target, (N, T); of "arm" what the arm itself is, (N,), whatever the targets.
-    over: what is made of the shares: their sum, the largest, or the root of their mean square.
+    over: what is made of the shares: their sum, the largest, the least, or the root of their mean square.
     """
 
     name: str
@@ -43,6 +45,8 @@ class Objective:
                 return each.sum(axis=1)
             case "max":
                 return each.max(axis=1)
+            case "min":
+                return each.min(axis=1)
             case "mean square":
                 return np.sqrt(np.mean(each**2, axis=1))
             case "arm":
@@ -183,9 +187,54 @@ LENGTH = Objective(
     each=lambda evaluation: evaluation.arms.length,
     over="arm",
 )
+COLLISION = Objective(
+    name="collision",
+    label="Collision",
+    unit="m",
+    symbol="E_collision",
+    words="how deep the arm in the kept posture is in an obstacle or in itself, at the worst place; 0 where it is free",
+    each=lambda evaluation: np.maximum(0.0, -evaluation.clearance),
+)
+CLOSENESS = Objective(
+    name="closeness",
+    label="Closeness",
+    unit="m",
+    symbol="E_closeness",
+    words=f"by how much the arm in the kept posture comes nearer than {COMFORTABLE:g} m to an obstacle or to itself; "
+    f"above {COMFORTABLE:g} it is in it",
+    each=lambda evaluation: np.maximum(0.0, COMFORTABLE - evaluation.clearance),
+    over="max",
+)
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
-_ALL = (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS)
+_ALL = (
+    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS, COLLISION,
+    CLOSENESS,
+)  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
+
+
+def _clearance(name: str, words: str, each: Callable[[Evaluation], Array]) -> Objective:
+    """Of which more is better, so that it can only be bounded."""
+    return Objective(
+        name=name,
+        label=name.replace("_", " ").capitalize(),
+        unit="m",
+        symbol=name,
+        words=f"{words}; below 0 it is in it, and {FAR:g} where there is nothing near",
+        each=lambda evaluation: np.minimum(each(evaluation), FAR),
+        over="min",
+    )
+
+
+CLEARANCES: tuple[Objective, ...] = (
+    _clearance(
+        "clearance", "how far the arm in the kept posture is from obstacles and from itself", lambda e: e.clearance
+    ),
+    _clearance("self_clearance", "how far the arm in the kept posture is from itself", lambda e: e.self_clearance),
+    _clearance("obstacle_clearance", "how far the arm in the kept posture is from obstacles",
+               lambda e: e.obstacle_clearance),
+)  # fmt: skip
+OF_CLEARANCE = (COLLISION, CLOSENESS, *CLEARANCES)
 
 
 def named_objectives(names: Sequence[str]) -> tuple[Objective, ...]:

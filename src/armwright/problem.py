@@ -6,11 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from armwright.arm import Arm
+from armwright.constraints import Constraint, read_constraints
 from armwright.evaluation import Array, Evaluation, evaluate_arrays
 from armwright.exceptions import SettingsError, TaskError
+from armwright.feasibility import ranked
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.objectives import PAPER_OBJECTIVES, Objective, named_objectives
+from armwright.objectives import OF_CLEARANCE, PAPER_OBJECTIVES, Objective, named_objectives
 from armwright.parameters import Design
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
@@ -27,6 +29,7 @@ class Problem:
         built exactly or with its base or one link off by so much (`armwright.tolerance`).
     device: where arms are evaluated; `resolve_device` says which there are.
     objectives: what is minimised, of one's own too; without them, the task's, else the paper's.
+    constraints: what a design has to keep, as the task says it.
     """
 
     task: Task
@@ -34,9 +37,14 @@ class Problem:
     tolerance: float = 0.0
     device: Device = "cpu"
     objectives: tuple[Objective, ...] = ()
+    constraints: tuple[Constraint, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
-        """Settles device and objectives; TaskError where the task's reference point is for other objectives."""
+        """Settles device, objectives and constraints.
+
+        TaskError where the task's reference point is for other objectives, or a constraint cannot be understood.
+        """
+        object.__setattr__(self, "constraints", read_constraints(self.task.constraints))
         if not self.objectives:
             names = self.task.objectives
             object.__setattr__(self, "objectives", PAPER_OBJECTIVES if names is None else named_objectives(names))
@@ -56,6 +64,12 @@ class Problem:
         """The worst values that count for the hypervolume, where the task states them."""
         return self.task.reference_point
 
+    @property
+    def heeds_clearance(self) -> bool:
+        """Whether it counts where the arm is in an obstacle or in itself."""
+        counted = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
+        return any(quantity.name in counted for quantity in OF_CLEARANCE)
+
     def arm(self, design: Design) -> Arm:
         """The physical chain that a design builds."""
         return self.space.arm(design)
@@ -70,23 +84,36 @@ class Problem:
 
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
-        return evaluate_arrays(arms, self.task.points, self.device, start, self.task.payloads)
+        task = self.task
+        return evaluate_arrays(arms, task.points, self.device, start, task.payloads, task.obstacles)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
-        """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
+        """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""
+        return self.judge_matrix(matrix)[0]
+
+    def judge_matrix(self, matrix: Array) -> tuple[Array, Array]:
+        """(N, M) and (N, C) as `judge`, for designs as rows.
 
         Only the postures of a chunk of them are in memory at a time.
         """
         matrix = self.space.settled(matrix)
         size = max(1, POSTURES_AT_ONCE[self.device] // len(self.task.points))
-        values = np.empty((len(matrix), len(self.objectives)))
+        found = np.empty((len(matrix), len(self.objectives) + len(self.constraints)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
-            values[rows] = self.values(self.evaluation_of_rows(matrix[rows]))
+            found[rows] = self.judged(self.evaluation_of_rows(matrix[rows]))
             if self.tolerance > 0.0:
                 for copies in moved(self.space, matrix[rows], self.tolerance):
-                    values[rows] = np.maximum(values[rows], self.values(self.evaluation_of_rows(copies)))
-        return values
+                    found[rows] = np.maximum(found[rows], self.judged(self.evaluation_of_rows(copies)))
+        return self.split(found)
+
+    def ranked_matrix(self, matrix: Array) -> Array:
+        """(N, M) of designs as rows: their objectives, or for infeasible ones numbers that lie behind all of these.
+
+        What a search compares designs by, where it knows nothing of constraints.
+        """
+        values, broken = self.judge_matrix(matrix)
+        return ranked(values, broken) if self.constraints else values
 
     def values(self, evaluation: Evaluation) -> Array:
         """(N, M): the objectives of evaluated designs, minimised; SettingsError where one is not a finite number."""
@@ -99,10 +126,35 @@ class Problem:
             )
         return values
 
-    def evaluate(self, designs: Sequence[Design]) -> Array:
-        """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
-        values = self.values(self.evaluation(designs))
+    def judged(self, evaluation: Evaluation) -> Array:
+        """(N, M + C): the objectives of evaluated designs, then how far each constraint is broken."""
+        values = self.values(evaluation)
+        if not self.constraints:
+            return values
+        broken = np.column_stack([constraint(evaluation) for constraint in self.constraints])
+        if not np.all(np.isfinite(broken)):
+            row, column = np.argwhere(~np.isfinite(broken))[0]
+            raise SettingsError(
+                f'constraint "{self.constraints[column].words}" is {broken[row, column]} for a design; it must be a '
+                "finite number for every design"
+            )
+        return np.hstack([values, broken])
+
+    def split(self, judged: Array) -> tuple[Array, Array]:
+        """(N, M) and (N, C): the objectives and the constraints of `judged`."""
+        return judged[:, : len(self.objectives)], judged[:, len(self.objectives) :]
+
+    def judge(self, designs: Sequence[Design]) -> tuple[Array, Array]:
+        """(N, M) and (N, C): the objectives of N designs, and how far they break each constraint, <= 0: not at all.
+
+        With a tolerance, the worst of each by itself.
+        """
+        found = self.judged(self.evaluation(designs))
         if self.tolerance > 0.0:
             for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
-                values = np.maximum(values, self.values(self.evaluation_of_rows(copies)))
-        return values
+                found = np.maximum(found, self.judged(self.evaluation_of_rows(copies)))
+        return self.split(found)
+
+    def evaluate(self, designs: Sequence[Design]) -> Array:
+        """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
+        return self.judge(designs)[0]

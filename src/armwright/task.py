@@ -9,13 +9,14 @@ import shlex
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Self
+from typing import Any, Self, cast
 
 import numpy as np
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
+from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
 
 Point = tuple[float, float, float]
 
@@ -31,17 +32,33 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from.
 
     payload: what the tip carries at all targets, or at each [kg].
+    obstacles: what the arm should keep away from; they count where an objective is of clearance.
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two.
+    constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
+    obstacles: tuple[Obstacle, ...] = ()
     objectives: tuple[str, ...] | None = None
+    constraints: tuple[str, ...] = ()
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
     description: str = Field(default="", max_length=10_000)
     provenance: str = Field(default="", max_length=10_000)
+
+    @field_validator("obstacles", mode="before")
+    @classmethod
+    def _check_obstacles(cls, value: Any) -> Any:
+        if not isinstance(value, (list, tuple)):
+            raise ValueError("obstacles is a list of records, such as {kind: ground, z: 0.0}")
+        records = cast("list[Any]", value)
+        if len(records) > MOST_OBSTACLES:
+            raise ValueError(f"obstacles has {len(records)} records; at most {MOST_OBSTACLES} are allowed")
+        for number, record in enumerate(records, start=1):
+            check_obstacle(record, number)
+        return records
 
     @model_validator(mode="after")
     def _check_numbers(self) -> Self:
@@ -179,9 +196,22 @@ targets:
 # What the tip carries: at every target, or a list with a value for each [kg].
 # payload: 0.5
 
+# What the arm should keep away from, in metres; it counts with the objective collision or closeness.
+# obstacles:
+#   - {{kind: ground, z: 0.0}}
+#   - {{kind: box, name: shelf, center: [0.4, 0.0, 0.2], size: [0.3, 0.6, 0.02], yaw: 0.0}}
+#   - {{kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}}
+#   - {{kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}}
+
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length.
+# rms_torque, mass, length, collision, closeness.
 # objectives: [worst_error, peak_torque, mass]
+
+# What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number
+# in its unit.
+# constraints:
+#   - worst_error <= 0.01
+#   - mass <= 3
 
 # Worst values that still count, for the hypervolume: [position error summed over the targets in m,
 # torque summed over the targets in N m, times 40], or one for each of the objectives. Without it, 1.1 x the worst

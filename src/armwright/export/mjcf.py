@@ -15,6 +15,8 @@ from armwright.export.shapes import (
     number,
     numbers,
     text_of,
+    tip_place,
+    tip_turn,
 )
 
 TYPES = {"revolute": "hinge", "prismatic": "slide"}  # a fixed joint is a body without a joint
@@ -49,14 +51,17 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
         _add_joint(body, f"joint_{n}", joint)
         _add_link(body, joint, link)
         place = link.offset
-    tip = {"name": "tip", "pos": numbers(place), "size": number(arm.links[-1].radius), "rgba": TIP_COLOUR}
+    turn = tip_turn(arm)
+    tip = {"name": "tip", "pos": numbers(tip_place(arm)), "size": number(arm.links[-1].radius), "rgba": TIP_COLOUR}
+    if any(turn):
+        tip["euler"] = numbers(turn)
     ElementTree.SubElement(body, "site", tip)
     actuators = ElementTree.SubElement(root, "actuator")
     for n, joint in enumerate(arm.joints, start=1):
         if joint.kind != "fixed":
             motor = {"name": f"motor_{n}", "joint": f"joint_{n}", "gear": "1"}
-            if joint.actuator is not None:
-                motor["ctrlrange"] = f"{number(-joint.actuator.effort)} {number(joint.actuator.effort)}"
+            if joint.effort is not None:
+                motor["ctrlrange"] = f"{number(-joint.effort)} {number(joint.effort)}"
             ElementTree.SubElement(actuators, "motor", motor)
     return text_of(root)
 

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import Link, Vector
+from armwright.arm import Arm, Link, Vector
 
 AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 COLOURS = {
@@ -15,6 +15,8 @@ COLOURS = {
     "joint_y": "0.00 0.45 0.70 1",
     "joint_z": "0.00 0.62 0.45 1",
 }
+
+MARKER = 1.4  # a joint's sphere to its link's radius
 
 # MuJoCo refuses a moving body without mass: it is to take these where a link has less.
 BOUNDS = {"boundmass": "1e-12", "boundinertia": "1e-14"}  # [kg], [kg m²]
@@ -45,10 +47,44 @@ def inertia_tensor(link: Link) -> NDArray[np.float64]:
     return tensor
 
 
+def inertia_frame(link: Link) -> Vector:
+    """Roll, pitch, yaw [rad] of the frame that `moments` are in: along the link, where nothing sits at its end."""
+    return along(link.offset) if link.end_mass == 0.0 else (0.0, 0.0, 0.0)
+
+
+def moments(link: Link) -> dict[str, str]:
+    """About the centre of mass, in `inertia_frame` [kg m²]."""
+    if link.end_mass == 0.0:
+        across, around = cylinder_inertia(link)
+        return {"ixx": across, "iyy": across, "izz": around, "ixy": "0", "ixz": "0", "iyz": "0"}
+    tensor = inertia_tensor(link)
+    places = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+    return {name: f"{tensor[place]:.17g}" for name, place in places.items()}
+
+
 def along(offset: Vector) -> Vector:
     """Roll, pitch, yaw [rad] of the frame whose z points along `offset`."""
     x, y, z = offset
     return (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))
+
+
+def tip_place(arm: Arm) -> Vector:
+    """Of the tip, from the last joint [m]."""
+    (x, y, z), (u, v, w) = arm.links[-1].offset, arm.tool
+    return (x + u, y + v, z + w)
+
+
+def tip_turn(arm: Arm) -> Vector:
+    """Roll, pitch, yaw [rad] of the tip's frame in the last link's: z is the tool's axis and x its side."""
+    z = np.array(arm.tool_axis) / np.linalg.norm(arm.tool_axis)
+    y = np.cross(z, arm.tool_side)
+    y = y / np.linalg.norm(y)
+    x = np.cross(y, z)
+    level = math.hypot(x[0], x[1])
+    pitch = math.atan2(-x[2], level)
+    # Pointing straight up or down, roll and yaw turn about the same line: it is all yaw.
+    roll, yaw = (math.atan2(y[2], z[2]), math.atan2(x[1], x[0])) if level > 1e-9 else (0.0, math.atan2(-y[0], y[1]))
+    return (roll + 0.0, pitch + 0.0, yaw + 0.0)  # no -0.0
 
 
 def middle(link: Link) -> Vector:
@@ -59,7 +95,7 @@ def middle(link: Link) -> Vector:
 
 def marker_radius(link: Link) -> float:
     """Of the sphere that shows a joint: a little more than its link [m]."""
-    return 1.4 * link.radius
+    return MARKER * link.radius
 
 
 def number(value: float) -> str:

@@ -3,31 +3,36 @@
 from xml.etree import ElementTree
 
 from armwright.arm import Arm, Joint, Link, Vector
+from armwright.export.limits import limits_of
 from armwright.export.shapes import (
     AXIS_VECTORS,
     BOUNDS,
     COLOURS,
     along,
-    cylinder_inertia,
-    inertia_tensor,
+    inertia_frame,
     marker_radius,
     middle,
+    moments,
     number,
     numbers,
     text_of,
+    tip_place,
+    tip_turn,
 )
-
-# URDF demands both for a moving joint; without an actuator they only have to be out of the way.
-EFFORT = 100.0  # [N m] or [N]
-VELOCITY = 10.0  # [rad/s] or [m/s]
 
 
 def to_urdf(arm: Arm, name: str = "arm") -> str:
     """The URDF of an arm: `world`, a fixed joint to `base`, then joint_1, link_1, …, and a frame `tip`.
 
-    Link frames stand at their joints; with all joints at 0 they are parallel to the world's. Links are
-    solid cylinders of uniform density from joint to joint, for inertia, collision and sight.
+    Link frames stand at their joints; with all joints at 0 they are parallel to the world's. The tip is the tool's, its
+    z along the tool's axis and its x to the tool's side. Links are solid cylinders of uniform density from joint to
+    joint, for inertia, collision and sight.
     """
+    return text_of(urdf_tree(arm, name))
+
+
+def urdf_tree(arm: Arm, name: str) -> ElementTree.Element:
+    """The same before it is text, for what adds to it."""
     robot = ElementTree.Element("robot", name=name)
     # MuJoCo would otherwise dissolve `base` and `tip`, drop what is only to be seen, and refuse links without mass.
     compiler = ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler")
@@ -44,35 +49,27 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
         element = _add_joint(robot, f"joint_{n}", joint.kind, parent, child, place)
         if joint.kind != "fixed":
             ElementTree.SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
-            motor = joint.actuator
-            effort = EFFORT if motor is None else motor.effort
-            velocity = VELOCITY if motor is None or motor.speed is None else motor.speed
-            limits = {"lower": joint.lower, "upper": joint.upper, "effort": effort, "velocity": velocity}
-            ElementTree.SubElement(element, "limit", {key: number(value) for key, value in limits.items()})
+            ElementTree.SubElement(element, "limit", {key: number(value) for key, value in limits_of(joint).items()})
         parent, place = child, link.offset
     ElementTree.SubElement(robot, "link", name="tip")
-    _add_joint(robot, "tip_joint", "fixed", parent, "tip", place)
-    return text_of(robot)
+    _add_joint(robot, "tip_joint", "fixed", parent, "tip", tip_place(arm), tip_turn(arm))
+    return robot
 
 
 def _add_joint(
-    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, xyz: Vector
+    robot: ElementTree.Element,
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    xyz: Vector,
+    rpy: Vector = (0.0, 0.0, 0.0),
 ) -> ElementTree.Element:
     element = ElementTree.SubElement(robot, "joint", name=name, type=kind)
     ElementTree.SubElement(element, "parent", link=parent)
     ElementTree.SubElement(element, "child", link=child)
-    ElementTree.SubElement(element, "origin", xyz=numbers(xyz), rpy="0 0 0")
+    ElementTree.SubElement(element, "origin", xyz=numbers(xyz), rpy=numbers(rpy))
     return element
-
-
-def _moments(link: Link) -> dict[str, str]:
-    """About the centre of mass: along the link's own axes, or with what sits at its end in the link's frame."""
-    if link.end_mass == 0.0:
-        across, around = cylinder_inertia(link)
-        return {"ixx": across, "iyy": across, "izz": around, "ixy": "0", "ixz": "0", "iyz": "0"}
-    tensor = inertia_tensor(link)
-    places = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
-    return {name: f"{tensor[place]:.17g}" for name, place in places.items()}
 
 
 def _add_link(robot: ElementTree.Element, name: str, joint: Joint, link: Link) -> None:
@@ -80,10 +77,9 @@ def _add_link(robot: ElementTree.Element, name: str, joint: Joint, link: Link) -
     rpy = numbers(along(link.offset))
     # Stated for a mass of 0 too: where it is not, MuJoCo takes water's density and scikit-robot takes 1 g.
     inertial = ElementTree.SubElement(element, "inertial")
-    turned = rpy if link.end_mass == 0.0 else "0 0 0"
-    ElementTree.SubElement(inertial, "origin", xyz=numbers(link.total_com), rpy=turned)
+    ElementTree.SubElement(inertial, "origin", xyz=numbers(link.total_com), rpy=numbers(inertia_frame(link)))
     ElementTree.SubElement(inertial, "mass", value=number(link.total_mass))
-    ElementTree.SubElement(inertial, "inertia", _moments(link))
+    ElementTree.SubElement(inertial, "inertia", moments(link))
     if link.length > 0.0:
         for purpose in ("visual", "collision"):
             body = ElementTree.SubElement(element, purpose)

@@ -25,7 +25,7 @@ Ints = NDArray[np.int32]
 Array = NDArray[np.float64]
 
 FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
-ARRAYS = (*FLOATS, "motion")  # of `ArmArrays`, that the kernels read
+ARRAYS = (*FLOATS, "motion")  # of `ArmArrays`, that inverse kinematics takes
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,8 @@ class ArmArrays:
     offset: Floats  # (N, D, 3) from a joint to the next, or to the tip of the tool [m]
     com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next [m]
     mass: Floats  # (N, D) [kg]
+    radius: Floats  # (N, D) of the link after a joint [m]; 0 where there is none
+    tool: Array  # (N, 3) from the end of the last link to the tip [m], in its own frame; a part of `offset`
     n_joints: Ints  # (N,) how many of the D an arm has
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 where it turns [m/rad]
     length: Array  # (N,) of all links [m]
@@ -108,7 +110,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     motion = np.full((n, dof), FIXED, dtype=np.int32)
     lower, upper, travel = np.full((3, n, dof), 1.0)
     lower *= -1.0
-    mass = np.zeros((n, dof))
+    mass, radius = np.zeros((2, n, dof))
     offset, com = np.zeros((2, n, dof, 3))
     for i, arm in enumerate(arms):
         own = slice(len(arm.joints))
@@ -120,6 +122,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         offset[i, len(arm.joints) - 1] += arm.tool
         com[i, own] = [link.total_com for link in arm.links]
         mass[i, own] = [link.total_mass for link in arm.links]
+        radius[i, own] = [link.radius if link.length > 0.0 else 0.0 for link in arm.links]
     return ArmArrays(
         base=np.array([arm.base for arm in arms], dtype=precision),
         motion=motion,
@@ -128,6 +131,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         offset=offset.astype(precision),
         com=com.astype(precision),
         mass=mass.astype(precision),
+        radius=radius.astype(precision),
+        tool=np.array([arm.tool for arm in arms]),
         n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
         travel=travel,
         length=np.array([arm.length for arm in arms]),
@@ -207,7 +212,10 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
     masses_[..., -1] = total
     travel = np.where(slides, space.travel, 1.0)
     motion = np.where(plan < FIXED, plan // SLIDES * SLIDES + axis, FIXED)
+    radius = np.zeros(shape)
+    radius[..., -1] = np.where(links > 0.0, space.link_radius, 0.0)
     flat = {
+        "radius": radius,
         "motion": motion, "lower": lower, "upper": upper, "offset": offset, "com": com, "mass": masses_,
         "travel": travel,
     }  # fmt: skip
@@ -218,8 +226,8 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
     there = there.reshape(n, places)
     n_joints = there.sum(axis=1).astype(np.int32)
     flat = _compact(flat, there)
-    if any(space.tool):
-        flat["offset"][np.arange(n), n_joints - 1] += _tool(space, read)
+    tool = _tool(space, read)
+    flat["offset"][np.arange(n), n_joints - 1] += tool
     return ArmArrays(
         base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
         motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
@@ -228,6 +236,8 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
         offset=flat["offset"].astype(precision),
         com=flat["com"].astype(precision),
         mass=flat["mass"].astype(precision),
+        radius=flat["radius"].astype(precision),
+        tool=tool,
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(links, axis=1)[:, -1],

@@ -25,6 +25,17 @@ def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:
     return np.array([*places, place + frame @ np.array(arm.tool)])
 
 
+def link_lines(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
+    """(2, 3) each: where the links, and the tool where there is one, begin and end [m]; q: as above."""
+    places, frame = joint_positions(arm, q), np.eye(3)
+    lines: list[Array] = []
+    for joint, link, value, place in zip(arm.joints, arm.links, q, places[:-1], strict=True):
+        if joint.kind == "revolute":
+            frame = frame @ rotation(joint.axis, value)
+        lines.append(np.array([place, place + frame @ np.array(link.offset)]))
+    return [*lines, np.array([lines[-1][1], places[-1]])]
+
+
 def rotation(axis: Axis, angle: float) -> Array:
     """(3, 3) about local x, y or z by `angle` [rad]."""
     s, c = np.sin(angle), np.cos(angle)

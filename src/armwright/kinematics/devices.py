@@ -49,6 +49,12 @@ def load(precision: Precision, lanes: int, motions: Motions, device: Device) -> 
         return _warp(), _load(precision, lanes, motions, device)
 
 
+def load_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
+    """Warp and one variant of the kernels of clearance, likewise."""
+    with _loading:
+        return _warp(), _load_clearance(precision, device)
+
+
 def _has_cuda() -> bool:
     with _loading:
         return bool(_warp().is_cuda_available())
@@ -71,6 +77,17 @@ def _load(precision: Precision, lanes: int, motions: Motions, device: Device) ->
 
         kernels = kernels_of(precision, lanes, motions)
         for kernel in (kernels.descend, kernels.hold):
+            kernel.module.load(device)
+    return kernels
+
+
+@cache
+def _load_clearance(precision: Precision, device: Device) -> Any:
+    with _said_where_it_is_kept():
+        from armwright.kinematics.clearance_kernels import clearance_kernels_of
+
+        kernels = clearance_kernels_of(precision)
+        for kernel in (kernels.place, kernels.part, kernels.clear):
             kernel.module.load(device)
     return kernels
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.exceptions import ArmError, FailureError, SettingsError
-from armwright.kinematics.arrays import ARRAYS, FLOATS, ArmArrays, Floats, Precision, checked_precision
+from armwright.kinematics.arrays import ARRAYS, FIXED, FLOATS, ArmArrays, Floats, Precision, checked_precision
 from armwright.kinematics.devices import Device, cores, load, resolve_device
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
@@ -53,7 +53,7 @@ def solve_postures(
 
     targets: (T, 3) [m]; how many is a question of memory alone.
     start: values [rad] or [m] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without
-    it all arms start straight, at 0.
+    it all arms start straight, at 0; fixed joints stay there.
     payload: (T,) point masses that the tip carries at the targets [kg]; without it none.
     precision: of the results. "float64" takes arms of either precision, "float32" only its own.
     The same arm, target and start give the same bits on the same device, whatever is solved beside them.
@@ -64,7 +64,9 @@ def solve_postures(
     device = resolve_device(device, many=True)
     n, t, dof = len(arms), len(targets), arms.dof
     start = None if start is None and arms.starts_at_zero else np.zeros(1) if start is None else start
-    starts = None if start is None else _broadcast(start, (n, t, dof))
+    starts = None
+    if start is not None:
+        starts = np.where(arms.motion[:, None] == FIXED, 0.0, _broadcast(start, (n, t, dof)))
     loaded = np.column_stack([targets, np.zeros(t) if payload is None else payload])
     solved = Postures(*(np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof)))
     parts = _parts(n, t, LANES[device])
@@ -81,7 +83,7 @@ def solve_postures(
     if device == "cuda":
         _one_after_another(solve, n, size)
     else:
-        _in_threads(solve, n, min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups))))
+        in_threads(solve, n, min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups))))
     return solved
 
 
@@ -90,6 +92,9 @@ def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_befo
 
     targets: (N, 3) [m].  q, the limit gradients h_before, and both results: (N, D). All is of the arms' precision.
     """
+    shape = (len(arms), arms.dof)
+    if q.shape != shape or h_before.shape != shape:
+        raise ArmError(f"q and h_before must have the shape {shape}: arms, joints; not {q.shape} and {h_before.shape}")
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
     moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
     lanes = LANES["cpu"]
@@ -278,7 +283,7 @@ def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> Non
             first += size
 
 
-def _in_threads(solve: Callable[[slice], None], n: int, size: int) -> None:
+def in_threads(solve: Callable[[slice], None], n: int, size: int) -> None:
     """Solves n arms in chunks of `size`, by as many threads as there are cores."""
     chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
     if len(chunks) == 1:

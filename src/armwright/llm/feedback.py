@@ -57,12 +57,13 @@ class Digits:
 class Feedback:
     """Members of the front and other finished designs, drawn by `seed`, as text.
 
-    front, others: numbers of the trials; of the front by its first objective, else in the order of the run.
+    front, others: numbers of the trials; of the front by its first objective, else in the order of the run. As long as
+        no design is feasible, what comes nearest to it stands in for the front.
     """
 
     def __init__(self, history: History, seed: int) -> None:
         rng = np.random.default_rng(seed)
-        front = [member.number for member in history.front]
+        front = [member.number for member in history.front] or history.nearest(N_PARETO)
         on_front = set(front)
         others = [trial.number for trial in history if trial.number not in on_front]
         self.front = _draw(front, N_PARETO, rng)
@@ -92,6 +93,7 @@ class Feedback:
             "limits": _limits(evaluation, row, joints),
             "load": _load(evaluation.motor_torques[row], joints),
             "e_all": vector(self._history.trials[number].values, at.objectives),
+            "broken": _broken(self._history, number),
         }
 
 
@@ -104,6 +106,7 @@ def proposal_records(history: History, name: str) -> list[Record]:
             **_parameters(history, trial.number, at.length),
             "expected": "not said" if trial.expected is None else vector(trial.expected, at.objectives),
             "e_all": vector(trial.values, at.objectives),
+            "broken": _broken(history, trial.number),
             "on_front": trial.number in front,
             "reason": one_line(trial.reason, LONGEST_REASON) or "not said",
         }
@@ -143,6 +146,17 @@ def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
         "links": vector(design.links, decimals),
         "extras": _extras(history.problem.space, design, decimals),
     }
+
+
+def _broken(history: History, number: int) -> str:
+    """The constraints that a design does not keep, with what it has instead; empty where the task has none."""
+    constraints = history.problem.constraints
+    words = [
+        f"{c.quantity.symbol} = {c.measured(value):.4g}, not {c.relation} {c.bound:.12g}"
+        for c, value in zip(constraints, history.trials[number].constraints, strict=True)
+        if value > 0.0
+    ]
+    return ("; ".join(words) or "none") if constraints else ""
 
 
 def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str, str]]:

@@ -17,16 +17,17 @@ from armwright.arm import AXES, Arm, Joint, Link
 from armwright.best_known import known_front
 from armwright.buying import read_bought, standing
 from armwright.comparison import method_words
-from armwright.decision import numbers_of
+from armwright.decision import bounded_numbers, numbers_of
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
 from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
+from armwright.obstacles import Obstacle
 from armwright.parameters import FloatParameter
 from armwright.pareto import front_numbers, hypervolume, hypervolume_history
 from armwright.report.repeat import repeat_command
-from armwright.report.style import EXISTING, FRONT, JOINT, JOINT_LABEL, MISSED, TARGET, look
+from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.results import read_summary
 from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
 
@@ -85,8 +86,8 @@ class RunContent:
         arrays = _joined([arrays for first, arrays in self._chunks if first >= designs_from])
         curve = np.zeros(0)
         if self.history.reference_point is not None and len(self.history):
-            curve = hypervolume_history(self.history.values, self.history.reference_point)
-        front = front_numbers(self.history.values) if len(self.history) else []
+            curve = hypervolume_history(self.history.counted, self.history.reference_point)
+        front = front_numbers(self.history.counted) if len(self.history) else []
         search = None if self.summary is None or self.study is not None else self.summary["search"]
         spent = None if search is None else search["evaluations"]
         head = {
@@ -111,7 +112,12 @@ class RunContent:
 def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
     """Arms that exist already, as they were last compared with the run, and where they stand beside its front now."""
     return [
-        {"name": arm.name, "values": list(arm.values), "standing": standing(arm.values, history)}
+        {
+            "name": arm.name,
+            "values": list(arm.values),
+            "breaks": list(arm.breaks),
+            "standing": standing(arm.values, arm.breaks, history),
+        }
         for arm in read_bought(folder)
     ]
 
@@ -125,7 +131,7 @@ def design_files(history: History, number: int) -> dict[str, str]:
 def _of_arm(history: History, number: int) -> dict[str, float]:
     """What an arm is, whatever the targets, by the names that `armwright pick` knows."""
     numbers = numbers_of(history, history.member(number))
-    return {name: numbers[name] for name in ("length", "mass")}
+    return {name: numbers[name] for name in ("length", "mass", *bounded_numbers(history, number))}
 
 
 def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
@@ -158,6 +164,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
         "values": history.values[numbers.start : numbers.stop],
         "params": space.matrix([trial.design for trial in trials]),
+        "broken": history.broken[numbers.start : numbers.stop],
         "q": evaluation.q.astype(np.float32),
         **_arm_arrays(arms, evaluation.arms.dof),
     }
@@ -173,6 +180,7 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
 
     return {
         "base": floats([arm.base for arm in arms]),
+        "stands": floats([arm.tool_axis for arm in arms]),
         "tool": floats([arm.tool for arm in arms]),
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
         "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
@@ -204,8 +212,20 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
+        "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
+        "constraints": [
+            {
+                "words": constraint.words,
+                "name": constraint.quantity.name,
+                "unit": constraint.quantity.unit,
+                "bound": constraint.bound,
+                "sign": 1 if constraint.relation == "<=" else -1,
+                "scale": constraint.scale,
+            }
+            for constraint in config.problem.constraints
+        ],
         "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
         "parameters": [
             {"name": p.name, "needs": space.needs(p.name)}
@@ -226,21 +246,40 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "command": repeat_command(config, any(trial.source == POLISH for trial in history), spent),
         "config": config.model_dump(mode="json"),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
-        "colours": {"front": FRONT, "missed": MISSED, "target": TARGET, "joint": JOINT},
+        "colours": {
+            "front": FRONT,
+            "missed": MISSED,
+            "target": TARGET,
+            "joint": JOINT,
+            "obstacle": OBSTACLE,
+            "infeasible": INFEASIBLE,
+        },
         "joint_words": JOINT_LABEL,
+    }
+
+
+def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    solid = obstacle.solid
+    return {
+        "shape": solid.shape,
+        "centre": list(solid.centre),
+        "rotation": solid.rotation.tolist(),
+        "half": list(solid.half),
+        "words": obstacle.words(),
     }
 
 
 def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
     """What the run has come to."""
     reference = history.reference_point
-    final = hypervolume(history.values, reference) if reference is not None and len(history) else None
+    final = hypervolume(history.counted, reference) if reference is not None and len(history) else None
     found: dict[str, Any] = {
         "finished": summary is not None,
         "hypervolume": final,
         "by_source": dict(Counter(trial.source for trial in history)),
         "seconds": sum(trial.seconds.get("total", 0.0) for trial in history),
         "evaluations": sum(trial.evaluations for trial in history),
+        "infeasible": int((~history.feasible).sum()),
         "solid": None,
         "cost_usd": None,
         "search": None,
@@ -255,6 +294,7 @@ def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | No
     if isinstance(config.method, FrontMethod):
         search = summary["search"]
         found |= {"seconds": search["seconds"], "evaluations": search["evaluations"]}
+        found["infeasible"] = search.get("infeasible", 0)
         found["search"] = search["hypervolume_history"]
     return found
 

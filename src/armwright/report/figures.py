@@ -18,11 +18,25 @@ from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
-from armwright.kinematics.chain import joint_positions
+from armwright.kinematics.chain import joint_positions, link_lines
 from armwright.objectives import POSITION_ERROR, TORQUE, Objective
+from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
-from armwright.report.style import EXISTING, FRONT, JOINT, JOINT_LABEL, LINK, MISSED, TARGET, Look, look
+from armwright.report.solids import draw_obstacles
+from armwright.report.style import (
+    EXISTING,
+    FRONT,
+    INFEASIBLE,
+    JOINT,
+    JOINT_LABEL,
+    LINK,
+    MISSED,
+    OBSTACLE,
+    TARGET,
+    Look,
+    look,
+)
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
@@ -76,12 +90,14 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     """Solution 1 (least position error), the knee, Solution 2 (least torque), all within the reference box.
 
     Before them the most precise design of all, where it lies beyond the box. Of other objectives, the first and the
-    last one take the places of position error and torque.
+    last one take the places of position error and torque. As long as no design is feasible: the nearest.
     """
     reference, objectives = _reference(history), history.problem.objectives
-    numbers = front_numbers(history.values)
+    numbers = front_numbers(history.counted)
+    if not numbers:
+        return [("Nearest to feasible", history.member(number)) for number in history.nearest(1)]
     first, last = (f"least {objective.label.lower()}" for objective in (objectives[0], objectives[-1]))
-    solutions = solution_numbers(history.values, reference)
+    solutions = solution_numbers(history.counted, reference)
     if solutions is None:
         lowest = min(numbers, key=lambda n: history.values[n, -1])
         titled = {numbers[0]: f"{first.capitalize()} of all", lowest: f"{last.capitalize()} of all"}
@@ -90,7 +106,7 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     if numbers[0] != solutions[0]:
         best = "Most precise" if objectives[0] is POSITION_ERROR else first.capitalize()
         titled = {numbers[0]: f"{best} of all, beyond the reference point", **titled}
-    knee = knee_number(history.values, reference)
+    knee = knee_number(history.counted, reference)
     if knee is not None:
         titled.setdefault(knee, "Knee of the front")
     titled.setdefault(solutions[1], f"Solution 2: {last}")
@@ -101,7 +117,7 @@ def draw_hypervolume(history: History) -> Figure:
     """The hypervolume over the counted trials, with the trials of the proposer marked where they enlarged it."""
     figure, axes = one_panel(5.2, 3.2)
     curve = history.hypervolume
-    start = hypervolume(history.values[: history.n_init], _reference(history))
+    start = hypervolume(history.counted[: history.n_init], _reference(history))
     iterations = np.arange(len(curve) + 1)
     axes.step(iterations, [start, *curve], where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     gains = np.diff(np.array([start, *curve])) > 0.0
@@ -126,7 +142,7 @@ def draw_hypervolume(history: History) -> Figure:
     axes.set_ylim(bottom=0)
     axes.legend(loc="lower right")
     if len(curve) and curve[-1] == 0.0:
-        _say(axes, "No design lies within the reference box.")
+        _say(axes, _nothing(history))
     return figure
 
 
@@ -160,7 +176,7 @@ def draw_samples(history: History) -> Figure:
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     panels[0].set_ylabel(_label(history, 1))
-    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_sources(history)) + 1)
+    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_legend(history)))
     return figure
 
 
@@ -176,7 +192,7 @@ def draw_credit(history: History) -> Figure:
     volume.set_title(f"{history.problem.task.name}, reference point {_pair(_reference(history))}")
     members.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     if not np.any(history.hypervolume > 0.0):
-        _say(volume, "No design lies within the reference box.")
+        _say(volume, _nothing(history))
     areas = [Patch(**_fill(look(source)), label=look(source).label) for source in reversed(_sources(history))]
     figure.legend(handles=areas, loc="outside right center", title="found by", alignment="left")
     return figure
@@ -212,7 +228,7 @@ def draw_front(history: History, bought: Sequence[ComparedArm] = ()) -> Figure:
     axes.set_ylabel(_label(history, 1))
     shown = _draw_bought(axes, reference, bought)
     axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if shown else [])], loc="upper right")
-    area = hypervolume(history.values, reference)
+    area = hypervolume(history.counted, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     return figure
 
@@ -270,10 +286,14 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
     for column, (title, member) in enumerate(chosen):
         axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
         targets = range(len(evaluation.targets))
+        extent = _extent(evaluation, [m for _, m in chosen])
+        draw_obstacles(axes, evaluation.obstacles, extent)
         _draw_postures(axes, member, evaluation, column, targets)
-        frame(axes, _extent(evaluation, [m for _, m in chosen]))
+        frame(axes, extent)
         axes.set_title(f"{title}\n{_words(history, member)}", y=1.0)
-    figure.legend(handles=_arm_legend(), loc="lower center", ncols=3 if len(chosen) == 1 else 6)
+    figure.legend(
+        handles=_arm_legend(evaluation), loc="lower center", ncols=3 if len(chosen) == 1 else _columns(evaluation)
+    )
     return figure
 
 
@@ -291,6 +311,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     extent = _extent(evaluation, [member])
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
+        draw_obstacles(axes, evaluation.obstacles, extent)
         _draw_postures(axes, member, evaluation, 0, [target])
         frame(axes, extent)
         error = evaluation.position_error[0, target]
@@ -298,15 +319,20 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
         axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=FRONT if error < REACHED else MISSED)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_words(history, member)}", fontsize=10)
-    figure.legend(handles=_arm_legend(), loc="lower center", ncols=6 if columns > 2 else 3)
+    figure.legend(handles=_arm_legend(evaluation), loc="lower center", ncols=_columns(evaluation) if columns > 2 else 3)
     return figure
 
 
 def _scatter(axes: Any, history: History, reference: Sequence[float], faint: bool = False) -> None:
     values = history.values
+    broken = values[~history.feasible]
+    if len(broken):
+        axes.scatter(
+            broken[:, 0], broken[:, 1], s=14, facecolors="none", edgecolors=INFEASIBLE, linewidths=0.7, zorder=2
+        )
     for source in _sources(history):
         style = look(source)
-        rows = values[[trial.source == source for trial in history]]
+        rows = values[history.feasible & np.array([trial.source == source for trial in history])]
         axes.scatter(
             rows[:, 0],
             rows[:, 1],
@@ -316,7 +342,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
             zorder=3,
             **_paint(style),
         )
-    front = values[front_numbers(values)]
+    front = values[front_numbers(history.counted)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # of more objectives there is no line to draw
         x = [inside[0, 0], *inside[:, 0], reference[0]]
@@ -327,12 +353,12 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
     axes.set_xlim(0, SHOWN * reference[0])
     axes.set_ylim(0, SHOWN * reference[1])
     if not len(inside):
-        _say(axes, "No design lies within the reference box.")
+        _say(axes, _nothing(history))
 
 
 def _best_known(axes: Any, history: History) -> None:
     """A line at the best known hypervolume of the task, where there is one."""
-    found = standing(history.problem, history.values, _reference(history))
+    found = standing(history.problem, history.counted, _reference(history))
     if found is not None:
         words = f"best known ({found.hypervolume:.2f})"
         axes.axhline(found.hypervolume, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=words)
@@ -355,8 +381,10 @@ def _stack(axes: Any, layers: Mapping[str, np.ndarray]) -> None:
 def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
-        places = joint_positions(member.arm, evaluation.q[row, target, : len(member.arm.joints)])
-        axes.plot(*places.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
+        q = evaluation.q[row, target, : len(member.arm.joints)]
+        places = joint_positions(member.arm, q)
+        for line in link_lines(member.arm, q):
+            axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
         for joint, place in zip(member.arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
         goal = evaluation.targets[target]
@@ -388,6 +416,9 @@ def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.
     ]
     points = np.vstack([evaluation.targets, *places])
     low, high = points.min(axis=0), points.max(axis=0)
+    for obstacle in evaluation.obstacles:
+        if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor that is near
+            low[2] = min(low[2], obstacle.z)
     return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
 
 
@@ -398,6 +429,19 @@ def _sources(history: History) -> list[str]:
 
 def _legend(history: History) -> list[Line2D]:
     marks = [_mark(look(source)) for source in _sources(history)]
+    if not history.feasible.all():
+        marks.append(
+            Line2D(
+                [],
+                [],
+                linestyle="",
+                marker="o",
+                markerfacecolor="none",
+                color=INFEASIBLE,
+                markersize=4,
+                label="infeasible",
+            )
+        )
     line = Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front")
     return [*marks, line] if len(history.problem.objectives) == 2 else marks
 
@@ -406,14 +450,21 @@ def _mark(style: Look) -> Line2D:
     return Line2D([], [], linestyle="", marker=style.marker, color=style.colour, markersize=5, label=style.label)
 
 
-def _arm_legend() -> list[Line2D]:
+def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:
     joints = [Line2D([], [], linestyle="", marker="o", color=JOINT[a], label=JOINT_LABEL[a]) for a in "xyz"]
+    obstacles = [Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle")] if evaluation.obstacles else []
     return [
         Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
         *joints,
         Line2D([], [], linestyle="", marker="*", markersize=9, color=TARGET, markeredgecolor=FRONT, label="target"),
         Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
+        *obstacles,
     ]
+
+
+def _columns(evaluation: Evaluation) -> int:
+    """Of a legend on one line."""
+    return len(_arm_legend(evaluation))
 
 
 def _paint(style: Look) -> dict[str, Any]:
@@ -455,6 +506,13 @@ def _reference(history: History) -> tuple[float, ...]:
     if reference is None:
         raise RunFolderError(f"figures need the {history.n_init} random trials; the run has only {len(history)} so far")
     return reference
+
+
+def _nothing(history: History) -> str:
+    """Why no design counts."""
+    if not history.feasible.any():
+        return "No design meets all constraints."
+    return "No design lies within the reference box."
 
 
 def _say(axes: Any, words: str) -> None:

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from armwright.history import BBO, RANDOM
+from armwright.history import BBO, RANDOM, START
 
 
 class Look(NamedTuple):
@@ -17,6 +17,7 @@ class Look(NamedTuple):
 
 _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
+    START: Look("start", "#111111", "P", 36),
     BBO: Look("black box", "#0072B2", "o", 20),
     "polish": Look("polish", "#009E73", "D", 28, "...."),
     "front": Look("front search", "#0072B2", "o", 14),
@@ -29,7 +30,9 @@ EXISTING = Look("existing arm", "#56B4E9", "P", 70)
 FRONT = "#111111"
 MISSED = "#CC0000"
 TARGET = "#CC79A7"
+INFEASIBLE = "#B0B0B0"
 LINK = "#5A5A60"
+OBSTACLE = "#6E7F91"
 JOINT = {"x": "#D55E00", "y": "#0072B2", "z": "#009E73"}
 JOINT_LABEL = {"x": "R (roll, x)", "y": "P (pitch, y)", "z": "Y (yaw, z)"}
 

@@ -1,7 +1,8 @@
 // The selected arm in space, in one posture for each target.
 
 import { postures, REACHED } from "./design.js";
-import { chain } from "./kinematics.js";
+import { PRISMATIC, chain, length, rail } from "./kinematics.js";
+import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, millimetres, number, onTheme, shown } from "./words.js";
 
@@ -68,6 +69,18 @@ export function drawnJoints() {
     .map((mesh) => mesh.position.toArray());
 }
 
+// The corners of what is drawn of obstacles, in the world; for tests.
+export function drawnObstacles() {
+  return groups.obstacles.children.map((part) => {
+    part.updateMatrixWorld();
+    const { array } = part.geometry.attributes.position, corners = [];
+    for (let k = 0; k < array.length; k += 3) {
+      corners.push(new THREE.Vector3(array[k], array[k + 1], array[k + 2]).applyMatrix4(part.matrixWorld).toArray());
+    }
+    return corners;
+  });
+}
+
 function begin() {
   unit = { rod: new THREE.CylinderGeometry(1, 1, 1, 20), ball: new THREE.SphereGeometry(1, 20, 14) };
   renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
@@ -78,7 +91,7 @@ function begin() {
   const sun = new THREE.DirectionalLight(0xffffff, 1.6);
   sun.position.set(3, -5, 8);
   scene.add(sun);
-  for (const name of ["floor", "targets", "ghost", "compared", "arm"]) {
+  for (const name of ["floor", "obstacles", "targets", "ghost", "compared", "arm"]) {
     groups[name] = new THREE.Group();
     scene.add(groups[name]);
   }
@@ -94,13 +107,14 @@ function begin() {
 }
 
 function paint() {
-  const { joint, target, missed } = content.head.colours;
+  const { joint, target, missed, obstacle } = content.head.colours;
   const solid = (paint_) => new THREE.MeshLambertMaterial({ color: paint_ });
   const faint = (paint_, opacity) => new THREE.MeshLambertMaterial({ color: paint_, transparent: true, opacity, depthWrite: false });
   materials = {
     link: solid(colour("arm")), base: solid(shown("#111111")), joints: ["x", "y", "z"].map((axis) => solid(joint[axis])),
     ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45),
     reached: solid(HIT), missed: solid(target), now: solid(NOW),
+    obstacle: { face: faint(obstacle, 0.3), edge: new THREE.LineBasicMaterial({ color: obstacle }) },
     gap: new THREE.LineDashedMaterial({ color: missed, dashSize: 0.02, gapSize: 0.012 }),
   };
 }
@@ -110,6 +124,7 @@ function legend() {
   const { joint } = content.head.colours, words = content.head.joint_words;
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], words[axis]]),
     [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
+  if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
   $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
     const dot = element("span", { class: "dot" });
     dot.style.background = paint_;
@@ -166,6 +181,7 @@ function reframe() {
   const centre = low.map((v, k) => (v + high[k]) / 2);
   frame = { centre, low, high, radius };
   drawFloor();
+  drawObstacles();
   drawTargets();
   look();
 }
@@ -225,6 +241,11 @@ function label(text, place) {
   return sprite;
 }
 
+function drawObstacles() {
+  empty(groups.obstacles);
+  for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, frame, materials.obstacle));
+}
+
 function drawTargets() {
   empty(groups.targets);
   for (const target of content.targets) groups.targets.add(ball(target, ballSize(), materials.missed));
@@ -247,10 +268,11 @@ function rod(from, to, radius, material) {
 
 function drawPosture(group, arm, q, paints) {
   empty(group);
-  const { joints, axes } = chain(arm, q);
+  const posed = chain(arm, q), { joints, ends, axes } = posed;
   for (let j = 0; j < q.length; j++) {
     const radius = thick(arm, j), wide = 1.45 * radius;
-    group.add(rod(joints[j], joints[j + 1], radius, paints.link));
+    group.add(rod(joints[j], ends[j], radius, paints.link));
+    if (arm.kind[j] === PRISMATIC) group.add(rod(...rail(arm, posed, q, j), 0.5 * radius, paints.base));
     const along = axes[j].map((v) => v * 1.25 * wide);
     const joint = rod(joints[j].map((v, k) => v - along[k]), joints[j].map((v, k) => v + along[k]), wide, paints.joints[arm.axis[j]]);
     joint.userData.joint = j;
@@ -258,8 +280,9 @@ function drawPosture(group, arm, q, paints) {
     group.add(joint);
   }
   const radius = thick(arm, 0);
-  const [bx, by, bz] = joints[0];
-  group.add(rod([bx, by, bz - 2.05 * radius], [bx, by, bz - 1.15 * radius], 2.4 * radius, paints.base));
+  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.stands[k]); // the base's plate
+  group.add(rod(behind(2.05 * radius), behind(1.15 * radius), 2.4 * radius, paints.base));
+  if (length(arm.tool) > 0) group.add(rod(ends.at(-1), joints.at(-1), 0.6 * radius, paints.base));
   const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
   tip.userData.joint = q.length;
   group.add(tip);
@@ -283,7 +306,7 @@ export function drawArm() {
     posed.forEach((one, t) => {
       if (t === state.target) return;
       for (let j = 0; j < one.q.length; j++) {
-        groups.ghost.add(rod(one.joints[j], one.joints[j + 1], 0.55 * thick(arm, j), materials.ghost));
+        groups.ghost.add(rod(one.joints[j], one.ends[j], 0.55 * thick(arm, j), materials.ghost));
       }
     });
   }

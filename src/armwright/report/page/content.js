@@ -70,9 +70,12 @@ export class Content {
 
   get objectives() { return this.head.objectives; }
   get targets() { return this.head.targets; }
+  get obstacles() { return this.head.obstacles; }
   source(i) { return this.head.sources[this._part("source", i)[0]]; }
   look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }
+  broken(i) { return this._part("broken", i); } // by how much, one a constraint: <= 0 is met
+  isFeasible(i) { return this.broken(i).every((value) => value <= 0); }
 
   // Those that matter: the arm has their module, and it is of a type that they are for.
   params(i) {
@@ -93,13 +96,16 @@ export class Content {
     return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
   }
 
-  // Names of the joints' actuators in order, where there is a choice.
-  motors(i) {
-    return this.params(i).filter((p) => p.choices && p.name.startsWith("motor_")).map((p) => p.value);
+  // One parameter's value; undefined where it does not matter.
+  param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
+
+  // The choices of kind_1, kind_2, … in order, where there are any: "motor", "direction".
+  chosen(i, kind) {
+    return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }
 
   arm(i) {
-    const arm = { base: this._part("base", i), tool: this._part("tool", i) }, n = this._part("joints", i)[0];
+    const arm = { base: this._part("base", i), tool: this._part("tool", i), stands: this._part("stands", i) }, n = this._part("joints", i)[0];
     for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
     for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
     return arm;

@@ -53,10 +53,12 @@ export function drawDesign() {
     const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
     return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
   });
-  const motors = content.motors(i).length ? ` Motors: ${content.motors(i).join(", ")}.` : "";
+  const feasible = head.constraints.length ? ` ${constraintWords(i)}` : "";
+  const motors = content.chosen(i, "motor").length ? ` Motors: ${content.chosen(i, "motor").join(", ")}.` : "";
+  const mount = content.param(i, "mount");
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m. ${onFront}${iteration}${motors}`;
+  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${feasible}${iteration}${motors}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -66,16 +68,28 @@ export function drawDesign() {
   }
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.`;
+  const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.words).join("; ")}.` : "";
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.${solids}`;
+}
+
+// What the design has where it is bounded.
+function constraintWords(i) {
+  const broken = content.broken(i);
+  const words = content.head.constraints.map((c, k) => {
+    const has = c.bound + c.sign * c.scale * broken[k];
+    return `${c.words}: ${number(has)} ${c.unit}${broken[k] > 0 ? " (broken)" : ""}`;
+  });
+  return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${words.join("; ")}.`;
 }
 
 function drawLinks(arm) {
   const { joint } = content.head.colours;
   $("links").replaceChildren(...Array.from(arm.axis, (axis, j) => {
     const long = linkLength(arm, j);
-    const moves = [`${"RPY"[axis]}`, `slides ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
-    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves})` },
-      `${moves} ${millimetres(long)}`);
+    const moves = [`turns about ${"xyz"[axis]}`, `slides along ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
+    const word = content.joints(state.design), letter = word.length === arm.axis.length ? word[j] : ["RPY"[axis], "slide", "F"][arm.kind[j]];
+    const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves} at first)` },
+      `${letter} ${millimetres(long)}`);
     bar.style.flex = `${1e6 * Math.max(long, 1e-6)} 1 0`;
     bar.style.background = joint["xyz"[axis]];
     return bar;

@@ -1,7 +1,8 @@
 // Where an arm is in a posture, and what holds it up: the formulas of armwright/kinematics, in double precision.
 
 const GRAVITY = 9.81; // m/s², along -z
-const [REVOLUTE, PRISMATIC] = [0, 1];
+const REVOLUTE = 0;
+export const PRISMATIC = 1;
 
 const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 const at = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
@@ -19,11 +20,11 @@ function rotated(m, k, angle) {
   return out;
 }
 
-// joints: positions of the joints and, last, of the tip [m]; end: of the last link; axes: of the joints, in the world;
+// joints: positions of the joints and, last, of the tip [m]; ends: of the links; axes: of the joints, in the world;
 // centres: of mass.
 export function chain(arm, q) {
   let frame = [1, 0, 0, 0, 1, 0, 0, 0, 1], place = Array.from(arm.base);
-  const joints = [], axes = [], centres = [];
+  const joints = [], ends = [], axes = [], centres = [];
   for (let j = 0; j < q.length; j++) {
     const axis = column(frame, arm.axis[j]);
     axes.push(axis);
@@ -32,8 +33,9 @@ export function chain(arm, q) {
     if (arm.kind[j] === REVOLUTE) frame = rotated(frame, arm.axis[j], q[j]);
     centres.push(add(place, turned(frame, at(arm.com, j))));
     place = add(place, turned(frame, at(arm.offset, j)));
+    ends.push(place);
   }
-  return { joints: [...joints, add(place, turned(frame, arm.tool))], end: place, axes, centres };
+  return { joints: [...joints, add(place, turned(frame, arm.tool))], ends, axes, centres };
 }
 
 // Torques of the joints' motors [N m] that hold the arm and its payload [kg] up against gravity.
@@ -49,6 +51,12 @@ export function holding(arm, posed, payload) {
     }
     return sum * arm.travel[i];
   });
+}
+
+// Where a sliding joint's rail begins and ends, in a posture.
+export function rail(arm, posed, q, j) {
+  const along = (way) => posed.joints[j].map((v, k) => v + posed.axes[j][k] * (way - q[j]));
+  return [along(arm.lower[j]), along(arm.upper[j])];
 }
 
 export const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);

@@ -1,6 +1,6 @@
 // Opens the page: with what it holds, or with what its server sends.
 
-import { drawArm, drawnJoints, openArm } from "./arm.js";
+import { drawArm, drawnJoints, drawnObstacles, openArm } from "./arm.js";
 import { Content, embedded } from "./content.js";
 import { drawCurve, openCurve } from "./curve.js";
 import { drawDesign, openDesign, postures } from "./design.js";
@@ -84,5 +84,5 @@ async function start() {
 }
 
 // For whoever opens the console, and for tests.
-window.armwright = { content, state, set, postures, drawnJoints, drawArm };
+window.armwright = { content, state, set, postures, drawnJoints, drawnObstacles, drawArm };
 start();

@@ -73,14 +73,14 @@ const counted = () => Math.max(0, content.n - content.head.n_init);
 const until = () => (state.iteration === null ? content.n : content.head.n_init + state.iteration);
 const placed = (value, axis) => (log && axis === 0 ? Math.max(value, FLOOR) : value);
 
-// Numbers of the non-dominated designs among the first n in the two objectives that are shown, by rising x.
+// Numbers of the feasible, non-dominated designs among the first n in the two objectives that are shown, by rising x.
 export function frontUntil(n) {
   const order = [...Array(n).keys()].sort((a, b) => {
     const [u, v] = [content.values(a), content.values(b)];
     return u[x] - v[x] || u[y] - v[y] || a - b;
   });
   let least = Infinity;
-  return order.filter((i) => content.values(i)[y] < least && ((least = content.values(i)[y]), true));
+  return order.filter((i) => content.isFeasible(i) && content.values(i)[y] < least && ((least = content.values(i)[y]), true));
 }
 
 function slider() {
@@ -129,9 +129,21 @@ function draw() {
     });
   }
   const onFront = new Set(many && n === content.n ? content.head.front : front);
+  const infeasible = [...Array(n).keys()].filter((i) => !content.isFeasible(i));
+  if (infeasible.length) {
+    traces.push({
+      x: infeasible.map((i) => placed(content.values(i)[x], 0)),
+      y: infeasible.map((i) => content.values(i)[y]),
+      customdata: infeasible,
+      text: infeasible.map((i) => plain(`#${i} ${content.joints(i)}`)),
+      hovertemplate: `%{text}<br>%{x:.4g}, %{y:.4g}<extra>infeasible</extra>`,
+      mode: "markers", name: "infeasible",
+      marker: { symbol: "circle-open", color: content.head.colours.infeasible, size: 7, line: { width: 1 } },
+    });
+  }
   for (const source of content.head.sources) {
     const look = content.head.looks[source], rows = [];
-    for (let i = 0; i < n; i++) if (content.source(i) === source) rows.push(i);
+    for (let i = 0; i < n; i++) if (content.source(i) === source && content.isFeasible(i)) rows.push(i);
     if (!rows.length) continue;
     traces.push({
       x: rows.map((i) => placed(content.values(i)[x], 0)),
@@ -188,6 +200,7 @@ function draw() {
     : [...Array(n).keys()].filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
   const notes = ["Click a design to see its arm."];
   if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
+  if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
   for (const arm of content.head.bought) notes.push(boughtWords(arm, high));
   if (many) notes.push("Large: on the front in all objectives; in this plane others may lie before them.");
   if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
@@ -204,6 +217,7 @@ function boughtWords(arm, high) {
 }
 
 function standing(arm) {
+  if (arm.breaks.length) return `breaks ${arm.breaks.join(", ")}`;
   if (arm.standing === null) return "not comparable";
   const [worse, better] = arm.standing;
   return `dominates ${plural(worse, "design")} of the front, dominated by ${better}`;

@@ -28,13 +28,17 @@ function columns() {
     made.push({ key: "solid", name: "verdict", text: true, value: (i) => (content.isSolid(i) ? "solid" : "fragile") });
   }
   made.push({ key: "joints", name: "joints", text: true, value: (i) => content.joints(i) });
-  if (head.parameters.some((p) => p.name.startsWith("motor_"))) {
-    made.push({ key: "motors", name: "motors", text: true, value: (i) => content.motors(i).join(", ") });
+  if (head.parameters.some((p) => p.name === "mount")) {
+    made.push({ key: "mount", name: "mount", text: true, value: (i) => content.param(i, "mount") });
   }
-  head.parameters.forEach((p, k) => {
-    const form = p.unit === "m" ? metres : number;
-    if (!p.choices) made.push({ key: p.name, name: `${p.name.replace("_", " ")} [${p.unit}]`, form, value: (i) => content.params(i)[k].value });
-  });
+  for (const kind of ["direction", "motor"]) {
+    if (!head.parameters.some((p) => p.name.startsWith(`${kind}_`))) continue;
+    made.push({ key: kind, name: `${kind}s`, text: true, value: (i) => content.chosen(i, kind).join(", ") });
+  }
+  for (const p of head.parameters.filter((p) => !p.choices)) {
+    const form = (value) => (value === undefined ? "–" : (p.unit === "m" ? metres : number)(value));
+    made.push({ key: p.name, name: `${p.name.replace("_", " ")} [${p.unit}]`, form, value: (i) => content.param(i, p.name) });
+  }
   return made;
 }
 
@@ -51,7 +55,7 @@ export function drawTable() {
   if (by) {
     rows.sort((a, b) => {
       const [u, v] = [by.value(a), by.value(b)];
-      return (sorted.up ? 1 : -1) * (by.text ? String(u).localeCompare(String(v)) : u - v) || a - b;
+      return (sorted.up ? 1 : -1) * (by.text ? String(u).localeCompare(String(v)) : (u ?? 0) - (v ?? 0)) || a - b;
     });
   }
   const head = element("tr", {}, ...all.map((column) => {

@@ -1,0 +1,56 @@
+// Obstacles in space: what can be seen through, with the edges of boxes and the rims of cylinders.
+
+const RIM = 48; // points of a circle
+
+// A world place of one in the obstacle's own frame.
+function placed({ centre, rotation }, p) {
+  return [0, 1, 2].map((r) => centre[r] + rotation[r][0] * p[0] + rotation[r][1] * p[1] + rotation[r][2] * p[2]);
+}
+
+function lines(points, material) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(points.flat(), 3));
+  return new THREE.LineSegments(geometry, material);
+}
+
+// A four-sided prism stands for a box: its sides are 1 long before it is scaled.
+const prism = () => new THREE.CylinderGeometry(Math.SQRT1_2, Math.SQRT1_2, 1, 4, 1, false, Math.PI / 4);
+
+// Meshes and lines of an obstacle; the ground is a plate below the frame { centre, radius } that is looked at.
+export function solidParts(solid, frame, { face, edge }) {
+  const { shape, half, rotation, centre } = solid;
+  if (shape === "ground") {
+    const [x, y] = frame.centre, r = 1.5 * frame.radius, thick = 0.01 * frame.radius;
+    const mesh = new THREE.Mesh(prism(), face);
+    mesh.scale.set(2 * r, thick, 2 * r);
+    mesh.rotation.set(Math.PI / 2, 0, 0);
+    mesh.position.set(x, y, centre[2] - thick / 2);
+    const corners = [[x - r, y - r], [x + r, y - r], [x + r, y + r], [x - r, y + r]].map((p) => [...p, centre[2]]);
+    return [mesh, lines(corners.flatMap((p, k) => [p, corners[(k + 1) % 4]]), edge)];
+  }
+  const geometry = shape === "sphere" ? new THREE.SphereGeometry(1, 32, 20)
+    : shape === "box" ? prism() : new THREE.CylinderGeometry(1, 1, 1, RIM);
+  // These stand along their own y; obstacles along their z: y is taken for z, and z for -y.
+  const mesh = new THREE.Mesh(geometry, face);
+  const [a, b, c] = half, wide = shape === "box" ? 2 : 1, high = shape === "sphere" ? 1 : 2;
+  const columns = [0, 1, 2].map((k) => [0, 1, 2].map((r) => rotation[r][k]));
+  const [x, y, z] = [columns[0].map((v) => v * wide * a), columns[2].map((v) => v * high * c), columns[1].map((v) => -v * wide * b)];
+  mesh.matrixAutoUpdate = false;
+  mesh.matrix.set(x[0], y[0], z[0], centre[0], x[1], y[1], z[1], centre[1], x[2], y[2], z[2], centre[2], 0, 0, 0, 1);
+  return [mesh, ...outline(solid, edge)];
+}
+
+function outline(solid, edge) {
+  const [a, b, c] = solid.half, points = [];
+  if (solid.shape === "box") {
+    for (const s of [-1, 1]) {
+      for (const t of [-1, 1]) {
+        points.push([-a, s * b, t * c], [a, s * b, t * c], [s * a, -b, t * c], [s * a, b, t * c], [s * a, t * b, -c], [s * a, t * b, c]);
+      }
+    }
+  } else if (solid.shape === "cylinder") {
+    const at = (k, z) => [a * Math.cos((2 * Math.PI * k) / RIM), a * Math.sin((2 * Math.PI * k) / RIM), z];
+    for (let k = 0; k < RIM; k++) points.push(at(k, -c), at(k + 1, -c), at(k, c), at(k + 1, c));
+  }
+  return points.length ? [lines(points.map((p) => placed(solid, p)), edge)] : [];
+}

@@ -1,0 +1,87 @@
+"""Obstacles in figures: faces that can be seen through, cut off where the drawing ends."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import NDArray
+
+from armwright.obstacles import Obstacle, Solid
+from armwright.report.style import OBSTACLE
+
+Array = NDArray[np.float64]
+
+EDGE = 0.5  # [pt]
+AROUND, UPWARDS = 32, 12  # faces of what is round
+
+
+def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: tuple[Array, float]) -> None:
+    """The parts of obstacles within the cube about a middle with this half side [m]."""
+    middle, half = extent
+    for obstacle in obstacles:
+        solid = obstacle.solid
+        faces = [(clipped(face, middle, half), line) for face, line in _faces(solid, middle, half)]
+        shown = [(face, line) for face, line in faces if len(face) > 2]
+        if shown:
+            corners, lines = zip(*shown, strict=True)
+            drawn = Poly3DCollection(corners, facecolor=OBSTACLE, edgecolor=OBSTACLE, alpha=0.18, linewidth=lines)
+            axes.add_collection3d(drawn, autolim=False)
+
+
+def clipped(face: Array, middle: Array, half: float) -> Array:
+    """(m, 3) the part of a flat convex face (n, 3) within a cube; m = 0 where there is none (Sutherland & Hodgman)."""
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            room = half - sign * (face[:, axis] - middle[axis])  # (n,) at least 0 within
+            corners: list[Array] = []
+            for k in range(len(face)):
+                after = (k + 1) % len(face)
+                if room[k] >= 0.0:
+                    corners.append(face[k])
+                if (room[k] >= 0.0) != (room[after] >= 0.0):
+                    share = room[k] / (room[k] - room[after])
+                    corners.append(face[k] + share * (face[after] - face[k]))
+            face = np.array(corners).reshape(-1, 3)
+    return face
+
+
+def _faces(solid: Solid, middle: Array, half: float) -> Iterable[tuple[Array, float]]:
+    """(n, 3) corners of each in the world [m], and how wide the line around it is; of the ground, what can be seen."""
+    if solid.shape == "ground":
+        x, y = middle[:2]
+        corners = [(x + s * half, y + t * half, solid.centre[2]) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        return [(np.array(corners), EDGE)]
+    flat, round_ = {"box": (_box(), []), "cylinder": _cylinder(), "sphere": ([], _sphere())}[solid.shape]
+    return [
+        (np.array(solid.centre) + face * np.array(solid.half) @ solid.rotation.T, line)
+        for faces, line in ((flat, EDGE), (round_, 0.0))
+        for face in faces
+    ]
+
+
+def _box() -> list[Array]:
+    """Of a box from -1 to 1."""
+    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    return [np.insert(square, axis, side, axis=1) for axis in range(3) for side in (-1.0, 1.0)]
+
+
+def _cylinder() -> tuple[list[Array], list[Array]]:
+    """Of radius 1 from z = -1 to 1: its ends, and what is round."""
+    angles = np.linspace(0.0, 2 * np.pi, AROUND, endpoint=False)
+    ring = np.column_stack([np.cos(angles), np.sin(angles), np.ones(AROUND)])
+    low = ring * [1.0, 1.0, -1.0]
+    sides = [np.array([low[k - 1], low[k], ring[k], ring[k - 1]]) for k in range(AROUND)]
+    return [low, ring], sides
+
+
+def _sphere() -> list[Array]:
+    """Of radius 1."""
+    around, up = np.linspace(0.0, 2 * np.pi, AROUND + 1), np.linspace(-np.pi / 2, np.pi / 2, UPWARDS + 1)
+    x, y = np.outer(np.cos(around), np.cos(up)), np.outer(np.sin(around), np.cos(up))
+    grid = np.stack([x, y, np.broadcast_to(np.sin(up), x.shape)], axis=-1)
+    return [
+        np.array([grid[i, j], grid[i + 1, j], grid[i + 1, j + 1], grid[i, j + 1]])
+        for i in range(AROUND)
+        for j in range(UPWARDS)
+    ]
