@@ -17,6 +17,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from armwright.baselines import Baseline, baselines, baselines_of
+from armwright.buying import MEASURES, ArmComparison, ComparedArm
 from armwright.catalogue import ActuatorRecord
 from armwright.drafting import Draft
 from armwright.experiment.plan import Cell, Skipped
@@ -325,6 +326,67 @@ def show_draft(console: Console, draft: Draft) -> None:
     )
     console.print(f"wrote {' and '.join(map(str, draft.files))}: a draft. Check the numbers, edit it, then run:")
     console.print(f"  armwright tasks {shlex.quote(str(draft.files[0]))}\n  {draft.command}")
+
+
+def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]) -> None:
+    """Arms that exist beside designs, and what was chosen for them."""
+    objectives, space = comparison.problem.objectives, comparison.problem.space
+    others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
+    title = f"Arms on {comparison.problem.task.name}{_payload_note(comparison.problem.task)}"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("\narm", no_wrap=True)
+    measured = [_ARM_COLUMNS[objective.name] for objective in MEASURES]
+    for name in ("\njoints", "reach\nm", "mass\nkg", *measured, *(f"{o.name}\n{o.unit}" for o in others)):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for arm in (*comparison.arms, *comparison.designs):
+        values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
+        numbers = [*arm.measures.values(), *(values[objective.name] for objective in others)]
+        told = ["-" if value is None else _measure(value) for value in numbers]
+        table.add_row(arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *told)
+    console.print(table)
+    console.print(
+        f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; use = the "
+        "largest share of a joint's effort limit"
+    )
+    if comparison.designs and space.is_toy:
+        console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
+    if comparison.positions:
+        within = " x ".join(f"[{low:g}, {high:g}]" for low, high in (space.origin_x, space.origin_y, space.origin_z))
+        console.print(
+            f"bases: {comparison.positions:,} positions tried for each arm in {within} m, for the least miss, then the "
+            "least torque; --base x,y,z gives one"
+        )
+    names = ", ".join(objective.name for objective in objectives)
+    for arm in comparison.arms:
+        broken = f"; breaks {', '.join(arm.breaks)}" if arm.breaks else ""
+        stands = (
+            broken if comparison.run is None or arm.breaks else f"; {_standing_words(arm, comparison.front)} ({names})"
+        )
+        console.print(f"{arm.name}: base at {_point(tuple(round(value, 4) for value in arm.base))} m{stands}")
+        for note in arm.notes:
+            console.print(f"  {note}")
+    if drawn:
+        console.print(f"drawn anew: {', '.join(map(str, drawn))}")
+
+
+_ARM_COLUMNS = {
+    "position_error": "error\nm",
+    "torque": "\ntorque",
+    "worst_error": "worst\nm",
+    "missed": "\nmissed",
+    "peak_torque": "peak\nN m",
+    "torque_use": "\nuse",
+}
+
+
+def _measure(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1e4 else f"{value:.3g}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"
+
+
+def _standing_words(arm: ComparedArm, front: int) -> str:
+    if arm.dominates is None:
+        return "not comparable with the front"
+    return f"dominates {arm.dominates} of the {front} designs of the front, dominated by {arm.dominated_by}"
 
 
 def stdout_console() -> Console:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Joint, Link
 from armwright.best_known import known_front
+from armwright.buying import read_bought, standing
 from armwright.comparison import method_words
 from armwright.decision import bounded_numbers, numbers_of
 from armwright.export.mjcf import to_mjcf
@@ -26,7 +27,7 @@ from armwright.obstacles import Obstacle
 from armwright.parameters import FloatParameter
 from armwright.pareto import front_numbers, hypervolume, hypervolume_history
 from armwright.report.repeat import repeat_command
-from armwright.report.style import FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
+from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.results import read_summary
 from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
 
@@ -98,12 +99,27 @@ class RunContent:
             "proposals": _proposals(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
             "looks": {trial.source: _look(trial.source) for trial in self.history},
+            "existing": {"label": EXISTING.label, "colour": EXISTING.colour},
+            "bought": _bought(self.folder, self.history),
             "result": _result(self.config, self.history, self.summary),
             "calls_from": calls_from,
             "calls": [asdict(call) for call in self.calls[calls_from:]],
             "files": {number: design_files(self.history, number) for number in front} if with_files else {},
         }
         return pack(head, {**arrays, "curve": curve})
+
+
+def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
+    """Arms that exist already, as they were last compared with the run, and where they stand beside its front now."""
+    return [
+        {
+            "name": arm.name,
+            "values": list(arm.values),
+            "breaks": list(arm.breaks),
+            "standing": standing(arm.values, arm.breaks, history),
+        }
+        for arm in read_bought(folder)
+    ]
 
 
 def design_files(history: History, number: int) -> dict[str, str]:

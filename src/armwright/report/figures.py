@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from armwright.best_known import standing
+from armwright.buying import ComparedArm, read_bought
 from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
@@ -23,7 +24,19 @@ from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.solids import draw_obstacles
-from armwright.report.style import FRONT, INFEASIBLE, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, Look, look
+from armwright.report.style import (
+    EXISTING,
+    FRONT,
+    INFEASIBLE,
+    JOINT,
+    JOINT_LABEL,
+    LINK,
+    MISSED,
+    OBSTACLE,
+    TARGET,
+    Look,
+    look,
+)
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
@@ -32,6 +45,7 @@ REACHED = 1e-3  # [m]; a target missed by less counts as reached
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # of the reference point, the part of the plane that is drawn
 MOST_PANELS = 12
+HIGHEST_LABEL, LOWEST_LABEL = 0.8, 0.3  # of existing arms, as parts of the panel's height
 
 
 def write_figures(folder: str | Path) -> list[Path]:
@@ -39,26 +53,29 @@ def write_figures(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     config, history = read_run(folder)
     summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
-    drawn = _figures(history) if summary is None else _search_figures(history, summary)
+    bought = read_bought(folder)
+    drawn = _figures(history, bought) if summary is None else _search_figures(history, summary, bought)
     return write_drawn(folder / FIGURES, drawn)
 
 
-def _figures(history: History) -> Iterator[tuple[str, Figure]]:
+def _figures(history: History, bought: Sequence[ComparedArm]) -> Iterator[tuple[str, Figure]]:
     plane = len(history.problem.objectives) > 1  # of the first two objectives
     yield "hypervolume", draw_hypervolume(history)
     if plane:
         yield "samples", draw_samples(history)
     yield "credit", draw_credit(history)
     if plane:
-        yield "front", draw_front(history)
+        yield "front", draw_front(history, bought)
     yield from _arm_figures(history)
 
 
-def _search_figures(history: History, summary: Mapping[str, Any]) -> Iterator[tuple[str, Figure]]:
+def _search_figures(
+    history: History, summary: Mapping[str, Any], bought: Sequence[ComparedArm]
+) -> Iterator[tuple[str, Figure]]:
     """Of a search for the whole front, whose trials are that front."""
     yield "hypervolume", draw_search(history, summary)
     if len(history.problem.objectives) > 1:
-        yield "front", draw_front(history)
+        yield "front", draw_front(history, bought)
     yield from _arm_figures(history)
 
 
@@ -181,8 +198,8 @@ def draw_credit(history: History) -> Figure:
     return figure
 
 
-def draw_front(history: History) -> Figure:
-    """The front at the end, its designs by source, the chosen ones named."""
+def draw_front(history: History, bought: Sequence[ComparedArm] = ()) -> Figure:
+    """The front at the end, its designs by source, the chosen ones named, and arms that exist already."""
     figure, axes = one_panel(5.2, 4.2)
     reference = _reference(history)
     _scatter(axes, history, reference, faint=True)
@@ -209,10 +226,54 @@ def draw_front(history: History) -> Figure:
         )
     axes.set_xlabel(_label(history, 0))
     axes.set_ylabel(_label(history, 1))
-    axes.legend(handles=_legend(history), loc="upper right")
+    shown = _draw_bought(axes, reference, bought)
+    axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if shown else [])], loc="upper right")
     area = hypervolume(history.counted, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     return figure
+
+
+def _draw_bought(axes: Any, reference: Sequence[float], bought: Sequence[ComparedArm]) -> int:
+    """Arms that exist already in the plane of the first two objectives; one beyond it at its edge, with its values.
+
+    How many were drawn: those whose values are known.
+    """
+    edge = SHOWN * np.array(reference[:2])
+    known = [(arm, arm.values[0], arm.values[1]) for arm in bought]
+    places = [(arm, np.array([x, y])) for arm, x, y in known if x is not None and y is not None]
+    height = HIGHEST_LABEL  # names stand apart from the front's and from each other, the highest arm's first
+    for arm, place in sorted(places, key=lambda known: -known[1][1]):
+        at = np.minimum(place, edge)
+        beyond = "" if np.all(place <= edge) else f"\nbeyond, at {_short(place[0])}, {_short(place[1])}"
+        axes.scatter(
+            *at,
+            s=EXISTING.size,
+            marker=EXISTING.marker,
+            color=EXISTING.colour,
+            edgecolors=FRONT,
+            zorder=6,
+            clip_on=False,
+        )
+        column, row = at / edge
+        height = min(height, max(row, LOWEST_LABEL))
+        axes.annotate(
+            f"{arm.name}{beyond}",
+            at,
+            xytext=(column + 0.33 if column < 0.5 else column - 0.33, height),
+            textcoords="axes fraction",
+            ha="left" if column < 0.5 else "right",
+            va="center",
+            fontsize=8,
+            zorder=5,
+            bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": EXISTING.colour, "alpha": 0.9},
+            arrowprops={"arrowstyle": "-", "color": EXISTING.colour, "linewidth": 0.8},
+        )
+        height -= 0.11 if beyond else 0.08
+    return len(places)
+
+
+def _short(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
@@ -369,10 +430,7 @@ def _sources(history: History) -> list[str]:
 
 
 def _legend(history: History) -> list[Line2D]:
-    marks = [
-        Line2D([], [], linestyle="", marker=look(s).marker, color=look(s).colour, markersize=5, label=look(s).label)
-        for s in _sources(history)
-    ]
+    marks = [_mark(look(source)) for source in _sources(history)]
     if not history.feasible.all():
         marks.append(
             Line2D(
@@ -388,6 +446,10 @@ def _legend(history: History) -> list[Line2D]:
         )
     line = Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front")
     return [*marks, line] if len(history.problem.objectives) == 2 else marks
+
+
+def _mark(style: Look) -> Line2D:
+    return Line2D([], [], linestyle="", marker=style.marker, color=style.colour, markersize=5, label=style.label)
 
 
 def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:

@@ -26,6 +26,7 @@ _LOOKS = {
     "scripted": Look("scripted stand-in", "#CC79A7", "v", 44, "\\\\\\\\"),
     "manual": Look("people", "#E69F00", "s", 36, "xxxx"),
 }
+EXISTING = Look("existing arm", "#56B4E9", "P", 70)
 FRONT = "#111111"
 MISSED = "#CC0000"
 TARGET = "#CC79A7"
