@@ -36,7 +36,8 @@ class FixedProblem(Problem):
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
         arms = arrays_of(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
-        return Evaluation(arms, targets, self.task.payloads, q, reached, error, torques)
+        angle = np.zeros_like(error)
+        return Evaluation(arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals)
 
 
 LENGTH = Objective(

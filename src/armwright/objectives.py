@@ -8,10 +8,10 @@ import numpy as np
 
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.goals import REACHED
 from armwright.kinematics.arrays import FIXED, Actuation
 
 TORQUE_SCALE = 40.0  # α of the paper
-REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
 MOST_OBJECTIVES = 5  # of which the hypervolume is still computed in no time
 
 Over = Literal["sum", "max", "mean square", "arm"]
@@ -55,7 +55,11 @@ class Objective:
 
 
 def _position_error(evaluation: Evaluation) -> Array:
-    return evaluation.position_error
+    return evaluation.goals.weight * evaluation.position_error
+
+
+def _orientation_error(evaluation: Evaluation) -> Array:
+    return evaluation.goals.weight * evaluation.angle_error
 
 
 def _torque_norm(evaluation: Evaluation) -> Array:
@@ -108,7 +112,7 @@ WORST_ERROR = Objective(
     unit="m",
     symbol="E_worst",
     words="the distance between the tip and the target in the kept posture",
-    each=_position_error,
+    each=lambda evaluation: evaluation.position_error,
     over="max",
 )
 MISSED = Objective(
@@ -117,7 +121,24 @@ MISSED = Objective(
     unit="targets",
     symbol="E_missed",
     words=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
-    each=lambda evaluation: (evaluation.position_error >= REACHED).astype(np.float64),
+    each=lambda evaluation: evaluation.missed.astype(np.float64),
+)
+ORIENTATION_ERROR = Objective(
+    name="orientation_error",
+    label="Orientation error",
+    unit="rad",
+    symbol="E_rot",
+    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    each=_orientation_error,
+)
+WORST_ANGLE = Objective(
+    name="worst_angle",
+    label="Worst orientation error",
+    unit="rad",
+    symbol="E_angle",
+    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    each=lambda evaluation: evaluation.angle_error,
+    over="max",
 )
 PEAK_TORQUE = Objective(
     name="peak_torque",
@@ -184,7 +205,11 @@ LENGTH = Objective(
     over="arm",
 )
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
-_ALL = (*PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS)
+OF_ORIENTATION = (ORIENTATION_ERROR, WORST_ANGLE)
+_ALL = (
+    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS,
+    *OF_ORIENTATION,
+)  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 
 

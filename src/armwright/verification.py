@@ -82,4 +82,5 @@ def _values(problem: Problem, rows: Array, start: Array | None = None) -> Array:
     """(N, M) in float64.  start: (T, D) angles [rad]; None for the straight start."""
     arrays = arrays_of(problem.space, rows, "float64")
     task = problem.task
-    return problem.values(evaluate_arrays(arrays, task.points, start=start, payload=task.payloads))
+    found = evaluate_arrays(arrays, task.points, start=start, payload=task.payloads, goals=task.goals)
+    return problem.values(found)
