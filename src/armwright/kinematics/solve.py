@@ -161,7 +161,7 @@ def _solve(
         at_ = wp.array(at, dtype=kernels.Lane, device=device, copy=False)
         q_last = wp.zeros((len(arms), len(at), arms.dof), dtype=kernels.Lane, device=device)
         if begin is not None:
-            q_last = wp.array(begin, dtype=kernels.Lane, device=device, copy=False)
+            q_last = wp.array(begin, dtype=kernels.Lane, shape=begin.shape[:-1], device=device, copy=False)
         h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
         results = [values.numpy() for values in _launch(arms, at_, updates, q_last, h_last, wp, kernels)]
     return [_from_lanes(values)[:, : len(targets)] for values in results]
@@ -182,7 +182,7 @@ class _KeptArrays:
         )
         held = replace(arms, **self._arms)
         at_, q_last, h_last, *results = (
-            wp.array(values, dtype=kernels.Lane, device="cpu", copy=False)
+            wp.array(values, dtype=kernels.Lane, shape=values.shape[:-1], device="cpu", copy=False)
             for values in (self._at, self._q_last, self._h_last, *self._results)
         )
         self._launch = wp.launch
