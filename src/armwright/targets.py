@@ -1,6 +1,7 @@
 """A target of a task file that says more than its point, and its checks."""
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Self
 
@@ -68,6 +69,32 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if self.axis is not None:
             return pointing(self.axis)
         return np.eye(3) if self.orientation is None else turned(*self.orientation)
+
+    @property
+    def words(self) -> str:
+        """What it says beside its point, on one line."""
+        parts = [] if self.axis is None else [f"axis {_vector(self.axis)}"]
+        parts += [] if self.orientation is None else [f"orientation {_vector(self.orientation)} rad"]
+        parts += [f"tolerance {1e3 * self.tolerance:g} mm"] * (self.tolerance != REACHED)
+        parts += [f"angle tolerance {math.degrees(self.angle_tolerance):.4g}°"] * (self.angle_tolerance != ALIGNED)
+        parts += [f"weight {self.weight:g}"] * (self.weight != 1.0)
+        return ", ".join(parts)
+
+
+def target_words(entries: Sequence[Point | Target]) -> list[str]:
+    """What targets say beside their points, a line for all that say the same, counted from 1."""
+    numbers: dict[str, list[int]] = {}
+    for number, entry in enumerate(entries, start=1):
+        if isinstance(entry, Target):
+            numbers.setdefault(entry.words, []).append(number)
+    return [
+        f"target{'s' if len(group) > 1 else ''} {', '.join(map(str, group))}: {words}"
+        for words, group in numbers.items()
+    ]
+
+
+def _vector(values: Point) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.4g}" for value in values) + ")"
 
 
 def _without_serializer(core_schema: Any) -> Any:

@@ -19,6 +19,7 @@ from armwright.comparison import method_words
 from armwright.decision import numbers_of
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
+from armwright.goals import Goals
 from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
@@ -163,6 +164,8 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
     return {
         "base": floats([arm.base for arm in arms]),
         "tool": floats([arm.tool for arm in arms]),
+        "tool_axis": floats([arm.tool_axis for arm in arms]),
+        "tool_side": floats([arm.tool_side for arm in arms]),
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
         "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
         "axis": np.array([[AXES.index(j.axis) for j in row] for row in own], dtype=np.uint8),
@@ -193,6 +196,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
+        "goals": _goals(task.goals),
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
         "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
@@ -217,6 +221,17 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
         "colours": {"front": FRONT, "missed": MISSED, "target": TARGET, "joint": JOINT},
         "joint_words": JOINT_LABEL,
+    }
+
+
+def _goals(goals: Goals) -> dict[str, Any]:
+    """How the targets are to be reached; frames: the axes that the tool should have, as columns, by rows."""
+    return {
+        "oriented": goals.oriented,
+        "rows": goals.rows.tolist(),
+        "frames": goals.rotation.reshape(-1, 9).tolist() if goals.oriented else [],
+        "tolerance": goals.tolerance.tolist(),
+        "angle_tolerance": goals.angle_tolerance.tolist(),
     }
 
 
