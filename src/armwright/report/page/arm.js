@@ -1,6 +1,6 @@
 // The selected arm in space, in one posture for each target.
 
-import { missWords, postures } from "./design.js";
+import { missWords, postures, why } from "./design.js";
 import { chain } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./words.js";
@@ -375,7 +375,7 @@ function words() {
   if (i === null) return;
   const one = postures(i)[state.target], n = content.targets.length;
   $("arm-title").textContent = `#${i} ${content.joints(i)}`;
-  const verdict = one.missed ? `missed by ${missWords(one)}` : "reached";
+  const verdict = one.missed ? `missed by ${missWords(one)}: ${why(content.arm(i), one)}` : "reached";
   $("target-words").textContent = `Target ${state.target + 1} of ${n}: ${verdict}`;
   $("target-words").className = one.missed ? "missed" : "";
   $("compare").setAttribute("aria-pressed", state.compared !== null);

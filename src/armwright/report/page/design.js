@@ -45,7 +45,7 @@ export function missWords(one) {
 const degrees = (angle) => `${number((180 * angle) / Math.PI, 3)}°`;
 
 // Why a target is missed: as armwright/misses.py has it.
-function why(arm, one) {
+export function why(arm, one) {
   const beyond = distance(one.target, arm.base) - reach(arm);
   const reasons = beyond > 0 ? [`out of reach by ${millimetres(beyond)}`] : [];
   for (let j = 0; j < one.q.length; j++) {
