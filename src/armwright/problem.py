@@ -45,8 +45,8 @@ class Problem:
         for objective in self.objectives:
             if objective in OF_ORIENTATION and not self.task.goals.oriented:
                 raise SettingsError(
-                    f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has an "
-                    "axis or an orientation. Give one to a target, or another objective"
+                    f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has "
+                    "an axis or an orientation. Give one to a target, or take another objective"
                 )
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))

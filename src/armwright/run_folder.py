@@ -475,7 +475,9 @@ def _brief(value: Any) -> str:
 def _identity(config: RunConfig) -> dict[str, Any]:
     """What makes a run this run and no other, flat."""
     content = config.model_dump(mode="json")
-    content["task"] = {key: content["task"][key] for key in ("name", "targets", "payload", "restarts", "reference_point")}
+    content["task"] = {
+        key: content["task"][key] for key in ("name", "targets", "payload", "restarts", "reference_point")
+    }
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)

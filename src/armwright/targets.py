@@ -38,7 +38,9 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if self.axis is not None and self.orientation is not None:
             raise ValueError("give axis or orientation, not both: an orientation says where every axis points to")
         if self.axis is not None and not 1e-6 <= math.hypot(*self.axis) <= LARGEST_COORDINATE:
-            raise ValueError(f"axis = {list(self.axis)} is no direction: such as [0, 0, -1] for a tool that points down")
+            raise ValueError(
+                f"axis = {list(self.axis)} is no direction: such as [0, 0, -1] for a tool that points down"
+            )
         if self.orientation is not None and max(map(abs, self.orientation)) > 2 * math.pi:
             raise ValueError(
                 f"orientation = {list(self.orientation)} is roll, pitch, yaw in rad, each within ±2π; 90° is 1.5708"
@@ -111,9 +113,9 @@ def read_target(value: Any, number: int) -> Target:
         return value
     for key in value:
         if key not in Target.model_fields:
-            allowed = ", ".join(Target.model_fields)
+            allowed = tuple(Target.model_fields)
             raise ValueError(
-                f'target {number}: unknown key "{key}". Allowed: {allowed}.{did_you_mean(str(key), Target.model_fields)}'
+                f'target {number}: unknown key "{key}". Allowed: {", ".join(allowed)}.{did_you_mean(str(key), allowed)}'
             )
     try:
         return Target.model_validate(value)

@@ -62,8 +62,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         )
         points = [entry if record is None else record.position for entry, record in zip(entries, records, strict=True)]
         task = handler({**cast("dict[str, Any]", data), "targets": points})
-        if any(isinstance(entry, Target) for entry in task._entries_of(records)):
-            task._records = records
+        kept = tuple(record if record is not None and record.words else None for record in records)
+        if any(kept):
+            task._records = kept  # pyright: ignore[reportAttributeAccessIssue] - frozen are the fields alone
         return task
 
     @field_serializer("targets")
@@ -99,24 +100,21 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @property
     def entries(self) -> tuple[Point | Target, ...]:
         """The targets as a task file has them: a record where one says more than its point."""
-        return self._entries_of(self._records)
+        if not self._records:
+            return self.targets
+        return tuple(record or point for point, record in zip(self.targets, self._records, strict=True))
 
     @property
     def goals(self) -> Goals:
         """How the targets are to be reached."""
-        return goals_of(self._records, self.restarts) if self._records else plain_goals(len(self.targets), self.restarts)
+        if not self._records:
+            return plain_goals(len(self.targets), self.restarts)
+        return goals_of(self._records, self.restarts)
 
     @property
     def is_plain(self) -> bool:
         """Whether the targets are points and nothing else, from one start."""
         return not self._records and self.restarts == 0
-
-    def _entries_of(self, records: tuple[Target | None, ...]) -> tuple[Point | Target, ...]:
-        says_more = [record is not None and record != Target(position=record.position) for record in records]
-        if not any(says_more):
-            return self.targets
-        each = zip(self.targets, records, says_more, strict=True)
-        return tuple(cast("Target", record) if more else point for point, record, more in each)
 
     @property
     def payloads(self) -> np.ndarray:

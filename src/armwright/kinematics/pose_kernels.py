@@ -1,8 +1,8 @@
 """The kernels for targets that say which way the tool points, too: of an axis, or of its whole orientation.
 
 A thread's targets may be of all kinds side by side. The system has six rows: three of the position, then the angles
-about the tool's own x, y and z that are still to be turned. A row that a target does not ask for is zero in J and one on
-the diagonal, so it neither moves a joint nor changes a determinant. All else is as in kernels.py, whose functions serve
+still to be turned about the tool's own x, y and z. A row that a target does not ask for is zero in J and one on the
+diagonal, so it neither moves a joint nor changes a determinant. All else is as in kernels.py, whose functions serve
 here, too.
 """
 
@@ -93,7 +93,17 @@ def pose_kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kerne
 
     @wp.func
     def turn_between(
-        xx: Lane, xy: Lane, xz: Lane, yx: Lane, yy: Lane, yz: Lane, zx: Lane, zy: Lane, zz: Lane, asks: Lane, whole: Lane
+        xx: Lane,
+        xy: Lane,
+        xz: Lane,
+        yx: Lane,
+        yy: Lane,
+        yz: Lane,
+        zx: Lane,
+        zy: Lane,
+        zz: Lane,
+        asks: Lane,
+        whole: Lane,
     ):
         """How far the tool is turned from a target [rad], and the way there about its own x, y, z, shortened.
 
@@ -467,7 +477,8 @@ def pose_kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kerne
                 b66 += wp.cw_mul(w6, c6)
 
             (
-                m21, m31, m32, m41, m42, m43, m51, m52, m53, m54, m61, m62, m63, m64, m65, p1, p2, p3, p4, p5, p6,
+                _m21, _m31, _m32, _m41, _m42, _m43, _m51, _m52, _m53, _m54, _m61, _m62, _m63, _m64, _m65,
+                p1, p2, p3, p4, p5, p6,
             ) = factored(
                 a11,
                 a21, a22,

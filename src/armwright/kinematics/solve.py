@@ -125,7 +125,8 @@ def _wanted(targets: NDArray[np.float64], payload: NDArray[np.float64], goals: G
     if goals is None or not goals.oriented:
         return np.column_stack(points)
     frame = goals.rotation.swapaxes(1, 2).reshape(-1, 9)  # the x, then y, then z that the tool should have
-    return np.column_stack([*points, frame, goals.rows > 0, goals.rows == ORIENTATION, goals.trade])
+    asks, whole = np.float64(goals.rows > 0), np.float64(goals.rows == ORIENTATION)
+    return np.column_stack([*points, frame, asks, whole, goals.trade])
 
 
 def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:
