@@ -37,7 +37,10 @@ class FixedProblem(Problem):
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
         arms = arrays_of(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
-        return Evaluation(arms, targets, self.task.payloads, q, reached, error, torques, self.task.obstacles)
+        angle = np.zeros_like(error)
+        return Evaluation(
+            arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals, self.task.obstacles
+        )
 
 
 LENGTH = Objective(

@@ -12,6 +12,7 @@ Vector = tuple[float, float, float]
 
 AXES: tuple[Axis, ...] = ("x", "y", "z")
 GRAVITY = 9.81  # [m/s²] along -z
+UNIT = 1e-6  # by which a unit vector's length may be off
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +161,10 @@ class Arm:
             raise ArmError(f"the base position must be finite: {self.base} m")
         if not all(math.isfinite(v) for v in self.tool):
             raise ArmError(f"the tool's offset must be finite: {self.tool} m")
+        axis, side = self.tool_axis, self.tool_side
+        across = sum(a * b for a, b in zip(axis, side, strict=True))
+        if not max(abs(math.hypot(*axis) - 1.0), abs(math.hypot(*side) - 1.0), abs(across)) < UNIT:
+            raise ArmError(f"tool_axis = {axis} and tool_side = {side} must be unit vectors at right angles")
 
     @property
     def mass(self) -> float:

@@ -51,7 +51,10 @@ def known_front(problem: Problem) -> KnownFront | None:
     paper = paper_space()
     same_space = problem.space.model_copy(update={"name": paper.name}) == paper
     as_the_paper = (
-        problem.objectives == PAPER_OBJECTIVES and not problem.task.payloads.any() and not problem.constraints
+        problem.objectives == PAPER_OBJECTIVES
+        and not problem.task.payloads.any()
+        and not problem.constraints
+        and problem.task.is_plain
     )
     if not same_space or problem.tolerance or not as_the_paper:
         return None

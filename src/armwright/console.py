@@ -30,6 +30,7 @@ from armwright.problem import Problem
 from armwright.results import REPORT, unmet
 from armwright.study import Progress as StudyProgress
 from armwright.study import Run
+from armwright.targets import target_words
 from armwright.task import Task as DesignTask
 
 EVERY = 10  # counted trials between two plain lines
@@ -286,6 +287,10 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
     reference = "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
     console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
+    for words in target_words(task.entries):
+        console.print(Text(f"  {words}"))
+    if task.restarts:
+        console.print(f"  {task.restarts + 1} starts of the inverse kinematics at each")
     if task.objectives is not None:
         console.print(f"  objectives: {', '.join(task.objectives)}")
     if task.constraints:

@@ -294,7 +294,7 @@ def _beginning(problem: Problem, begin_with: str | Path | Proposer | None) -> tu
         return nothing, {"proposer": {"name": begin_with.name, **begin_with.settings()}}
     _, run = read_run(begin_with)
     space = run.problem.space.model_copy(update={"name": problem.space.name})
-    if space != problem.space or run.problem.task.targets != problem.task.targets:
+    if space != problem.space or run.problem.task.entries != problem.task.entries:
         raise SettingsError(
             f"{begin_with} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"

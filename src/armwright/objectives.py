@@ -8,11 +8,11 @@ import numpy as np
 
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.goals import REACHED
 from armwright.kinematics.arrays import FIXED, Actuation
 
 TORQUE_SCALE = 40.0  # α of the paper
 FAR = 1.0  # [m]; a clearance counts as no more
-REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
 COMFORTABLE = 0.1  # [m] of clearance, beyond which more of it is worth nothing
 MOST_OBJECTIVES = 5  # of which the hypervolume is still computed in no time
 
@@ -59,7 +59,11 @@ class Objective:
 
 
 def _position_error(evaluation: Evaluation) -> Array:
-    return evaluation.position_error
+    return evaluation.goals.weight * evaluation.position_error
+
+
+def _orientation_error(evaluation: Evaluation) -> Array:
+    return evaluation.goals.weight * evaluation.angle_error
 
 
 def _torque_norm(evaluation: Evaluation) -> Array:
@@ -112,7 +116,7 @@ WORST_ERROR = Objective(
     unit="m",
     symbol="E_worst",
     words="the distance between the tip and the target in the kept posture",
-    each=_position_error,
+    each=lambda evaluation: evaluation.position_error,
     over="max",
 )
 MISSED = Objective(
@@ -121,7 +125,24 @@ MISSED = Objective(
     unit="targets",
     symbol="E_missed",
     words=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
-    each=lambda evaluation: (evaluation.position_error >= REACHED).astype(np.float64),
+    each=lambda evaluation: evaluation.missed.astype(np.float64),
+)
+ORIENTATION_ERROR = Objective(
+    name="orientation_error",
+    label="Orientation error",
+    unit="rad",
+    symbol="E_rot",
+    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    each=_orientation_error,
+)
+WORST_ANGLE = Objective(
+    name="worst_angle",
+    label="Worst orientation error",
+    unit="rad",
+    symbol="E_angle",
+    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    each=lambda evaluation: evaluation.angle_error,
+    over="max",
 )
 PEAK_TORQUE = Objective(
     name="peak_torque",
@@ -206,9 +227,10 @@ CLOSENESS = Objective(
     over="max",
 )
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
+OF_ORIENTATION = (ORIENTATION_ERROR, WORST_ANGLE)
 _ALL = (
-    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS, COLLISION,
-    CLOSENESS,
+    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS,
+    *OF_ORIENTATION, COLLISION, CLOSENESS,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 

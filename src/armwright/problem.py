@@ -12,7 +12,14 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.feasibility import ranked
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.objectives import OF_CLEARANCE, PAPER_OBJECTIVES, Objective, named_objectives
+from armwright.objectives import (
+    OF_CLEARANCE,
+    OF_ORIENTATION,
+    ORIENTATION_ERROR,
+    PAPER_OBJECTIVES,
+    Objective,
+    named_objectives,
+)  # fmt: skip
 from armwright.parameters import Design
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
@@ -28,7 +35,8 @@ class Problem:
     tolerance: [m] of a workshop; above 0, a design counts by the worst that comes of it, in each objective, when it is
         built exactly or with its base or one link off by so much (`armwright.tolerance`).
     device: where arms are evaluated; `resolve_device` says which there are.
-    objectives: what is minimised, of one's own too; without them, the task's, else the paper's.
+    objectives: what is minimised, of one's own too; without them, the task's, else the paper's, and the orientation
+        error where a target says which way the tool points.
     constraints: what a design has to keep, as the task says it.
     """
 
@@ -47,7 +55,14 @@ class Problem:
         object.__setattr__(self, "constraints", read_constraints(self.task.constraints))
         if not self.objectives:
             names = self.task.objectives
-            object.__setattr__(self, "objectives", PAPER_OBJECTIVES if names is None else named_objectives(names))
+            usual = (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.goals.oriented else PAPER_OBJECTIVES
+            object.__setattr__(self, "objectives", usual if names is None else named_objectives(names))
+        for objective in self.objectives:
+            if objective in OF_ORIENTATION and not self.task.goals.oriented:
+                raise SettingsError(
+                    f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has "
+                    "an axis or an orientation. Give one to a target, or take another objective"
+                )
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
         point, names = self.reference_point, [objective.name for objective in self.objectives]
@@ -85,7 +100,7 @@ class Problem:
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
         task = self.task
-        return evaluate_arrays(arms, task.points, self.device, start, task.payloads, task.obstacles)
+        return evaluate_arrays(arms, task.points, self.device, start, task.payloads, task.obstacles, task.goals)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""

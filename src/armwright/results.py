@@ -26,6 +26,7 @@ from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.feasibility import violation
 from armwright.history import FinishedTrial, FrontMember, History
+from armwright.misses import why_missed
 from armwright.pareto import hypervolume
 from armwright.proposers.proposer import ProposerSummary
 from armwright.run_folder import FrontMethod, RunConfig, RunFolder, read_run
@@ -336,6 +337,8 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
                     "q": evaluation.q[row, t, : len(member.arm.joints)].tolist(),
                     "reached": evaluation.reached[row, t].tolist(),
                     "position_error": float(evaluation.position_error[row, t]),
+                    **({"angle_error": float(evaluation.angle_error[row, t])} if evaluation.goals.rows[t] else {}),
+                    "missed": why_missed(member.arm, evaluation, row, t) or None,
                     "joint_torques": evaluation.joint_torques[row, t, : len(member.arm.joints)].tolist(),
                 }
                 for t in range(len(evaluation.targets))

@@ -44,14 +44,8 @@ SEARCH = "search.npz"
 BEFORE_TRIALS = {
     ".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
 }  # fmt: skip
-IDENTITY = (
-    "name",
-    "targets",
-    "payload",
-    "obstacles",
-    "constraints",
-    "reference_point",
-)  # of a task; its words may change
+# Of a task; its words may change.
+IDENTITY = ("name", "targets", "payload", "restarts", "obstacles", "constraints", "reference_point")
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 

@@ -1,4 +1,4 @@
-"""The task: points that the tip of the arm should reach."""
+"""The task: points that the tip of the arm should reach, and which way it should point there."""
 
 import csv
 import json
@@ -12,17 +12,25 @@ from pathlib import Path
 from typing import Any, Self, cast
 
 import numpy as np
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    field_serializer,
+    field_validator,
+    model_validator,
+)  # fmt: skip
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
+from armwright.goals import Goals, plain_goals
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
+from armwright.targets import LARGEST_COORDINATE, Point, Target, goals_of, read_target
 
-Point = tuple[float, float, float]
-
-LARGEST_COORDINATE = 1000.0  # [m]
 LARGEST_PAYLOAD = 1e4  # [kg]
 MOST_TARGETS = 10_000
+MOST_RESTARTS = 100
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 _FOLDER = resources.files("armwright") / "tasks"
 _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
@@ -31,9 +39,12 @@ _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from.
 
+    targets: points; where records are given that say more (`Target`), that is in `goals` and `entries`.
     payload: what the tip carries at all targets, or at each [kg].
+    restarts: further starts of the inverse kinematics at each target, of which the best posture counts.
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
-    objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two.
+    objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two, and where a target
+        says which way the tool points, orientation_error.
     constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
     """
 
@@ -41,12 +52,37 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
     obstacles: tuple[Obstacle, ...] = ()
+    restarts: int = Field(default=0, ge=0, le=MOST_RESTARTS)
     objectives: tuple[str, ...] | None = None
     constraints: tuple[str, ...] = ()
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
     description: str = Field(default="", max_length=10_000)
     provenance: str = Field(default="", max_length=10_000)
+    _records: tuple[Target | None, ...] = PrivateAttr(())  # of each target that says more; empty where none does
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _take_records(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Points of all targets, and the records of those that have one, apart."""
+        given = cast("dict[str, Any]", data).get("targets") if isinstance(data, dict) else None
+        if not isinstance(given, (list, tuple)):
+            return handler(data)
+        entries = cast("list[Any]", given)
+        records = tuple(
+            read_target(entry, number) if isinstance(entry, (dict, Target)) else None
+            for number, entry in enumerate(entries, start=1)
+        )
+        points = [entry if record is None else record.position for entry, record in zip(entries, records, strict=True)]
+        task = handler({**cast("dict[str, Any]", data), "targets": points})
+        kept = tuple(record if record is not None and record.words else None for record in records)
+        if any(kept):
+            task._records = kept  # pyright: ignore[reportAttributeAccessIssue] - frozen are the fields alone
+        return task
+
+    @field_serializer("targets")
+    def _with_records(self, targets: tuple[Point, ...]) -> tuple[Point | Target, ...]:
+        return self.entries
 
     @field_validator("obstacles", mode="before")
     @classmethod
@@ -85,6 +121,25 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def points(self) -> np.ndarray:
         """The targets as an array (T, 3) [m]."""
         return np.array(self.targets, dtype=np.float64)
+
+    @property
+    def entries(self) -> tuple[Point | Target, ...]:
+        """The targets as a task file has them: a record where one says more than its point."""
+        if not self._records:
+            return self.targets
+        return tuple(record or point for point, record in zip(self.targets, self._records, strict=True))
+
+    @property
+    def goals(self) -> Goals:
+        """How the targets are to be reached."""
+        if not self._records:
+            return plain_goals(len(self.targets), self.restarts)
+        return goals_of(self._records, self.restarts)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the targets are points and nothing else, from one start."""
+        return not self._records and self.restarts == 0
 
     @property
     def payloads(self) -> np.ndarray:
@@ -193,6 +248,14 @@ name: {json.dumps(_safe_name(file.stem))}    # names the run folder: letters, di
 targets:
 {rows}
 
+# A target can say more than its point: which way the tool's own z points there (axis), or its whole orientation as
+# roll, pitch, yaw about the fixed x, y, z [rad]; from where on it counts as missed; how much it counts.
+#   - {{position: [0.45, 0.0, 0.1], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}}
+#   - {{position: [0.45, 0.2, 0.3], orientation: [3.1416, 0, 1.5708]}}
+
+# Further starts of the inverse kinematics at each target, from postures drawn at random; the best posture counts.
+# restarts: 3
+
 # What the tip carries: at every target, or a list with a value for each [kg].
 # payload: 0.5
 
@@ -204,7 +267,7 @@ targets:
 #   - {{kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}}
 
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length, collision, closeness.
+# rms_torque, mass, length, collision, closeness, orientation_error, worst_angle.
 # objectives: [worst_error, peak_torque, mass]
 
 # What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number

@@ -20,12 +20,15 @@ SLIDES, FIXED = 3, 6  # motions: 0 to 2 turn about local x, y, z, 3 to 5 slide a
 
 Precision = Literal["float32", "float64"]
 Motions = Literal["turning", "any"]  # what all joints of some arms do
+Rows = Literal["position", "mixed"]  # what targets ask for: points alone, or of some which way the tool points, too
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
 Array = NDArray[np.float64]
 
-FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
-ARRAYS = (*FLOATS, "motion")  # of `ArmArrays`, that inverse kinematics takes
+_FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
+TOOL = ("tool_axis", "tool_side")  # that only targets with an axis or an orientation need
+FLOATS = (*_FLOATS, *TOOL)
+ARRAYS = (*_FLOATS, "motion")  # of `ArmArrays`, that all kernels of inverse kinematics read
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,8 @@ class ArmArrays:
     mass: Floats  # (N, D) [kg]
     radius: Floats  # (N, D) of the link after a joint [m]; 0 where there is none
     tool: Array  # (N, 3) from the end of the last link to the tip [m], in its own frame; a part of `offset`
+    tool_axis: Floats  # (N, 3) the tool's own z in the world when all joints are at 0, and so in the last local frame
+    tool_side: Floats  # (N, 3) the same of its x
     n_joints: Ints  # (N,) how many of the D an arm has
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 where it turns [m/rad]
     length: Array  # (N,) of all links [m]
@@ -133,6 +138,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         mass=mass.astype(precision),
         radius=radius.astype(precision),
         tool=np.array([arm.tool for arm in arms]),
+        tool_axis=np.array([arm.tool_axis for arm in arms], dtype=precision),
+        tool_side=np.array([arm.tool_side for arm in arms], dtype=precision),
         n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
         travel=travel,
         length=np.array([arm.length for arm in arms]),
@@ -239,6 +246,8 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
         mass=flat["mass"].astype(precision),
         radius=flat["radius"].astype(precision),
         tool=tool,
+        tool_axis=_turned(np.broadcast_to(_VECTORS[4], (n, 1, 3)), read.mount)[:, 0].astype(precision),
+        tool_side=_turned(np.broadcast_to(_VECTORS[0], (n, 1, 3)), read.mount)[:, 0].astype(precision),
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(links, axis=1)[:, -1],

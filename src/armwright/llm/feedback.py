@@ -14,12 +14,12 @@ from armwright.history import History
 from armwright.llm.answer import LONGEST_REASON
 from armwright.llm.lines import LISTS, NOTHING
 from armwright.llm.words import one_line
+from armwright.misses import AT_LIMIT, why_missed
 from armwright.parameters import Design
 from armwright.space import DesignSpace
 
 N_PARETO = 5  # members of the front shown
 N_RANDOM = 5  # other finished designs shown
-AT_LIMIT = 1e-3  # [rad] or [m] from a limit, from which a joint counts as standing at it
 LARGE = 1e6  # from which on numbers are written with an exponent
 NOISE = 1e-9  # below it a number counts as 0
 
@@ -89,12 +89,22 @@ class Feedback:
             **_parameters(self._history, number, at.length),
             "e_each": points(self._each[row, shown], at.shares) if at.shares else "",
             "p_ik": points(evaluation.reached[row, shown], at.length),
+            "a_ik": _angles(evaluation, row, shown),
+            "missed": self._missed(number, row, shown),
             "tau_ik": points(evaluation.motor_torques[row, shown, : len(joints)], at.torque),
             "limits": _limits(evaluation, row, joints),
             "load": _load(evaluation.motor_torques[row], joints),
             "e_all": vector(self._history.trials[number].values, at.objectives),
             "broken": _broken(self._history, number),
         }
+
+    def _missed(self, number: int, row: int, shown: list[int]) -> str:
+        """Why targets are missed, counted as shown; empty for points alone, whose reasons stand in the other lists."""
+        if not self._evaluation.goals.oriented:
+            return ""
+        arm = self._history.problem.arm(self._history.trials[number].design)
+        reasons = [why_missed(arm, self._evaluation, row, target) for target in shown]
+        return "; ".join(f"target {k} by {why}" for k, why in enumerate(reasons, start=1) if why) or "none"
 
 
 def proposal_records(history: History, name: str) -> list[Record]:
@@ -191,6 +201,15 @@ def _limits(evaluation: Evaluation, row: int, joints: Sequence[str]) -> str:
             if stands.any():
                 found.append(f"{name} {word} at {int(stands.sum())} of {len(q)}")
     return ", ".join(found) or "none"
+
+
+def _angles(evaluation: Evaluation, row: int, shown: list[int]) -> str:
+    """By how many degrees the tool is off at targets, "-" where any direction will do; empty where no target asks."""
+    goals = evaluation.goals
+    if not goals.oriented:
+        return ""
+    degrees = np.degrees(evaluation.angle_error[row])
+    return "(" + ", ".join(f"{degrees[t]:.1f}" if goals.rows[t] else "-" for t in shown) + ")"
 
 
 def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ import os
 import re
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -15,6 +15,7 @@ from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 from armwright.arm import GRAVITY
 from armwright.control import LONGEST_HINT
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.goals import REACHED
 from armwright.history import History
 from armwright.kinematics.solve import UPDATES
 from armwright.llm.feedback import Feedback, Record, points, proposal_records, vector
@@ -22,7 +23,9 @@ from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
+from armwright.objectives import MISSED, ORIENTATION_ERROR, POSITION_ERROR, Objective
 from armwright.problem import Problem
+from armwright.targets import target_words
 from armwright.task import Task
 from armwright.tolerance import measured_columns
 
@@ -58,6 +61,9 @@ VARIABLES = {
     "payload": "what the tip carries at the targets, as text; empty for nothing",
     "obstacles": "what the arm should keep away from, each as text; none as a rule",
     "collisions": "whether what the arm touches counts in an objective",
+    "asks": "what targets say beside their points, such as an axis for the tool, a line each; empty for points alone",
+    "oriented": "whether any target asks for an axis or an orientation of the tool",
+    "restarts": "further starts of the inverse kinematics at each target",
     "n_targets": "how many targets the task has",
     "n_targets_shown": "how many of them are listed",
     "target_low": "the least x, y and z of all targets",
@@ -71,8 +77,8 @@ VARIABLES = {
     "n_finished": "how many designs have been evaluated",
     "n_front": "how many of them are Pareto-optimal",
     "front": "members of the front, by rising first objective: number, origin, joints, links, extras, e_each, p_ik, "
-    "tau_ik, limits, load, e_all, broken (which constraints, or none; empty where there are none); as long as no "
-    "design is feasible (n_feasible), those nearest to it",
+    "a_ik, missed, tau_ik, limits, load, e_all, broken (which constraints, or none; empty where there are none); as "
+    "long as no design is feasible (n_feasible), those nearest to it",
     "others": "some other designs, with the same",
     "proposed": "--memory own: earlier proposals: number, origin, joints, links, extras, expected, e_all, broken, "
     "reason",
@@ -272,9 +278,11 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "payload": _payload_words(problem.task),
         "obstacles": [obstacle.words() for obstacle in problem.task.obstacles],
         "collisions": problem.heeds_clearance,
+        "oriented": problem.task.goals.oriented,
+        "restarts": problem.task.restarts,
         "n_targets": len(problem.task.points),
         "updates": UPDATES,
-        "objectives": problem.objectives,
+        "objectives": [_spoken(objective, problem.task) for objective in problem.objectives],
         "constraints": problem.constraints,
         "n_feasible": int(history.feasible.sum()),
         "tolerance": problem.tolerance,
@@ -290,6 +298,17 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
 def _lines(hints: Sequence[str]) -> list[str]:
     """Each hint on one line; one in which nothing is to be seen is left out."""
     return [line for hint in hints if (line := one_line(hint, LONGEST_HINT))]
+
+
+def _spoken(objective: Objective, task: Task) -> Objective:
+    """An objective whose words say what this task's tolerances and weights make of it."""
+    goals = task.goals
+    if objective == MISSED and (goals.oriented or np.any(goals.tolerance != REACHED)):
+        angle = " or the tool's direction by its angle tolerance" if goals.oriented else ""
+        return replace(objective, words=f"1 where the tip misses the target by its tolerance{angle} or more, else 0")
+    if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(goals.weight != 1.0):
+        return replace(objective, words=f"{objective.words}, times the target's weight")
+    return objective
 
 
 def _payload_words(task: Task) -> str:
@@ -320,6 +339,7 @@ def _shown(
     others = [feedback.others[place] for place in spread(len(feedback.others), most_designs)]
     return {
         "targets": points(points_[shown], decimals),
+        "asks": target_words([history.problem.task.entries[place] for place in shown]),
         "target_low": vector(points_.min(axis=0), decimals),
         "target_high": vector(points_.max(axis=0), decimals),
         "n_targets_shown": len(shown),

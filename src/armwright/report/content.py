@@ -20,6 +20,7 @@ from armwright.comparison import method_words
 from armwright.decision import bounded_numbers, numbers_of
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
+from armwright.goals import Goals
 from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
@@ -180,8 +181,9 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
 
     return {
         "base": floats([arm.base for arm in arms]),
-        "stands": floats([arm.tool_axis for arm in arms]),
         "tool": floats([arm.tool for arm in arms]),
+        "tool_axis": floats([arm.tool_axis for arm in arms]),
+        "tool_side": floats([arm.tool_side for arm in arms]),
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
         "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
         "axis": np.array([[AXES.index(j.axis) for j in row] for row in own], dtype=np.uint8),
@@ -213,6 +215,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
         "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
+        "goals": _goals(task.goals),
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
         "constraints": [
@@ -266,6 +269,17 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
         "rotation": solid.rotation.tolist(),
         "half": list(solid.half),
         "words": obstacle.words(),
+    }
+
+
+def _goals(goals: Goals) -> dict[str, Any]:
+    """How the targets are to be reached; frames: the axes that the tool should have, as columns, by rows."""
+    return {
+        "oriented": goals.oriented,
+        "rows": goals.rows.tolist(),
+        "frames": goals.rotation.reshape(-1, 9).tolist() if goals.oriented else [],
+        "tolerance": goals.tolerance.tolist(),
+        "angle_tolerance": goals.angle_tolerance.tolist(),
     }
 
 

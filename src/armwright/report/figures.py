@@ -17,6 +17,7 @@ from armwright.buying import ComparedArm, read_bought
 from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
+from armwright.goals import AXIS
 from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions, link_lines, rails
 from armwright.objectives import POSITION_ERROR, TORQUE, Objective
@@ -41,7 +42,7 @@ from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
 
-REACHED = 1e-3  # [m]; a target missed by less counts as reached
+ARROW = 0.15  # of an arm's reach, long: which way a target asks the tool to point
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # of the reference point, the part of the plane that is drawn
 MOST_PANELS = 12
@@ -314,9 +315,9 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
         draw_obstacles(axes, evaluation.obstacles, extent)
         _draw_postures(axes, member, evaluation, 0, [target])
         frame(axes, extent)
-        error = evaluation.position_error[0, target]
-        verdict = "reached" if error < REACHED else f"missed by {1e3 * error:.0f} mm"
-        axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=FRONT if error < REACHED else MISSED)
+        missed = evaluation.missed[0, target]
+        verdict = f"missed by {_missed_by(evaluation, target)}" if missed else "reached"
+        axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=MISSED if missed else FRONT)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_words(history, member)}", fontsize=10)
     figure.legend(handles=_arm_legend(evaluation), loc="lower center", ncols=_columns(evaluation) if columns > 2 else 3)
@@ -390,11 +391,29 @@ def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: 
         for joint, place in zip(member.arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
         goal = evaluation.targets[target]
-        reached = evaluation.position_error[row, target] < REACHED
         axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
-        if not reached:
+        _draw_goal(axes, evaluation, target, ARROW * member.arm.reach)
+        if evaluation.missed[row, target]:
             axes.plot(*np.array([places[-1], goal]).T, color=MISSED, linewidth=1.2, linestyle=(0, (2, 2)))
     axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
+
+
+def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
+    """Where the tool should point to: an arrow for its z, of a whole orientation its x and y, too."""
+    goal, rows = evaluation.targets[target], evaluation.goals.rows[target]
+    if not rows:
+        return
+    for k in (2,) if rows == AXIS else (0, 1, 2):
+        colour = TARGET if rows == AXIS else JOINT["xyz"[k]]
+        way = (1.0 if k == 2 else 0.6) * size * evaluation.goals.rotation[target, :, k]
+        axes.quiver(*goal, *way, color=colour, linewidth=1.4, arrow_length_ratio=0.3)
+
+
+def _missed_by(evaluation: Evaluation, target: int) -> str:
+    words = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
+    if not evaluation.goals.rows[target]:
+        return words
+    return f"{words}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
 
 
 def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
