@@ -7,6 +7,8 @@ import numpy as np
 from armwright.evaluation import Array, Evaluation
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.arrays import arrays_of
+from armwright.kinematics.paths import Paths
+from armwright.moves import lines_of
 from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
 from armwright.parameters import Design
 from armwright.pareto import default_reference_point
@@ -36,7 +38,25 @@ class FixedProblem(Problem):
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
         arms = arrays_of(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
-        return Evaluation(arms, targets, self.task.payloads, q, reached, error, torques, self.task.obstacles)
+        known = (arms, targets, self.task.payloads, q, reached, error, torques, self.task.obstacles)
+        evaluation = Evaluation(*known, moves=self.task.lines)
+        if evaluation.moves:
+            vars(evaluation)["paths"] = _fixed_paths(evaluation)
+        return evaluation
+
+
+def _fixed_paths(evaluation: Evaluation) -> Paths:
+    """Between two targets, all is between what it is at them, but for a bow of the tip."""
+    lines = lines_of(evaluation.moves, evaluation.targets)
+    start, end = np.array(evaluation.moves.pairs)[lines.move].T
+    share = lines.share[:, None]
+    q, reached, torques = (
+        (1 - share) * at[:, start] + share * at[:, end]
+        for at in (evaluation.q, evaluation.reached, evaluation.joint_torques)
+    )
+    reached = reached + 0.1 * share * (1 - share)
+    error = np.linalg.norm(reached - lines.points, axis=-1)
+    return Paths(evaluation.moves, lines, np.zeros(len(lines)), q, reached, error, torques)
 
 
 LENGTH = Objective(

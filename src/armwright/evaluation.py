@@ -1,6 +1,6 @@
 """What the physics says of an arm at its targets: no preference, no sums."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
-from armwright.exceptions import TaskError
+from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
+from armwright.kinematics.paths import Paths, follow
 from armwright.kinematics.solve import solve_postures
+from armwright.moves import NO_MOVES, Moves
 from armwright.obstacles import Obstacle
 
 Array = NDArray[np.float64]
@@ -22,7 +24,7 @@ Array = NDArray[np.float64]
 class Evaluation:
     """N arms of up to J joints at T targets; 0 for joints that an arm does not have.
 
-    Clearances are computed when they are first asked for.
+    Clearances and moves are computed when they are first asked for.
     """
 
     arms: ArmArrays
@@ -34,6 +36,7 @@ class Evaluation:
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
     obstacles: tuple[Obstacle, ...] = ()
     device: Device = "cpu"
+    moves: Moves = NO_MOVES
 
     def __len__(self) -> int:
         return len(self.q)
@@ -43,9 +46,33 @@ class Evaluation:
         """(N, T, J) at the actuators: of a sliding joint its force times its travel [N m]."""
         return self.joint_torques * self.arms.travel[:, None]
 
+    def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
+        """(N, T) a measure of motor torques, the largest of a target's posture and of the moves that end there.
+
+        measure: from torques (N, K, J) [N m] to (N, K), of K postures.
+        """
+        at_targets = measure(self.motor_torques)
+        if not self.moves:
+            return at_targets
+        along = measure(self.paths.joint_torques * self.arms.travel[:, None])
+        return self.paths.with_largest(at_targets, along)
+
+    @cached_property
+    def paths(self) -> Paths:
+        """The arms along the moves; SettingsError where there are none."""
+        if not self.moves:
+            raise SettingsError(
+                "path_error, joint_jump and all else of moves need some in the task: moves: in_order, or "
+                "moves: [[1, 2], [2, 3]]"
+            )
+        return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
+
     @property
     def self_clearance(self) -> Array:
-        """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none."""
+        """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none.
+
+        It and the other clearances are of a target's posture and of the moves that end there.
+        """
         return self._clearances[0]
 
     @property
@@ -60,7 +87,12 @@ class Evaluation:
 
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:
-        return clearances(self.arms, self.q, self.obstacles, self.device)
+        own, clear = clearances(self.arms, self.q, self.obstacles, self.device)
+        if not self.moves:
+            return own, clear
+        along = clearances(self.arms, self.paths.q, self.obstacles, self.device)
+        own, clear = (-self.paths.with_largest(-at, -way) for at, way in zip((own, clear), along, strict=True))
+        return own, clear
 
 
 def evaluate(
@@ -69,13 +101,15 @@ def evaluate(
     device: Device = "cpu",
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
+    moves: Moves = NO_MOVES,
 ) -> Evaluation:
     """Every arm at every target. Not reaching a target is a result, never an exception.
 
     targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
     obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
+    moves: lines between targets that the tip goes along.
     """
-    return evaluate_arrays(stack_arms(arms), targets, device, payload=payload, obstacles=obstacles)
+    return evaluate_arrays(stack_arms(arms), targets, device, payload=payload, obstacles=obstacles, moves=moves)
 
 
 def evaluate_arrays(
@@ -85,6 +119,7 @@ def evaluate_arrays(
     start: ArrayLike | None = None,
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
+    moves: Moves = NO_MOVES,
 ) -> Evaluation:
     """The same for arms that are stacked already, in their precision.
 
@@ -106,6 +141,7 @@ def evaluate_arrays(
         joint_torques=postures.torque.astype(np.float64),
         obstacles=tuple(obstacles),
         device=device,
+        moves=moves,
     )
 
 

@@ -475,9 +475,8 @@ def _brief(value: Any) -> str:
 def _identity(config: RunConfig) -> dict[str, Any]:
     """What makes a run this run and no other, flat."""
     content = config.model_dump(mode="json")
-    content["task"] = {
-        key: content["task"][key] for key in ("name", "targets", "payload", "obstacles", "reference_point")
-    }
+    of_task = ("name", "targets", "payload", "obstacles", "moves", "move_step", "reference_point")
+    content["task"] = {key: content["task"][key] for key in of_task}
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)

@@ -9,13 +9,14 @@ import shlex
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 from pydantic import BaseModel, Field, field_validator, model_validator
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
+from armwright.moves import MOVE_STEP, Moves, check_moves
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
 
 Point = tuple[float, float, float]
@@ -23,6 +24,7 @@ Point = tuple[float, float, float]
 LARGEST_COORDINATE = 1000.0  # [m]
 LARGEST_PAYLOAD = 1e4  # [kg]
 MOST_TARGETS = 10_000
+IN_ORDER = "in_order"  # of moves: from each target to the next
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 _FOLDER = resources.files("armwright") / "tasks"
 _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
@@ -33,6 +35,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     payload: what the tip carries at all targets, or at each [kg].
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
+    moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
+    move_step: from one sample of such a line to the next, at most [m].
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two.
     """
 
@@ -40,6 +44,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
     obstacles: tuple[Obstacle, ...] = ()
+    moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
+    move_step: Annotated[float, Field(gt=0.0, le=LARGEST_COORDINATE)] = MOVE_STEP
     objectives: tuple[str, ...] | None = None
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
@@ -58,6 +64,14 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             check_obstacle(record, number)
         return records
 
+    @field_validator("moves", mode="before")
+    @classmethod
+    def _check_moves(cls, value: Any) -> Any:
+        pairs = cast("list[Any]", value) if isinstance(value, (list, tuple)) else [None]
+        if value != IN_ORDER and not all(_is_pair(pair) for pair in pairs):
+            raise ValueError(f"moves is {IN_ORDER}, or a list of pairs of targets counted from 1: [[1, 2], [2, 3]]")
+        return cast("Any", value)
+
     @model_validator(mode="after")
     def _check_numbers(self) -> Self:
         if not self.targets:
@@ -75,6 +89,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(f"payload has {len(self.payload)} values for {len(self.targets)} targets; give one or all")
         if not all(0.0 <= kg <= LARGEST_PAYLOAD for kg in payloads):
             raise ValueError(f"payload = {self.payload} kg is outside 0 <= payload <= {LARGEST_PAYLOAD:g} kg")
+        if self.moves == IN_ORDER and len(self.targets) < 2:
+            raise ValueError(f"moves: {IN_ORDER} needs two targets or more")
+        check_moves([(start + 1, end + 1) for start, end in self.lines.pairs], self.targets, self.move_step)
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
             raise ValueError(f"reference_point = {list(self.reference_point)} must be above 0 in each objective")
         return self
@@ -88,6 +105,13 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def payloads(self) -> np.ndarray:
         """What the tip carries at each target, (T,) [kg]."""
         return np.broadcast_to(np.array(self.payload, dtype=np.float64), (len(self.targets),)).copy()
+
+    @property
+    def lines(self) -> Moves:
+        """The straight moves, with targets counted from 0."""
+        if self.moves == IN_ORDER:
+            return Moves(tuple((i, i + 1) for i in range(len(self.targets) - 1)), self.move_step)
+        return Moves(tuple((start - 1, end - 1) for start, end in self.moves), self.move_step)
 
 
 def builtin_names() -> list[str]:
@@ -201,8 +225,13 @@ targets:
 #   - {{kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}}
 #   - {{kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}}
 
+# Straight lines that the tip goes along: from each target to the next, or pairs of targets counted from 1. They count
+# in path_error, joint_jump, peak_torque, torque_use, collision and closeness.
+# moves: in_order    # or [[1, 2], [2, 1]]
+# move_step: 0.02    # m between two samples of a line
+
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length, collision, closeness.
+# rms_torque, mass, length, collision, closeness, path_error, joint_jump.
 # objectives: [worst_error, peak_torque, mass]
 
 # Worst values that still count, for the hypervolume: [position error summed over the targets in m,
@@ -213,6 +242,13 @@ targets:
 # description: What the arm has to do there.
 # provenance: Who measured the points, and when.
 """
+
+
+def _is_pair(value: Any) -> bool:
+    if not isinstance(value, (list, tuple)):
+        return False
+    pair = cast("list[Any]", value)
+    return len(pair) == 2 and all(isinstance(target, int) and not isinstance(target, bool) for target in pair)
 
 
 def _safe_name(stem: str) -> str:

@@ -16,14 +16,16 @@ from armwright.arm import GRAVITY
 from armwright.control import LONGEST_HINT
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.history import History
+from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.kinematics.solve import UPDATES
 from armwright.llm.feedback import Feedback, Record, points, proposal_records, vector
 from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
+from armwright.objectives import OF_THE_WAY
 from armwright.problem import Problem
-from armwright.task import Task
+from armwright.task import IN_ORDER, Task
 from armwright.tolerance import measured_columns
 
 PROMPTS = ("plus", "minus")
@@ -58,6 +60,9 @@ VARIABLES = {
     "payload": "what the tip carries at the targets, as text; empty for nothing",
     "obstacles": "what the arm should keep away from, each as text; none as a rule",
     "collisions": "whether what the arm touches counts in an objective",
+    "moves": "the straight lines that the tip goes along, as text; empty where none counts in an objective",
+    "of_the_way": "the objectives of which a target's share is the worst of it and of the moves that end there",
+    "updates_of_step": "updates of the inverse kinematics from one sample of a move to the next",
     "n_targets": "how many targets the task has",
     "n_targets_shown": "how many of them are listed",
     "target_low": "the least x, y and z of all targets",
@@ -269,6 +274,9 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "payload": _payload_words(problem.task),
         "obstacles": [obstacle.words() for obstacle in problem.task.obstacles],
         "collisions": problem.heeds_clearance,
+        "moves": _move_words(problem.task) if problem.heeds_moves else "",
+        "of_the_way": [objective for objective in problem.objectives if objective in OF_THE_WAY],
+        "updates_of_step": UPDATES_OF_STEP,
         "n_targets": len(problem.task.points),
         "updates": UPDATES,
         "objectives": problem.objectives,
@@ -298,6 +306,17 @@ def _payload_words(task: Task) -> str:
     each = "each" if len(shown) == len(payloads) else "some of"
     listed = ", ".join(f"{payloads[i]:g}" for i in shown)
     return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
+
+
+def _move_words(task: Task) -> str:
+    """The straight moves, by numbers of targets; empty where there are none."""
+    pairs = task.lines.pairs
+    if task.moves == IN_ORDER:
+        return "from each target to the next, in the order of the list"
+    shown = [pairs[i] for i in spread(len(pairs), MOST_TARGETS)]
+    listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in shown)
+    more = "" if len(shown) == len(pairs) else f" (some of {len(pairs)})"
+    return f"between the targets of these numbers, counted from 1: {listed}{more}" if pairs else ""
 
 
 def _shown(

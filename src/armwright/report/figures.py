@@ -23,7 +23,7 @@ from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.solids import draw_obstacles
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, Look, look
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, WAY, Look, look
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
@@ -225,6 +225,7 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
         targets = range(len(evaluation.targets))
         extent = _extent(evaluation, [m for _, m in chosen])
         draw_obstacles(axes, evaluation.obstacles, extent)
+        _draw_moves(axes, evaluation, column, targets)
         _draw_postures(axes, member, evaluation, column, targets)
         frame(axes, extent)
         axes.set_title(f"{title}\n{_words(history, member)}", y=1.0)
@@ -249,6 +250,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
         draw_obstacles(axes, evaluation.obstacles, extent)
+        _draw_moves(axes, evaluation, 0, [target])
         _draw_postures(axes, member, evaluation, 0, [target])
         frame(axes, extent)
         error = evaluation.position_error[0, target]
@@ -327,6 +329,17 @@ def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: 
     axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
 
 
+def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
+    """The moves that end at these targets: the line, and the way that the tip takes."""
+    if not evaluation.moves:
+        return
+    lines = evaluation.paths.lines
+    for (_, end), first, beyond in zip(evaluation.moves.pairs, lines.first, lines.first[1:], strict=False):
+        if end in targets:
+            axes.plot(*lines.points[first:beyond].T, color=TARGET, linewidth=1.2)
+            axes.plot(*evaluation.paths.reached[row, first:beyond].T, color=WAY, linewidth=1.4, linestyle=(0, (3, 1)))
+
+
 def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
     """Equal scales, so that angles and lengths look as they are."""
     centre, half = extent
@@ -371,12 +384,17 @@ def _legend(history: History) -> list[Line2D]:
 def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:
     joints = [Line2D([], [], linestyle="", marker="o", color=JOINT[a], label=JOINT_LABEL[a]) for a in "xyz"]
     obstacles = [Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle")] if evaluation.obstacles else []
+    moves = [
+        Line2D([], [], color=TARGET, linewidth=1.2, label="straight move"),
+        Line2D([], [], color=WAY, linewidth=1.4, linestyle=(0, (3, 1)), label="its tip"),
+    ][: 2 * bool(evaluation.moves)]
     return [
         Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
         *joints,
         Line2D([], [], linestyle="", marker="*", markersize=9, color=TARGET, markeredgecolor=FRONT, label="target"),
         Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
         *obstacles,
+        *moves,
     ]
 
 

@@ -91,7 +91,7 @@ function begin() {
   const sun = new THREE.DirectionalLight(0xffffff, 1.6);
   sun.position.set(3, -5, 8);
   scene.add(sun);
-  for (const name of ["floor", "obstacles", "targets", "ghost", "compared", "arm"]) {
+  for (const name of ["floor", "obstacles", "moves", "targets", "ghost", "compared", "arm"]) {
     groups[name] = new THREE.Group();
     scene.add(groups[name]);
   }
@@ -125,6 +125,7 @@ function legend() {
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], words[axis]]),
     [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
   if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
+  if (content.head.moves.length) parts.push([content.head.colours.target, "straight move (line)"]);
   $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
     const dot = element("span", { class: "dot" });
     dot.style.background = paint_;
@@ -182,6 +183,7 @@ function reframe() {
   frame = { centre, low, high, radius };
   drawFloor();
   drawObstacles();
+  drawMoves();
   drawTargets();
   look();
 }
@@ -244,6 +246,13 @@ function label(text, place) {
 function drawObstacles() {
   empty(groups.obstacles);
   for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, frame, materials.obstacle));
+}
+
+// The straight lines that the tip is asked to go along.
+function drawMoves() {
+  empty(groups.moves);
+  const points = content.head.moves.flatMap(([start, end]) => [...content.targets[start], ...content.targets[end]]);
+  if (points.length) groups.moves.add(segments(points, new THREE.LineBasicMaterial({ color: content.head.colours.target })));
 }
 
 function drawTargets() {
