@@ -15,6 +15,7 @@ from armwright.pareto import default_reference_point
 from armwright.problem import Problem
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
+from armwright.workspace import points_of
 
 
 class FixedProblem(Problem):
@@ -39,9 +40,11 @@ class FixedProblem(Problem):
         arms = arrays_of(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
         known = (arms, targets, self.task.payloads, q, reached, error, torques, self.task.obstacles)
-        evaluation = Evaluation(*known, moves=self.task.lines)
+        evaluation = Evaluation(*known, moves=self.task.lines, workspace=self.task.workspace)
         if evaluation.moves:
             vars(evaluation)["paths"] = _fixed_paths(evaluation)
+        ways = np.linalg.norm(points_of(self.task.workspace) - base[:, None], axis=-1)
+        vars(evaluation)["workspace_error"] = np.maximum(0.0, ways - reach[:, None])
         return evaluation
 
 

@@ -74,7 +74,7 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     scaled = TORQUE in history.problem.objectives
     words = f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; " if scaled else ""
     problem = history.problem
-    notes = f"{_payload_note(problem.task)}{_obstacle_note(problem)}{_move_note(problem)}"
+    notes = f"{_payload_note(problem.task)}{_obstacle_note(problem)}{_move_note(problem)}{_workspace_note(problem)}"
     console.print(f"{words}{problem.space.mass_note}{notes}")
     _show_places(console, run.folder, figures)
 
@@ -285,6 +285,8 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
     if task.lines:
         listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.lines.pairs)
         console.print(f"  straight moves between targets: {listed}; a step of {1e3 * task.move_step:g} mm")
+    for region in task.workspace:
+        console.print(f"  workspace: {region.words()}")
     console.print(f"  reference point: {reference}")
     console.print(f"  provenance: {task.provenance}")
     if known is not None:
@@ -342,6 +344,13 @@ def _move_note(problem: Problem) -> str:
         return ""
     names = ", ".join(objective.name for objective in OF_MOVES)
     return f"; the task's moves count in none of the objectives (these heed them: {names})"
+
+
+def _workspace_note(problem: Problem) -> str:
+    """That a task's workspace counts for nothing, where that is so."""
+    if not problem.task.workspace or problem.heeds_workspace:
+        return ""
+    return "; the task's workspace counts in none of the objectives (unreached heeds it)"
 
 
 def _payload_note(task: DesignTask) -> str:

@@ -12,10 +12,12 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
+from armwright.kinematics.jacobian import jacobians
 from armwright.kinematics.paths import Paths, follow
 from armwright.kinematics.solve import solve_postures
 from armwright.moves import NO_MOVES, Moves
 from armwright.obstacles import Obstacle
+from armwright.workspace import Region, points_of
 
 Array = NDArray[np.float64]
 
@@ -24,7 +26,7 @@ Array = NDArray[np.float64]
 class Evaluation:
     """N arms of up to J joints at T targets; 0 for joints that an arm does not have.
 
-    Clearances and moves are computed when they are first asked for.
+    Clearances, moves, the workspace and Jacobians are computed when they are first asked for.
     """
 
     arms: ArmArrays
@@ -37,6 +39,7 @@ class Evaluation:
     obstacles: tuple[Obstacle, ...] = ()
     device: Device = "cpu"
     moves: Moves = NO_MOVES
+    workspace: tuple[Region, ...] = ()  # to cover, by W points together
 
     def __len__(self) -> int:
         return len(self.q)
@@ -66,6 +69,34 @@ class Evaluation:
                 "moves: [[1, 2], [2, 3]]"
             )
         return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
+
+    @property
+    def manipulability(self) -> Array:
+        """(N, T) sqrt(det J Jᵀ) of the position Jacobian J in the kept posture (Yoshikawa 1985) [m³]."""
+        return self._singular_values.prod(axis=-1)
+
+    @property
+    def dexterity(self) -> Array:
+        """(N, T) the smallest singular value of J over the largest; 0 where the tip cannot move in some direction."""
+        largest = self._singular_values[..., 0]
+        return self._singular_values[..., -1] / np.where(largest > 0.0, largest, 1.0)
+
+    @cached_property
+    def _singular_values(self) -> Array:
+        """(N, T, 3) of J, from the largest on."""
+        jacobian = jacobians(self.arms, self.q)
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(-1, -2))[..., ::-1], 0.0))
+
+    @cached_property
+    def workspace_error(self) -> Array:
+        """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
+        if not self.workspace:
+            raise SettingsError(
+                "unreached needs a workspace in the task: workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
+            )
+        points = points_of(self.workspace)
+        reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
+        return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
 
     @property
     def self_clearance(self) -> Array:
@@ -102,14 +133,16 @@ def evaluate(
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
     moves: Moves = NO_MOVES,
+    workspace: Sequence[Region] = (),
 ) -> Evaluation:
     """Every arm at every target. Not reaching a target is a result, never an exception.
 
     targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
     obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
     moves: lines between targets that the tip goes along.
+    workspace: boxes to cover.
     """
-    return evaluate_arrays(stack_arms(arms), targets, device, payload=payload, obstacles=obstacles, moves=moves)
+    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, moves, workspace)
 
 
 def evaluate_arrays(
@@ -120,6 +153,7 @@ def evaluate_arrays(
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
     moves: Moves = NO_MOVES,
+    workspace: Sequence[Region] = (),
 ) -> Evaluation:
     """The same for arms that are stacked already, in their precision.
 
@@ -142,6 +176,7 @@ def evaluate_arrays(
         obstacles=tuple(obstacles),
         device=device,
         moves=moves,
+        workspace=tuple(workspace),
     )
 
 

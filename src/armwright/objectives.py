@@ -230,10 +230,29 @@ JOINT_JUMP = Objective(
     each=_joint_jump,
     over="max",
 )
+UNREACHED = Objective(
+    name="unreached",
+    label="Unreached",
+    unit="share",
+    symbol="E_unreached",
+    words=f"the share of the workspace's points that the tip misses by {1e3 * REACHED:g} mm or more",
+    each=lambda evaluation: (evaluation.workspace_error >= REACHED).mean(axis=1),
+    over="arm",
+)
+CLUMSINESS = Objective(
+    name="clumsiness",
+    label="Clumsiness",
+    unit="share",
+    symbol="E_clumsy",
+    words="1 less the tip's speed in the direction in which the joints move it worst over that in the best, in the "
+    "kept posture: 0 where all directions are alike, 1 where there is one in which the tip cannot move at all",
+    each=lambda evaluation: 1.0 - evaluation.dexterity,
+    over="max",
+)
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
 _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS, COLLISION,
-    CLOSENESS, PATH_ERROR, JOINT_JUMP,
+    CLOSENESS, PATH_ERROR, JOINT_JUMP, UNREACHED, CLUMSINESS,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 

@@ -10,7 +10,7 @@ from armwright.evaluation import Array, Evaluation, evaluate_arrays
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.objectives import OF_CLEARANCE, OF_MOVES, PAPER_OBJECTIVES, Objective, named_objectives
+from armwright.objectives import OF_CLEARANCE, OF_MOVES, PAPER_OBJECTIVES, UNREACHED, Objective, named_objectives
 from armwright.parameters import Design
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
@@ -66,6 +66,22 @@ class Problem:
         """Whether it counts what the arm does on its moves."""
         return any(objective in OF_MOVES for objective in self.objectives)
 
+    @property
+    def heeds_workspace(self) -> bool:
+        """Whether it counts how much of the workspace is covered."""
+        return UNREACHED in self.objectives
+
+    @property
+    def _postures(self) -> int:
+        """Of each arm, at most."""
+        task = self.task
+        return (
+            len(task.points)
+            + sum(task.lines.steps(task.points))
+            + len(task.lines)
+            + sum(r.points for r in task.workspace)
+        )
+
     def arm(self, design: Design) -> Arm:
         """The physical chain that a design builds."""
         return self.space.arm(design)
@@ -81,7 +97,8 @@ class Problem:
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
         task = self.task
-        return evaluate_arrays(arms, task.points, self.device, start, task.payloads, task.obstacles, task.lines)
+        known = (task.payloads, task.obstacles, task.lines, task.workspace)
+        return evaluate_arrays(arms, task.points, self.device, start, *known)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
@@ -89,9 +106,7 @@ class Problem:
         Only the postures of a chunk of them are in memory at a time.
         """
         matrix = self.space.settled(matrix)
-        lines = self.task.lines
-        postures = len(self.task.points) + sum(lines.steps(self.task.points)) + len(lines)
-        size = max(1, POSTURES_AT_ONCE[self.device] // postures)
+        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
         values = np.empty((len(matrix), len(self.objectives)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)

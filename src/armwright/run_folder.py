@@ -475,7 +475,7 @@ def _brief(value: Any) -> str:
 def _identity(config: RunConfig) -> dict[str, Any]:
     """What makes a run this run and no other, flat."""
     content = config.model_dump(mode="json")
-    of_task = ("name", "targets", "payload", "obstacles", "moves", "move_step", "reference_point")
+    of_task = ("name", "targets", "payload", "obstacles", "moves", "move_step", "workspace", "reference_point")
     content["task"] = {key: content["task"][key] for key in of_task}
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")

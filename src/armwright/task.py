@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.moves import MOVE_STEP, Moves, check_moves
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
+from armwright.workspace import MOST_POINTS, MOST_REGIONS, Region
 
 Point = tuple[float, float, float]
 
@@ -37,6 +38,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
     moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
     move_step: from one sample of such a line to the next, at most [m].
+    workspace: boxes that the tip should cover; where targets are left out, these are the boxes' corners.
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two.
     """
 
@@ -46,6 +48,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     obstacles: tuple[Obstacle, ...] = ()
     moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
     move_step: Annotated[float, Field(gt=0.0, le=LARGEST_COORDINATE)] = MOVE_STEP
+    workspace: tuple[Region, ...] = ()
     objectives: tuple[str, ...] | None = None
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
@@ -63,6 +66,27 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         for number, record in enumerate(records, start=1):
             check_obstacle(record, number)
         return records
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_corners(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or "targets" in content or "workspace" not in content:
+            return cast("Any", content)
+        try:
+            regions = [Region.model_validate(region) for region in _listed(content["workspace"])]
+        except ValidationError:
+            corners = ((0.0, 0.0, 0.0),)  # what is wrong with the workspace is said of itself, by its field
+        else:
+            corners = tuple(dict.fromkeys(corner for region in regions for corner in region.corners))
+        return {**cast("dict[str, Any]", content), "targets": corners}
+
+    @field_validator("workspace", mode="before")
+    @classmethod
+    def _check_workspace(cls, value: Any) -> Any:
+        regions = _listed(value)
+        if len(regions) > MOST_REGIONS:
+            raise ValueError(f"workspace has {len(regions)} boxes; at most {MOST_REGIONS} are allowed")
+        return regions
 
     @field_validator("moves", mode="before")
     @classmethod
@@ -92,6 +116,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if self.moves == IN_ORDER and len(self.targets) < 2:
             raise ValueError(f"moves: {IN_ORDER} needs two targets or more")
         check_moves([(start + 1, end + 1) for start, end in self.lines.pairs], self.targets, self.move_step)
+        if sum(region.points for region in self.workspace) > MOST_POINTS:
+            raise ValueError(f"workspace has more than {MOST_POINTS} points together")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
             raise ValueError(f"reference_point = {list(self.reference_point)} must be above 0 in each objective")
         return self
@@ -230,8 +256,13 @@ targets:
 # moves: in_order    # or [[1, 2], [2, 1]]
 # move_step: 0.02    # m between two samples of a line
 
+# A box that the tip should cover, in metres, or a list of boxes; it counts with the objective unreached. Where targets
+# are left out, they are its corners.
+# workspace: {{low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 200}}
+
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length, collision, closeness, path_error, joint_jump.
+# rms_torque, mass, length, collision, closeness, path_error, joint_jump,
+# unreached, clumsiness.
 # objectives: [worst_error, peak_torque, mass]
 
 # Worst values that still count, for the hypervolume: [position error summed over the targets in m,
@@ -242,6 +273,15 @@ targets:
 # description: What the arm has to do there.
 # provenance: Who measured the points, and when.
 """
+
+
+def _listed(workspace: Any) -> list[Any]:
+    """One box, or a list of them, as a list."""
+    if isinstance(workspace, (dict, Region)):
+        return [workspace]
+    if isinstance(workspace, (list, tuple)):
+        return list(cast("list[Any]", workspace))
+    raise ValueError("workspace is {low: [x, y, z], high: [x, y, z], points: 200} in metres, or a list of such boxes")
 
 
 def _is_pair(value: Any) -> bool:

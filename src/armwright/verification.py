@@ -82,7 +82,6 @@ def _values(problem: Problem, rows: Array, start: Array | None = None) -> Array:
     """(N, M) in float64.  start: (T, D) angles [rad]; None for the straight start."""
     arrays = arrays_of(problem.space, rows, "float64")
     task = problem.task
-    found = evaluate_arrays(
-        arrays, task.points, start=start, payload=task.payloads, obstacles=task.obstacles, moves=task.lines
-    )
+    known = (task.payloads, task.obstacles, task.lines, task.workspace)
+    found = evaluate_arrays(arrays, task.points, "cpu", start, *known)
     return problem.values(found)

@@ -196,6 +196,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
         "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
+        "workspace": [{"low": list(r.low), "high": list(r.high), "words": r.words()} for r in task.workspace],
         "moves": [list(pair) for pair in task.lines.pairs],
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],

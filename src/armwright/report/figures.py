@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +24,11 @@ from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.solids import draw_obstacles
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, WAY, Look, look
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, REGION, TARGET, WAY, Look, look
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
+from armwright.workspace import Region
 
 REACHED = 1e-3  # [m]; a target missed by less counts as reached
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
@@ -225,6 +227,7 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
         targets = range(len(evaluation.targets))
         extent = _extent(evaluation, [m for _, m in chosen])
         draw_obstacles(axes, evaluation.obstacles, extent)
+        _draw_workspace(axes, evaluation.workspace)
         _draw_moves(axes, evaluation, column, targets)
         _draw_postures(axes, member, evaluation, column, targets)
         frame(axes, extent)
@@ -250,6 +253,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
         draw_obstacles(axes, evaluation.obstacles, extent)
+        _draw_workspace(axes, evaluation.workspace)
         _draw_moves(axes, evaluation, 0, [target])
         _draw_postures(axes, member, evaluation, 0, [target])
         frame(axes, extent)
@@ -340,6 +344,15 @@ def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[i
             axes.plot(*evaluation.paths.reached[row, first:beyond].T, color=WAY, linewidth=1.4, linestyle=(0, (3, 1)))
 
 
+def _draw_workspace(axes: Any, workspace: Sequence[Region]) -> None:
+    """The edges of the boxes to cover."""
+    for region in workspace:
+        corners = np.array(list(product(*zip(region.low, region.high, strict=True))))
+        for one, other in combinations(corners, 2):
+            if (one != other).sum() == 1:
+                axes.plot(*np.array([one, other]).T, color=REGION, linewidth=0.8)
+
+
 def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
     """Equal scales, so that angles and lengths look as they are."""
     centre, half = extent
@@ -359,7 +372,8 @@ def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.
         for row, member in enumerate(members)
         for q in evaluation.q[row]
     ]
-    points = np.vstack([evaluation.targets, *places])
+    corners = [corner for region in evaluation.workspace for corner in region.corners]
+    points = np.vstack([evaluation.targets, *corners, *places])
     low, high = points.min(axis=0), points.max(axis=0)
     for obstacle in evaluation.obstacles:
         if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor that is near
@@ -388,6 +402,7 @@ def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:
         Line2D([], [], color=TARGET, linewidth=1.2, label="straight move"),
         Line2D([], [], color=WAY, linewidth=1.4, linestyle=(0, (3, 1)), label="its tip"),
     ][: 2 * bool(evaluation.moves)]
+    regions = [Line2D([], [], color=REGION, linewidth=0.8, label="workspace")] if evaluation.workspace else []
     return [
         Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
         *joints,
@@ -395,6 +410,7 @@ def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:
         Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
         *obstacles,
         *moves,
+        *regions,
     ]
 
 
