@@ -1,6 +1,7 @@
 """Problems whose evaluation is a simple formula, the same on every machine; and histories of them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,8 +40,9 @@ class FixedProblem(Problem):
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
         arms = arrays_of(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
-        known = (arms, targets, self.task.payloads, q, reached, error, torques, self.task.obstacles)
-        evaluation = Evaluation(*known, moves=self.task.lines, workspace=self.task.workspace)
+        angle = np.zeros_like(error)
+        known = (arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals)
+        evaluation = Evaluation(*known, self.task.obstacles, moves=self.task.lines, workspace=self.task.workspace)
         if evaluation.moves:
             vars(evaluation)["paths"] = _fixed_paths(evaluation)
         ways = np.linalg.norm(points_of(self.task.workspace) - base[:, None], axis=-1)
@@ -79,17 +81,27 @@ THREE_OBJECTIVES = (*PAPER_OBJECTIVES, LENGTH)
 def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Sequence[FinishedTrial] = ()) -> History:
     """`n` designs at random, then the given proposals (their numbers and values are filled in)."""
     designs = [*problem.space.sample(n, seed=1), *(trial.design for trial in proposals)]
-    values = problem.evaluate(designs)
+    values, broken = problem.judge(designs)
     reference = problem.reference_point
     if reference is None and len(designs) >= n_init and values.shape[1] == 2:
         reference = default_reference_point(values[:n_init])
     trials = [
-        FinishedTrial(number, "random" if number < n_init else "bbo", design, tuple(row))
+        FinishedTrial(
+            number,
+            "random" if number < n_init else "bbo",
+            design,
+            tuple(row),
+            constraints=tuple(broken[number].tolist()),
+        )
         for number, (design, row) in enumerate(zip(designs, values.tolist(), strict=True))
     ]
     for place, trial in enumerate(proposals, start=n):
-        trials[place] = FinishedTrial(
-            place, "llm", trial.design, trials[place].values, f"llm-{place:04d}", trial.reason, trial.expected
+        trials[place] = replace(
+            trials[place],
+            source="llm",
+            proposal=f"llm-{place:04d}",
+            reason=trial.reason,
+            expected=trial.expected,
         )
     return History(problem, trials, n_init, reference)
 

@@ -24,7 +24,18 @@ def told(server: ChatServer) -> tuple[str, ...]:
     return ("--model", "test-model", "--base-url", server.url, "--origin", "scripted")
 
 
-@pytest.mark.parametrize("number", ["1-paper-target", "2-assembly", "5-obstacle-reach", "6-price"])
+@pytest.mark.parametrize(
+    "number",
+    [
+        "1-paper-target",
+        "2-assembly",
+        "3-long-shelf",
+        "4-wall-painting",
+        "5-obstacle-reach",
+        "6-price",
+        "7-buy-or-build",
+    ],
+)
 def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
     task = next(EXAMPLES.glob(f"{number}*task.yaml"), EXAMPLES / f"{number}.yaml")
     space = EXAMPLES / f"{number}-space.yaml"

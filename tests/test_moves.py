@@ -334,3 +334,32 @@ def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
     (in_folder / "line.yaml").write_text(f"{text} [position_error, torque]\n")
     told = CliRunner().invoke(app, [*words, "--out", "other"])
     assert "the task's moves count in none of the objectives" in told.output
+
+
+def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:
+    sentences = (
+        "path_error <= 0.01",
+        "joint_jump <= 0.5",
+        "unreached <= 0.4",
+        "manipulability >= 0.001",
+        "clumsiness <= 0.99",
+    )
+    box = {"low": (0.2, -0.2, 0.1), "high": (0.5, 0.2, 0.3), "points": 30}
+    problem = Problem(
+        task(moves="in_order", workspace=box, constraints=[*sentences, "clumsiness <= 0.99"]), paper_space(6)
+    )
+    designs = problem.space.sample(40, 1)
+    evaluation, broken = problem.evaluation(designs), problem.judge(designs)[1]
+    assert (problem.heeds_moves, problem.heeds_workspace) == (True, True)
+    measured = np.column_stack(
+        [
+            evaluation.paths.error.max(axis=1),
+            evaluation.paths.jumps.max(axis=1),
+            (evaluation.workspace_error >= 1e-3).mean(axis=1),
+            -evaluation.manipulability.min(axis=1),
+            1.0 - evaluation.dexterity.min(axis=1),
+        ]
+    )
+    kept = measured <= np.array([0.01, 0.5, 0.4, -0.001, 0.99])
+    assert np.array_equal(broken <= 0.0, kept)
+    assert np.all((kept.sum(axis=0) > 0) & (kept.sum(axis=0) < 40)), "each is kept by some and broken by others"

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from armwright.cli import app
 from armwright.documents import parse_document
 from armwright.exceptions import RunConflictError, TaskError
-from armwright.objectives import CLEARANCES, OBJECTIVES, named_objectives
+from armwright.objectives import CLEARANCES, FAR, OBJECTIVES, named_objectives
 from armwright.obstacles import SHAPES, Box, Cylinder
 from armwright.problem import Problem
 from armwright.report.page import write_report
@@ -129,8 +129,9 @@ def test_objectives_of_clearance() -> None:
         assert values[row, 0] == pytest.approx(sum(max(0.0, -at) for at in free[row]))
         assert values[row, 1] == pytest.approx(max(max(0.0, 0.1 - at) for at in free[row]))
     assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)), values)
-    for name, of in CLEARANCES.items():
-        assert np.array_equal(of(evaluation), getattr(evaluation, name))
+    for quantity in CLEARANCES:
+        least = getattr(evaluation, quantity.name).min(axis=1)
+        assert np.array_equal(quantity(evaluation), np.minimum(least, FAR))
     assert np.any(verify(problem, designs, values, (1.0, 1.0)).solid)
     alone = Problem(Task(name="alone", targets=task.targets), objectives=named_objectives(["collision", "closeness"]))
     assert np.all(np.isfinite(alone.evaluate(designs)))

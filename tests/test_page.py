@@ -216,6 +216,32 @@ def test_a_design_that_is_not_on_the_front_has_numbers_and_no_files(run: Path, t
     assert "Not on the Pareto front" in tab.text("#design-words")
 
 
+def test_infeasible_designs_are_hollow_on_no_front_and_say_what_they_break(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-2").model_copy(update={"constraints": ("worst_error <= 0.4", "length >= 0.5")})
+    history = aw.optimize(aw.Problem(task=task), proposer="none", n_total=30, seed=1, out=tmp_path / "run").history
+    tab.open(write_report(tmp_path / "run"))
+    infeasible = np.flatnonzero(~history.feasible).tolist()
+    assert infeasible
+    assert history.front
+    drawn = (
+        "pareto.data.filter((t) => t.marker?.symbol === 'circle-open').map((t) => [t.name, Array.from(t.customdata)])"
+    )
+    assert tab.ask(drawn) == [["infeasible", infeasible]]
+    assert f"infeasible {len(infeasible)}" in tab.text("#facts")
+    numbers = [int(text) for text in tab.page.locator("#table tbody tr td:first-child").all_inner_texts()]
+    assert numbers == [member.number for member in history.front]
+    worst = max(infeasible, key=lambda number: history.broken[number, 0])
+    tab.ask(f"armwright.set({{ design: {worst} }})")
+    error = history.evaluation([worst]).position_error.max()
+    assert f"Infeasible; worst_error <= 0.4: {error:.4g} m (broken); length >= 0.5: " in tab.text("#design-words")
+    tab.ask(f"armwright.set({{ design: {numbers[0]} }})")
+    assert "Feasible; worst_error <= 0.4: " in tab.text("#design-words")
+    assert asked(tab, "worst_error<=0.35") == [
+        member.number for member in pick_from(tmp_path / "run", [read_condition("worst_error<=0.35")])[1]
+    ]
+    assert tab.faults == []
+
+
 def test_the_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
     numbers = [int(text) for text in tab.page.locator("#table tbody tr td:first-child").all_inner_texts()]

@@ -97,6 +97,10 @@ def own(n: int) -> History:
     return fixed_history(PAPER, proposals=told)
 
 
+def bounded(*constraints: str) -> FixedProblem:
+    return FixedProblem(load_task("target-1").model_copy(update={"constraints": constraints}))
+
+
 def rendered(history: History, prompt: str = "plus", **how: Any) -> str:
     return load_prompt(prompt).render(history, 3, **how)
 
@@ -124,6 +128,12 @@ CASES: dict[str, Callable[[], str]] = {
     "two-joints-two-designs": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
     "nothing-yet": lambda: rendered(fixed_history(PAPER, n=0), "minus"),
     "robust": lambda: rendered(fixed_history(FixedProblem(load_task("target-1"), tolerance=1e-3)), "minus"),
+    "constraints": lambda: rendered(fixed_history(bounded("worst_error <= 0.3", "length >= 0.7"))),
+    "constraints-none-feasible-own": lambda: rendered(
+        fixed_history(bounded("mass <= 0.001"), proposals=[proposal(DESIGNS[0], "light", (1.0, 2.0))]),
+        "minus",
+        memory="own",
+    ),
     "small": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, SMALL), n=3), "minus"),
     "parameters": lambda: parameters_prompt(PAPER, "I think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)"),
     "parameters-several-own": lambda: parameters_prompt(

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from armwright.any_study.llm import StudyLlmProposer
     from armwright.any_study.proposals import StudyProposal, StudyProposer
     from armwright.arm import Arm, Joint, Link, uniform_link
+    from armwright.buying import ArmComparison, ComparedArm, compare_arms
     from armwright.comparison import Comparison, compare_runs
     from armwright.drafting import Draft, draft
     from armwright.evaluation import Evaluation, evaluate
@@ -43,12 +44,15 @@ if TYPE_CHECKING:
     from armwright.space import DesignSpace, load_space, paper_space
     from armwright.study import Run, optimize
     from armwright.task import Task, builtin_tasks, load_task, random_task
+    from armwright.urdf.reading import UrdfArm, read_urdf
 
 # Where each public name lives. Modules load when a name of theirs is first used, so that the command line
 # answers at once and nobody pays for what is not used.
 _PLACES = {
     "Arm": "arm",
+    "ArmComparison": "buying",
     "ArmwrightError": "exceptions",
+    "ComparedArm": "buying",
     "Comparison": "comparison",
     "Design": "parameters",
     "DesignSpace": "space",
@@ -75,8 +79,10 @@ _PLACES = {
     "StudyProposal": "any_study.proposals",
     "StudyProposer": "any_study.proposals",
     "Task": "task",
+    "UrdfArm": "urdf.reading",
     "UsageError": "exceptions",
     "builtin_tasks": "task",
+    "compare_arms": "buying",
     "compare_runs": "comparison",
     "draft": "drafting",
     "evaluate": "evaluation",
@@ -89,6 +95,7 @@ _PLACES = {
     "polish_run": "polish",
     "random_task": "task",
     "read_run": "run_folder",
+    "read_urdf": "urdf.reading",
     "to_mjcf": "export.mjcf",
     "to_ros2_control": "export.ros2_control",
     "to_sdf": "export.sdf",
@@ -103,7 +110,9 @@ _PLACES = {
 
 __all__ = [
     "Arm",
+    "ArmComparison",
     "ArmwrightError",
+    "ComparedArm",
     "Comparison",
     "Design",
     "DesignSpace",
@@ -130,8 +139,10 @@ __all__ = [
     "StudyProposal",
     "StudyProposer",
     "Task",
+    "UrdfArm",
     "UsageError",
     "builtin_tasks",
+    "compare_arms",
     "compare_runs",
     "draft",
     "evaluate",
@@ -144,6 +155,7 @@ __all__ = [
     "polish_run",
     "random_task",
     "read_run",
+    "read_urdf",
     "to_mjcf",
     "to_ros2_control",
     "to_sdf",

@@ -12,6 +12,7 @@ Vector = tuple[float, float, float]
 
 AXES: tuple[Axis, ...] = ("x", "y", "z")
 GRAVITY = 9.81  # [m/s²] along -z
+UNIT = 1e-6  # by which a unit vector's length may be off
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,8 @@ class Link:
 
     offset: from this joint to the next, or to the tip of the arm [m].
     mass: [kg].  com: centre of mass from this joint [m].  radius: of its round section [m].
-    end_mass: of a point at its end that it carries, too, such as the next joint's actuator [kg].
+    end_mass: of a point that it carries at its end, too, such as the next joint's actuator [kg].
+    end_shift: from its end to that point [m].
     """
 
     offset: Vector
@@ -92,9 +94,10 @@ class Link:
     com: Vector
     radius: float
     end_mass: float = 0.0
+    end_shift: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass)
+        values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift)
         if not all(math.isfinite(v) for v in values):
             raise ArmError(f"a link's numbers must be finite: {self}")
         if min(self.mass, self.end_mass) < 0.0 or self.radius <= 0.0:
@@ -110,12 +113,18 @@ class Link:
         """The centre of that mass from this joint [m]."""
         if self.end_mass == 0.0:
             return self.com
-        (x, y, z), (u, v, w), total = self.com, self.offset, self.total_mass
+        (x, y, z), (u, v, w), total = self.com, self.end_place, self.total_mass
         return (
             (self.mass * x + self.end_mass * u) / total,
             (self.mass * y + self.end_mass * v) / total,
             (self.mass * z + self.end_mass * w) / total,
         )
+
+    @property
+    def end_place(self) -> Vector:
+        """Of `end_mass`, from this joint [m]."""
+        (x, y, z), (u, v, w) = self.offset, self.end_shift
+        return (x + u, y + v, z + w)
 
     @property
     def length(self) -> float:
@@ -152,6 +161,10 @@ class Arm:
             raise ArmError(f"the base position must be finite: {self.base} m")
         if not all(math.isfinite(v) for v in self.tool):
             raise ArmError(f"the tool's offset must be finite: {self.tool} m")
+        axis, side = self.tool_axis, self.tool_side
+        across = sum(a * b for a, b in zip(axis, side, strict=True))
+        if not max(abs(math.hypot(*axis) - 1.0), abs(math.hypot(*side) - 1.0), abs(across)) < UNIT:
+            raise ArmError(f"tool_axis = {axis} and tool_side = {side} must be unit vectors at right angles")
 
     @property
     def mass(self) -> float:

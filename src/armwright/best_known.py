@@ -50,7 +50,12 @@ def known_front(problem: Problem) -> KnownFront | None:
     """The best known front of a problem: of a built-in task's targets in the paper's design space, else None."""
     paper = paper_space()
     same_space = problem.space.model_copy(update={"name": paper.name}) == paper
-    as_the_paper = problem.objectives == PAPER_OBJECTIVES and not problem.task.payloads.any()
+    as_the_paper = (
+        problem.objectives == PAPER_OBJECTIVES
+        and not problem.task.payloads.any()
+        and not problem.constraints
+        and problem.task.is_plain
+    )
     if not same_space or problem.tolerance or not as_the_paper:
         return None
     own = problem.task.name

@@ -146,6 +146,10 @@ def optimize(
         bool, typer.Option("--once", help="With manual:DIR: take the answers that are there, and exit at a question.")
     ] = False,
     robust: Robust = False,
+    start: Annotated[
+        list[Path] | None,
+        typer.Option(help="A design to begin with, such as designs/0042/design.json of a run; several may be given."),
+    ] = None,
     polish_every: Annotated[
         int | None,
         typer.Option(help="After so many counted trials, one refines a design of the front by 1000 evaluations."),
@@ -168,6 +172,7 @@ def optimize(
     """Search designs for TASK. The same command again resumes or shows the run; a larger --n-total extends it."""
     from armwright import console as view
     from armwright.proposers.choice import Wishes, choose_proposer
+    from armwright.starts import read_design
     from armwright.study import optimize as run_study
 
     words = view.stderr_console() if json_ else view.stdout_console()
@@ -196,6 +201,7 @@ def optimize(
                 n_total=n_total,
                 in_flight=(1 if in_flight is None else in_flight) if overlap else None,
                 polish_every=polish_every,
+                start=[read_design(file, problem.space) for file in start or ()],
                 on_model_failure=on_model_failure,
                 verify=verify,
                 seed=seed,
@@ -468,6 +474,68 @@ def compare(
 
             drawn = write_comparison_figures(out, comparison)
         view.show_files(words, tables, drawn)
+
+
+@app.command(name="compare-arms")
+def compare_arms_(
+    task: TaskName,
+    arms: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ARM...", help="URDF files, or names such as ur5e or panda (robot_descriptions; extra arms)."
+        ),
+    ],
+    run: Annotated[
+        Path | None, typer.Option(help="A run of the task: its designs beside the arms, which its figures then show.")
+    ] = None,
+    base: Annotated[
+        str | None, typer.Option(help="Where the base links stand, x,y,z in metres; without it, it is searched.")
+    ] = None,
+    tip: Annotated[
+        str | None, typer.Option(help="The link of the URDFs that is to reach the targets.  [default: the last one]")
+    ] = None,
+    base_link: Annotated[
+        str | None, typer.Option(help="The link of the URDFs that stands at the base.  [default: the root]")
+    ] = None,
+    space: SpaceFile = None,
+    figures: Figures = True,
+    seed: Annotated[int, typer.Option(help="Seed of the search for the base.")] = 0,
+    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """Buy or build: evaluate arms that exist on TASK, beside the designs of a run."""
+    from armwright import console as view
+    from armwright.buying import as_records, compare_arms
+    from armwright.space import load_space
+
+    compared = compare_arms(
+        task,
+        arms,
+        run,
+        space=None if space is None else load_space(space),
+        base=None if base is None else _point(base),
+        tip=tip,
+        base_link=base_link,
+        seed=seed,
+    )
+    drawn: list[Path] = []
+    if run is not None and figures:
+        from armwright.report.figures import write_figures
+        from armwright.report.page import write_report
+
+        drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
+    if json_:
+        _print_json(as_records(compared))
+    else:
+        view.show_arms(view.stdout_console(), compared, drawn)
+
+
+def _point(words: str) -> tuple[float, float, float]:
+    """`0.1,0,0.3` as a point."""
+    try:
+        x, y, z = (float(part) for part in words.split(","))
+    except ValueError:
+        raise SettingsError(f'--base "{words}": three numbers with commas are needed, such as 0,0,0.5 [m]') from None
+    return x, y, z
 
 
 @app.command()

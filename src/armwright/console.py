@@ -17,6 +17,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from armwright.baselines import Baseline, baselines, baselines_of
+from armwright.buying import MEASURES, ArmComparison, ComparedArm
 from armwright.catalogue import ActuatorRecord
 from armwright.drafting import Draft
 from armwright.experiment.plan import Cell, Skipped
@@ -26,9 +27,10 @@ from armwright.history import FrontMember, History
 from armwright.objectives import OF_MOVES, POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.polish import Polished
 from armwright.problem import Problem
-from armwright.results import REPORT
+from armwright.results import REPORT, unmet
 from armwright.study import Progress as StudyProgress
 from armwright.study import Run
+from armwright.targets import target_words
 from armwright.task import Task as DesignTask
 
 EVERY = 10  # counted trials between two plain lines
@@ -62,14 +64,19 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
         console.print(_credit_table(summary["credit"]))
     volume = summary["hypervolume"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    broken = f", {(~history.feasible).sum()} infeasible" if history.problem.constraints else ""
     sources = ", ".join(f"{count} {source}" for source, count in summary["by_source"].items())
     console.print(
         f"hypervolume {volume['final']:.3f} (mean over iterations {volume['mean']:.3f}; reference point {reference})"
     )
-    _show_emptiness(console, volume["final"], "more trials")
+    _show_emptiness(console, history, volume["final"], "more trials")
     _show_standing(console, summary["best_known"])
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
-    console.print(f"{summary['n_trials']} trials{more}: {sources}; {_seconds(summary['seconds'])}")
+    console.print(f"{summary['n_trials']} trials{more}{broken}: {sources}; {_seconds(summary['seconds'])}")
+    if summary["same_arms"]:
+        console.print(
+            f"{summary['same_arms']} trials were the same arm as an earlier one, and were not evaluated again"
+        )
     _show_proposer(console, summary["proposer"])
     scaled = TORQUE in history.problem.objectives
     words = f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; " if scaled else ""
@@ -80,7 +87,9 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
 
 
 def show_front(console: Console, history: History, summary: dict[str, Any]) -> None:
-    """The front as a table, and how much of it is solid."""
+    """The front as a table, and how much of it is solid; nothing of an empty one."""
+    if not history.front:
+        return
     verified = summary["verification"]
     console.print(_front_table(history, None if verified is None else set(verified["solid_numbers"])))
     if verified is not None:
@@ -99,10 +108,11 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     volume, search = summary["hypervolume"], summary["search"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
     console.print(f"hypervolume {volume['final']:.3f} (reference point {reference}), {len(run.history)} designs")
-    _show_emptiness(console, volume["final"], "a larger --budget")
+    _show_emptiness(console, run.history, volume["final"], "a larger --budget")
     _show_standing(console, summary["best_known"])
     why = {"budget": "the budget is spent", "stall": "the hypervolume hardly grew any more"}[search["ended_by"]]
-    console.print(f"{search['evaluations']:,} evaluations in {search['seconds']:.1f} s; {why}")
+    broken = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
+    console.print(f"{search['evaluations']:,} evaluations{broken} in {search['seconds']:.1f} s; {why}")
     console.print(f"{run.history.problem.space.mass_note}")
     _show_places(console, run.folder, figures)
 
@@ -119,8 +129,10 @@ def show_polish(console: Console, polished: Polished) -> None:
     _show_standing(console, polished.summary["best_known"])
 
 
-def _show_emptiness(console: Console, hypervolume: float, more: str) -> None:
-    if hypervolume == 0.0:
+def _show_emptiness(console: Console, history: History, hypervolume: float, more: str) -> None:
+    if len(history) and not history.feasible.any():
+        console.print(f"{unmet(history)[0].upper()}{unmet(history)[1:]}. Give {more} or looser constraints.")
+    elif hypervolume == 0.0:
         console.print(
             f"The front lies wholly outside the reference point: no design counts yet. Give {more} or another one."
         )
@@ -231,7 +243,7 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
         console.print(f"  joints {member.design.joints}, links {links} m, base ({base}) m{motors}")
     first = picked[0].number
-    console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet")
+    console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
@@ -276,8 +288,14 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
     reference = "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
     console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
+    for words in target_words(task.entries):
+        console.print(Text(f"  {words}"))
+    if task.restarts:
+        console.print(f"  {task.restarts + 1} starts of the inverse kinematics at each")
     if task.objectives is not None:
         console.print(f"  objectives: {', '.join(task.objectives)}")
+    if task.constraints:
+        console.print(f"  constraints: {', '.join(task.constraints)}")
     if task.payloads.any():
         console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
     for obstacle in task.obstacles:
@@ -319,6 +337,67 @@ def show_draft(console: Console, draft: Draft) -> None:
     )
     console.print(f"wrote {' and '.join(map(str, draft.files))}: a draft. Check the numbers, edit it, then run:")
     console.print(f"  armwright tasks {shlex.quote(str(draft.files[0]))}\n  {draft.command}")
+
+
+def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]) -> None:
+    """Arms that exist beside designs, and what was chosen for them."""
+    objectives, space = comparison.problem.objectives, comparison.problem.space
+    others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
+    title = f"Arms on {comparison.problem.task.name}{_payload_note(comparison.problem.task)}"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("\narm", no_wrap=True)
+    measured = [_ARM_COLUMNS[objective.name] for objective in MEASURES]
+    for name in ("\njoints", "reach\nm", "mass\nkg", *measured, *(f"{o.name}\n{o.unit}" for o in others)):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for arm in (*comparison.arms, *comparison.designs):
+        values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
+        numbers = [*arm.measures.values(), *(values[objective.name] for objective in others)]
+        told = ["-" if value is None else _measure(value) for value in numbers]
+        table.add_row(arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *told)
+    console.print(table)
+    console.print(
+        f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; use = the "
+        "largest share of a joint's effort limit"
+    )
+    if comparison.designs and space.is_toy:
+        console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
+    if comparison.positions:
+        within = " x ".join(f"[{low:g}, {high:g}]" for low, high in (space.origin_x, space.origin_y, space.origin_z))
+        console.print(
+            f"bases: {comparison.positions:,} positions tried for each arm in {within} m, for the least miss, then the "
+            "least torque; --base x,y,z gives one"
+        )
+    names = ", ".join(objective.name for objective in objectives)
+    for arm in comparison.arms:
+        broken = f"; breaks {', '.join(arm.breaks)}" if arm.breaks else ""
+        stands = (
+            broken if comparison.run is None or arm.breaks else f"; {_standing_words(arm, comparison.front)} ({names})"
+        )
+        console.print(f"{arm.name}: base at {_point(tuple(round(value, 4) for value in arm.base))} m{stands}")
+        for note in arm.notes:
+            console.print(f"  {note}")
+    if drawn:
+        console.print(f"drawn anew: {', '.join(map(str, drawn))}")
+
+
+_ARM_COLUMNS = {
+    "position_error": "error\nm",
+    "torque": "\ntorque",
+    "worst_error": "worst\nm",
+    "missed": "\nmissed",
+    "peak_torque": "peak\nN m",
+    "torque_use": "\nuse",
+}
+
+
+def _measure(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1e4 else f"{value:.3g}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"
+
+
+def _standing_words(arm: ComparedArm, front: int) -> str:
+    if arm.dominates is None:
+        return "not comparable with the front"
+    return f"dominates {arm.dominates} of the {front} designs of the front, dominated by {arm.dominated_by}"
 
 
 def stdout_console() -> Console:

@@ -24,7 +24,7 @@ class Credit:
 
 def credit_by_source(history: History) -> dict[str, Credit]:
     """The credit of each source, in the order in which they first occur."""
-    gains, on_front = hypervolume_gains(history), front_mask(history.values)
+    gains, on_front = hypervolume_gains(history), front_mask(history.counted)
     credit: dict[str, Credit] = {}
     for source, mine in masks_by_source(history).items():
         gained = None if gains is None else float(gains[mine].sum())
@@ -40,7 +40,7 @@ def hypervolume_gains(history: History) -> Array | None:
     """
     if history.reference_point is None:
         return None
-    return np.diff(hypervolume_history(history.values, history.reference_point), prepend=0.0)
+    return np.diff(hypervolume_history(history.counted, history.reference_point), prepend=0.0)
 
 
 def gained_by_source(history: History) -> dict[str, Array] | None:
@@ -60,7 +60,7 @@ def gained_by_source(history: History) -> dict[str, Array] | None:
 
 def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
     """For each source (I + 1,): how many of its trials are on the front after 0, 1, …, I counted iterations."""
-    fronts = [front_mask(history.values[:n]) for n in _last_trials(history)]
+    fronts = [front_mask(history.counted[:n]) for n in _last_trials(history)]
     return {
         source: np.array([np.count_nonzero(front & mine[: len(front)]) for front in fronts])
         for source, mine in masks_by_source(history).items()

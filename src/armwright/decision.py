@@ -12,7 +12,7 @@ from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.history import FrontMember, History
 from armwright.parameters import FloatParameter
 from armwright.pareto import knee_number
-from armwright.results import read_summary
+from armwright.results import read_summary, unmet
 from armwright.run_folder import read_run
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
@@ -57,14 +57,23 @@ def read_weights(words: str) -> dict[str, float]:
 
 
 def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
-    """What a design can be chosen by: its objectives, its real parameters, and the length and mass of its arm."""
+    """What a design can be chosen by: its objectives, its real parameters, the length and mass of its arm.
+
+    And what the constraints bound.
+    """
     space = history.problem.space
     reals = {
         p.name: float(member.design.params.get(p.name, 0.0)) for p in space.parameters if isinstance(p, FloatParameter)
     }
     arm = {"length": member.arm.length, "mass": member.arm.mass}
     objectives = {o.name: value for o, value in zip(history.problem.objectives, member.values, strict=True)}
-    return {**reals, **arm, **objectives}
+    return {**reals, **arm, **bounded_numbers(history, member.number), **objectives}
+
+
+def bounded_numbers(history: History, number: int) -> dict[str, float]:
+    """The quantities of a design that the constraints bound, by name."""
+    pairs = zip(history.problem.constraints, history.trials[number].constraints, strict=True)
+    return {constraint.quantity.name: constraint.measured(broken) for constraint, broken in pairs}
 
 
 def pick(
@@ -83,6 +92,8 @@ def pick(
     """
     if by is not None and weights is not None:
         raise SettingsError("choose by one number or by weights, not by both")
+    if len(history) and not history.front:
+        raise FailureError(unmet(history))
     told = {member.number: numbers_of(history, member) for member in history.front}
     names = list(told[history.front[0].number]) if history.front else []
     objectives = [objective.name for objective in history.problem.objectives]
@@ -122,7 +133,7 @@ def pick_from(
     """The same of a run folder; solid: only designs that hold when they are built a little off."""
     _, history = read_run(run)
     numbers = None
-    if solid:
+    if solid and history.front:
         verification = (read_summary(run) or {}).get("verification")
         if verification is None:
             raise FailureError(f"{run} is not verified; armwright verify {run} does it")

@@ -1,6 +1,6 @@
 """What the physics says of an arm at its targets: no preference, no sums."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
 from armwright.exceptions import SettingsError, TaskError
-from armwright.kinematics.arrays import ArmArrays, stack_arms
+from armwright.goals import Goals, plain_goals
+from armwright.kinematics.arrays import FIXED, MOST_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
 from armwright.kinematics.jacobian import jacobians
 from armwright.kinematics.paths import Paths, follow
-from armwright.kinematics.solve import solve_postures
+from armwright.kinematics.solve import Postures, solve_postures
 from armwright.moves import NO_MOVES, Moves
 from armwright.obstacles import Obstacle
 from armwright.workspace import Region, points_of
@@ -35,7 +36,9 @@ class Evaluation:
     q: Array  # (N, T, J) kept joint angles [rad], or ways [m]; 0 for a fixed joint
     reached: Array  # (N, T, 3) position of the tip [m]
     position_error: Array  # (N, T) distance from the target [m]
+    angle_error: Array  # (N, T) of the tool from the target's axis or orientation [rad]; 0 where it has none
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
+    goals: Goals  # how the targets are to be reached
     obstacles: tuple[Obstacle, ...] = ()
     device: Device = "cpu"
     moves: Moves = NO_MOVES
@@ -99,6 +102,12 @@ class Evaluation:
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
 
     @property
+    def missed(self) -> NDArray[np.bool_]:
+        """(N, T) whether the tip or the tool's direction is off by a target's tolerance or more."""
+        goals = self.goals
+        return (self.position_error >= goals.tolerance) | (self.angle_error >= goals.angle_tolerance)
+
+    @property
     def self_clearance(self) -> Array:
         """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none.
 
@@ -132,6 +141,7 @@ def evaluate(
     device: Device = "cpu",
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
+    goals: Goals | None = None,
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
@@ -139,10 +149,11 @@ def evaluate(
 
     targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
     obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
+    goals: how they are to be reached (`Task.goals`); without them, as points.
     moves: lines between targets that the tip goes along.
     workspace: boxes to cover.
     """
-    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, moves, workspace)
+    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, goals, moves, workspace)
 
 
 def evaluate_arrays(
@@ -152,18 +163,25 @@ def evaluate_arrays(
     start: ArrayLike | None = None,
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
+    goals: Goals | None = None,
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
     """The same for arms that are stacked already, in their precision.
 
-    start: values [rad] or [m] that broadcast to (N, T, D); None for the straight start.
+    start: values [rad] or [m] that broadcast to (N, T, D); None for the straight start. Restarts begin elsewhere.
     """
     targets = np.asarray(targets, dtype=np.float64)
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
     loads = _payloads(payload, len(targets))
-    postures = solve_postures(arrays, targets, start=start, payload=loads, precision=arrays.precision, device=device)
+    goals = plain_goals(len(targets)) if goals is None else goals
+    if len(goals) != len(targets):
+        raise TaskError(f"goals are of {len(goals)} targets, not of the {len(targets)} that are given")
+    postures = _postures(arrays, targets, loads, goals, device, start)
+    for other in _restarts(arrays, goals.restarts):
+        again = _postures(arrays, targets, loads, goals, device, other)
+        postures = _nearer(postures, again, targets, goals)
     reached = postures.reached.astype(np.float64)
     return Evaluation(
         arms=arrays,
@@ -172,11 +190,45 @@ def evaluate_arrays(
         q=postures.q.astype(np.float64),
         reached=reached,
         position_error=np.linalg.norm(reached - targets, axis=-1),
+        angle_error=postures.angle.astype(np.float64),
         joint_torques=postures.torque.astype(np.float64),
+        goals=goals,
         obstacles=tuple(obstacles),
         device=device,
         moves=moves,
         workspace=tuple(workspace),
+    )
+
+
+def _postures(
+    arrays: ArmArrays, targets: Array, loads: Array, goals: Goals, device: Device, start: ArrayLike | None
+) -> Postures:
+    return solve_postures(
+        arrays, targets, start=start, payload=loads, goals=goals, precision=arrays.precision, device=device
+    )
+
+
+def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
+    """n times (N, 1, D) postures to start from, each the same share of every joint's range for all arms."""
+    shares = np.random.default_rng(0).uniform(size=(n, MOST_JOINTS))[:, : arrays.dof]
+    lower, upper = arrays.lower.astype(np.float64), arrays.upper.astype(np.float64)
+    for share in shares:
+        yield np.where(arrays.motion == FIXED, 0.0, lower + share * (upper - lower))[:, None]
+
+
+def _nearer(first: Postures, second: Postures, targets: Array, goals: Goals) -> Postures:
+    """Of each arm and target the posture of the smaller distance, angles counted; the first of equals."""
+
+    def off(postures: Postures) -> Array:
+        distance = np.linalg.norm(postures.reached.astype(np.float64) - targets, axis=-1)
+        return np.hypot(distance, goals.trade * postures.angle)
+
+    better = off(second) < off(first)
+    return Postures(
+        q=np.where(better[..., None], second.q, first.q),
+        reached=np.where(better[..., None], second.reached, first.reached),
+        torque=np.where(better[..., None], second.torque, first.torque),
+        angle=np.where(better, second.angle, first.angle),
     )
 
 

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from armwright.decision import pick
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.export.mjcf import to_mjcf
@@ -14,6 +16,7 @@ from armwright.export.srdf import to_srdf
 from armwright.export.urdf import to_urdf
 from armwright.export.xacro import to_xacro
 from armwright.history import FrontMember, History
+from armwright.misses import why_missed
 from armwright.results import as_csv
 from armwright.run_folder import read_run
 from armwright.space import DesignSpace
@@ -44,8 +47,11 @@ def _sheet(history: History, member: FrontMember) -> str:
     notes = [f"Masses: {space.mass_note}."]
     if task.payloads.any():
         notes.append(f"Torques with the payload of {task.payloads.max():g} kg at most; of the arm alone they are less.")
-    missed = history.evaluation([member.number]).position_error[0]
-    notes.append(f"Targets are missed by {1e3 * missed.max():.2f} mm at most.")
+    evaluation = history.evaluation([member.number])
+    angle = f" and {np.degrees(evaluation.angle_error.max()):.2f}°" if evaluation.goals.oriented else ""
+    notes.append(f"Targets are missed by {1e3 * evaluation.position_error.max():.2f} mm{angle} at most.")
+    for target in np.flatnonzero(evaluation.missed[0]):
+        notes.append(f"Target {target + 1} is missed by {why_missed(member.arm, evaluation, 0, int(target))}.")
     return sheet_markdown(_name(history, member), member.arm, _rows(history, member), notes)
 
 

@@ -19,9 +19,9 @@ import numpy as np
 
 from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.history import FRONT, FinishedTrial, FrontMember, History
+from armwright.feasibility import FAR
+from armwright.history import FRONT, FinishedTrial, FrontMember, History, found_reference_point
 from armwright.kinematics.solve import MANY_ARMS
-from armwright.pareto import default_reference_point
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, read_summary, results_are_there, summarize_front, write_results
@@ -145,7 +145,7 @@ def find_front(
             if begin_with is not None and not isinstance(begin_with, (str, Path)):
                 rows = _proposed(problem, begin_with, seed, None if folder is None else folder.path)
             if folder is not None:
-                rows = np.vstack([rows, _rows(problem, folder.open_trials(problem.space, len(problem.objectives)))])
+                rows = np.vstack([rows, _rows(problem, _trials_of(problem, folder))])
         return _Search(problem, config, folder, rows, watch).run(budget, stop_at_stall)
 
 
@@ -165,10 +165,9 @@ class _Search:
         self.folder = folder
         self.watch = watch
         assert config.reference_point is not None
-        self.search = FrontSearch(
-            problem.space.parameters, problem.evaluate_matrix, config.reference_point, config.seed, rows
-        )
+        self.search = FrontSearch(problem.space.parameters, self._ranked, config.reference_point, config.seed, rows)
         self.seconds = 0.0  # of earlier sessions, then of all
+        self.infeasible = 0  # designs, likewise
         if folder is not None:
             self._restore(folder)
 
@@ -189,7 +188,7 @@ class _Search:
                 self.search.step()
                 now = time.monotonic()
                 self.seconds = before + now - started
-                state = {"seconds": self.seconds, **self.search.state()}
+                state = {"seconds": self.seconds, "infeasible": self.infeasible, **self.search.state()}
                 if now - saved >= SAVE_SECONDS:
                     self._save(state)
                     saved = now
@@ -225,21 +224,34 @@ class _Search:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as state:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
+                self.infeasible = int(state["infeasible"])
         except Exception as fault:  # numpy, zipfile, zlib and tokenize each have their own
             raise RunFolderError(
                 f"{path} is damaged ({fault}); delete it, and the search begins anew with the front in {folder.path}"
             ) from fault
 
+    def _ranked(self, rows: Array) -> Array:
+        """(N, M) what the search compares designs by."""
+        ranks = self.problem.ranked_matrix(rows)
+        self.infeasible += int(np.any(ranks >= FAR, axis=1).sum())
+        return ranks
+
     def _finish(self, ended: str, resumed: int) -> FrontRun:
         kept = self.search.best(MOST_DESIGNS)
-        designs = self.problem.space.designs(self.search.rows[kept])
+        designs, values = self.problem.space.designs(self.search.rows[kept]), self.search.values[kept]
+        broken = np.empty((len(designs), 0))
+        if self.problem.constraints:  # the search knows their ranks alone
+            values, broken = self.problem.judge_matrix(self.search.rows[kept])
         trials = [
-            FinishedTrial(number, FRONT, design, tuple(values))
-            for number, (design, values) in enumerate(zip(designs, self.search.values[kept].tolist(), strict=True))
+            FinishedTrial(
+                number, FRONT, design, tuple(values[number].tolist()), constraints=tuple(broken[number].tolist())
+            )
+            for number, design in enumerate(designs)
         ]
         history = History(self.problem, trials, 0, self.config.reference_point)
         searched = {
             "evaluations": self.search.evaluations,
+            **({"infeasible": self.infeasible} if self.problem.constraints else {}),
             "seconds": round(self.seconds, 3),
             "ended_by": ended,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
@@ -260,7 +272,12 @@ class _Search:
 
 def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
     """For a task that states none: from a few random designs."""
-    return default_reference_point(problem.evaluate(problem.space.sample(N_SAMPLE, seed)))
+    return found_reference_point(*problem.judge(problem.space.sample(N_SAMPLE, seed)))
+
+
+def _trials_of(problem: Problem, folder: RunFolder) -> list[FinishedTrial]:
+    """That lie in the folder."""
+    return folder.open_trials(problem.space, len(problem.objectives), len(problem.constraints))
 
 
 def _rows(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:
@@ -277,7 +294,7 @@ def _beginning(problem: Problem, begin_with: str | Path | Proposer | None) -> tu
         return nothing, {"proposer": {"name": begin_with.name, **begin_with.settings()}}
     _, run = read_run(begin_with)
     space = run.problem.space.model_copy(update={"name": problem.space.name})
-    if space != problem.space or run.problem.task.targets != problem.task.targets:
+    if space != problem.space or run.problem.task.entries != problem.task.entries:
         raise SettingsError(
             f"{begin_with} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"

@@ -8,14 +8,15 @@ import numpy as np
 
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.goals import REACHED
 from armwright.kinematics.arrays import FIXED, Actuation
 
 TORQUE_SCALE = 40.0  # α of the paper
-REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
+FAR = 1.0  # [m]; a clearance counts as no more
 COMFORTABLE = 0.1  # [m] of clearance, beyond which more of it is worth nothing
 MOST_OBJECTIVES = 5  # of which the hypervolume is still computed in no time
 
-Over = Literal["sum", "max", "mean square", "arm"]
+Over = Literal["sum", "max", "min", "mean square", "arm"]
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Objective:
     symbol: its name in formulas and prompts.
     words: what its share of one target is, for a reader who knows nothing of this program; of "arm", what it is.
     each: its share per target, (N, T); of "arm" what the arm itself is, (N,), whatever the targets.
-    over: what is made of the shares: their sum, the largest, or the root of their mean square.
+    over: what is made of the shares: their sum, the largest, the least, or the root of their mean square.
     """
 
     name: str
@@ -44,6 +45,8 @@ class Objective:
                 return each.sum(axis=1)
             case "max":
                 return each.max(axis=1)
+            case "min":
+                return each.min(axis=1)
             case "mean square":
                 return np.sqrt(np.mean(each**2, axis=1))
             case "arm":
@@ -56,7 +59,11 @@ class Objective:
 
 
 def _position_error(evaluation: Evaluation) -> Array:
-    return evaluation.position_error
+    return evaluation.goals.weight * evaluation.position_error
+
+
+def _orientation_error(evaluation: Evaluation) -> Array:
+    return evaluation.goals.weight * evaluation.angle_error
 
 
 def _torque_norm(evaluation: Evaluation) -> Array:
@@ -117,7 +124,7 @@ WORST_ERROR = Objective(
     unit="m",
     symbol="E_worst",
     words="the distance between the tip and the target in the kept posture",
-    each=_position_error,
+    each=lambda evaluation: evaluation.position_error,
     over="max",
 )
 MISSED = Objective(
@@ -126,7 +133,24 @@ MISSED = Objective(
     unit="targets",
     symbol="E_missed",
     words=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
-    each=lambda evaluation: (evaluation.position_error >= REACHED).astype(np.float64),
+    each=lambda evaluation: evaluation.missed.astype(np.float64),
+)
+ORIENTATION_ERROR = Objective(
+    name="orientation_error",
+    label="Orientation error",
+    unit="rad",
+    symbol="E_rot",
+    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    each=_orientation_error,
+)
+WORST_ANGLE = Objective(
+    name="worst_angle",
+    label="Worst orientation error",
+    unit="rad",
+    symbol="E_angle",
+    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    each=lambda evaluation: evaluation.angle_error,
+    over="max",
 )
 PEAK_TORQUE = Objective(
     name="peak_torque",
@@ -250,26 +274,48 @@ CLUMSINESS = Objective(
     over="max",
 )
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
+OF_ORIENTATION = (ORIENTATION_ERROR, WORST_ANGLE)
 _ALL = (
-    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS, COLLISION,
-    CLOSENESS, PATH_ERROR, JOINT_JUMP, UNREACHED, CLUMSINESS,
+    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS,
+    *OF_ORIENTATION, COLLISION, CLOSENESS, PATH_ERROR, JOINT_JUMP, UNREACHED, CLUMSINESS,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 
 
-# What an arm's clearance is called, where it is named: (N, T) each [m].
-CLEARANCES: Mapping[str, Callable[[Evaluation], Array]] = {
-    "clearance": lambda evaluation: evaluation.clearance,
-    "self_clearance": lambda evaluation: evaluation.self_clearance,
-    "obstacle_clearance": lambda evaluation: evaluation.obstacle_clearance,
-}
-OF_CLEARANCE = (COLLISION, CLOSENESS)
-OF_THE_WAY = (
-    *OF_CLEARANCE,
-    PEAK_TORQUE,
-    TORQUE_USE,
-)  # where a target's share is the worst of it and of the moves there
+def _clearance(name: str, words: str, each: Callable[[Evaluation], Array]) -> Objective:
+    """Of which more is better, so that it can only be bounded."""
+    return Objective(
+        name=name,
+        label=name.replace("_", " ").capitalize(),
+        unit="m",
+        symbol=name,
+        words=f"{words}; below 0 it is in it, and {FAR:g} where there is nothing near",
+        each=lambda evaluation: np.minimum(each(evaluation), FAR),
+        over="min",
+    )
+
+
+CLEARANCES: tuple[Objective, ...] = (
+    _clearance(
+        "clearance", "how far the arm in the kept posture is from obstacles and from itself", lambda e: e.clearance
+    ),
+    _clearance("self_clearance", "how far the arm in the kept posture is from itself", lambda e: e.self_clearance),
+    _clearance("obstacle_clearance", "how far the arm in the kept posture is from obstacles",
+               lambda e: e.obstacle_clearance),
+)  # fmt: skip
+OF_CLEARANCE = (COLLISION, CLOSENESS, *CLEARANCES)
+OF_THE_WAY = (*OF_CLEARANCE, PEAK_TORQUE, TORQUE_USE)  # a target's share is the worst of it and of the moves there
 OF_MOVES = (*OF_THE_WAY, PATH_ERROR, JOINT_JUMP)
+MANIPULABILITY = Objective(
+    name="manipulability",
+    label="Manipulability",
+    unit="m³",
+    symbol="manipulability",
+    words="the square root of det(J J^T) in the kept posture, with the position Jacobian J",
+    each=lambda evaluation: evaluation.manipulability,
+    over="min",
+)
+TO_BOUND = (*CLEARANCES, MANIPULABILITY)  # of which more is better: no objectives
 
 
 def named_objectives(names: Sequence[str]) -> tuple[Objective, ...]:

@@ -12,12 +12,12 @@ Array = NDArray[np.float64]
 def front_mask(values: Array) -> NDArray[np.bool_]:
     """(N,) True where no other row of `values` (N, M) is better or equal in all and better in one.
 
-    Of equal rows the first is kept.
+    Of equal rows the first is kept. Infinite rows, as of infeasible designs (`armwright.feasibility`), are not on it.
     """
     values = np.asarray(values, dtype=np.float64)
     if len(values) == 0:
         return np.zeros(0, dtype=bool)
-    return moocore.is_nondominated(values, keep_weakly=False)
+    return moocore.is_nondominated(values, keep_weakly=False) & np.all(values < np.inf, axis=1)
 
 
 def front_numbers(values: Array) -> list[int]:
@@ -62,9 +62,9 @@ class FrontTracker:
         self._reference_point, self._hypervolume = reference_point, None
 
     def add(self, point: Sequence[float]) -> None:
-        """One point more."""
+        """One point more; an infinite one, as of an infeasible design, changes nothing."""
         row = np.asarray(point, dtype=np.float64)
-        if not np.any(np.all(self._front <= row, axis=1)):
+        if np.all(row < np.inf) and not np.any(np.all(self._front <= row, axis=1)):
             self._front = np.vstack([self._front[~np.all(row <= self._front, axis=1)], row])
             self._hypervolume = None
 

@@ -10,7 +10,7 @@ import numpy as np
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.history import POLISH, FinishedTrial, FrontMember, History
 from armwright.refining import EVALUATIONS, POLISHING, refine_members, worth_refining
-from armwright.results import discard_results, read_summary, resummarize, write_results
+from armwright.results import discard_results, read_summary, resummarize, unmet, write_results
 from armwright.run_folder import RunFolder, read_run
 from armwright.search.refinement import POPULATION, Refined
 from armwright.seeding import derived_seed
@@ -52,7 +52,7 @@ def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
     config, _ = read_run(path)
     method = config.study
     with RunFolder(path) as folder:
-        trials = folder.open_trials(config.space, len(config.objectives))
+        trials = folder.open_trials(config.space, len(config.objectives), len(config.task.constraints))
         summary = read_summary(path)
         if len(trials) < method.n_trials or summary is None:
             raise RunFolderError(
@@ -61,6 +61,8 @@ def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
             )
         before = History(config.problem, tuple(trials), method.n_init, config.reference_point)
         members = worth_refining(before)
+        if not members:
+            raise RunFolderError(f"{path} has no front to polish: {unmet(before)}")
         earlier = summary.get("polish") or {"rounds": 0, "in_vain": 0}
         seed = derived_seed(config.seed, POLISHING, len(before), earlier["rounds"])
         refined = refine_members(before, members, seed, evaluations)
@@ -84,12 +86,14 @@ def _trials(history: History, members: Sequence[FrontMember], refined: Refined) 
     """
     better = np.flatnonzero(refined.improved).tolist()
     designs = history.problem.space.designs(refined.rows[better])
+    _, broken = history.problem.judge_matrix(refined.rows[better])
     return [
         FinishedTrial(
             len(history) + k,
             POLISH,
             design,
             tuple(refined.values[i].tolist()),
+            constraints=tuple(broken[k].tolist()),
             reason=f"refines trial {members[i].number}",
             refines=members[i].number,
             evaluations=refined.evaluations * (k + 1) // len(better) - refined.evaluations * k // len(better),

@@ -6,11 +6,22 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from armwright.arm import Arm
+from armwright.constraints import Constraint, read_constraints
 from armwright.evaluation import Array, Evaluation, evaluate_arrays
 from armwright.exceptions import SettingsError, TaskError
+from armwright.feasibility import ranked
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
-from armwright.objectives import OF_CLEARANCE, OF_MOVES, PAPER_OBJECTIVES, UNREACHED, Objective, named_objectives
+from armwright.objectives import (
+    OF_CLEARANCE,
+    OF_MOVES,
+    OF_ORIENTATION,
+    ORIENTATION_ERROR,
+    PAPER_OBJECTIVES,
+    UNREACHED,
+    Objective,
+    named_objectives,
+)  # fmt: skip
 from armwright.parameters import Design
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
@@ -26,7 +37,9 @@ class Problem:
     tolerance: [m] of a workshop; above 0, a design counts by the worst that comes of it, in each objective, when it is
         built exactly or with its base or one link off by so much (`armwright.tolerance`).
     device: where arms are evaluated; `resolve_device` says which there are.
-    objectives: what is minimised, of one's own too; without them, the task's, else the paper's.
+    objectives: what is minimised, of one's own too; without them, the task's, else the paper's, and the orientation
+        error where a target says which way the tool points.
+    constraints: what a design has to keep, as the task says it.
     """
 
     task: Task
@@ -34,12 +47,24 @@ class Problem:
     tolerance: float = 0.0
     device: Device = "cpu"
     objectives: tuple[Objective, ...] = ()
+    constraints: tuple[Constraint, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
-        """Settles device and objectives; TaskError where the task's reference point is for other objectives."""
+        """Settles device, objectives and constraints.
+
+        TaskError where the task's reference point is for other objectives, or a constraint cannot be understood.
+        """
+        object.__setattr__(self, "constraints", read_constraints(self.task.constraints))
         if not self.objectives:
             names = self.task.objectives
-            object.__setattr__(self, "objectives", PAPER_OBJECTIVES if names is None else named_objectives(names))
+            usual = (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.goals.oriented else PAPER_OBJECTIVES
+            object.__setattr__(self, "objectives", usual if names is None else named_objectives(names))
+        for objective in self.objectives:
+            if objective in OF_ORIENTATION and not self.task.goals.oriented:
+                raise SettingsError(
+                    f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has "
+                    "an axis or an orientation. Give one to a target, or take another objective"
+                )
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
         point, names = self.reference_point, [objective.name for objective in self.objectives]
@@ -56,20 +81,25 @@ class Problem:
         """The worst values that count for the hypervolume, where the task states them."""
         return self.task.reference_point
 
+    def counts(self, quantity: Objective) -> bool:
+        """Whether it is an objective, or bounded by a constraint."""
+        counted = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
+        return quantity.name in counted
+
     @property
     def heeds_clearance(self) -> bool:
         """Whether it counts where the arm is in an obstacle or in itself."""
-        return any(objective in OF_CLEARANCE for objective in self.objectives)
+        return any(map(self.counts, OF_CLEARANCE))
 
     @property
     def heeds_moves(self) -> bool:
         """Whether it counts what the arm does on its moves."""
-        return any(objective in OF_MOVES for objective in self.objectives)
+        return any(map(self.counts, OF_MOVES))
 
     @property
     def heeds_workspace(self) -> bool:
         """Whether it counts how much of the workspace is covered."""
-        return UNREACHED in self.objectives
+        return self.counts(UNREACHED)
 
     @property
     def _postures(self) -> int:
@@ -97,24 +127,36 @@ class Problem:
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
         task = self.task
-        known = (task.payloads, task.obstacles, task.lines, task.workspace)
+        known = (task.payloads, task.obstacles, task.goals, task.lines, task.workspace)
         return evaluate_arrays(arms, task.points, self.device, start, *known)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
-        """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many.
+        """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""
+        return self.judge_matrix(matrix)[0]
+
+    def judge_matrix(self, matrix: Array) -> tuple[Array, Array]:
+        """(N, M) and (N, C) as `judge`, for designs as rows.
 
         Only the postures of a chunk of them are in memory at a time.
         """
         matrix = self.space.settled(matrix)
         size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
-        values = np.empty((len(matrix), len(self.objectives)))
+        found = np.empty((len(matrix), len(self.objectives) + len(self.constraints)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
-            values[rows] = self.values(self.evaluation_of_rows(matrix[rows]))
+            found[rows] = self.judged(self.evaluation_of_rows(matrix[rows]))
             if self.tolerance > 0.0:
                 for copies in moved(self.space, matrix[rows], self.tolerance):
-                    values[rows] = np.maximum(values[rows], self.values(self.evaluation_of_rows(copies)))
-        return values
+                    found[rows] = np.maximum(found[rows], self.judged(self.evaluation_of_rows(copies)))
+        return self.split(found)
+
+    def ranked_matrix(self, matrix: Array) -> Array:
+        """(N, M) of designs as rows: their objectives, or for infeasible ones numbers that lie behind all of these.
+
+        What a search compares designs by, where it knows nothing of constraints.
+        """
+        values, broken = self.judge_matrix(matrix)
+        return ranked(values, broken) if self.constraints else values
 
     def values(self, evaluation: Evaluation) -> Array:
         """(N, M): the objectives of evaluated designs, minimised; SettingsError where one is not a finite number."""
@@ -127,10 +169,35 @@ class Problem:
             )
         return values
 
-    def evaluate(self, designs: Sequence[Design]) -> Array:
-        """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
-        values = self.values(self.evaluation(designs))
+    def judged(self, evaluation: Evaluation) -> Array:
+        """(N, M + C): the objectives of evaluated designs, then how far each constraint is broken."""
+        values = self.values(evaluation)
+        if not self.constraints:
+            return values
+        broken = np.column_stack([constraint(evaluation) for constraint in self.constraints])
+        if not np.all(np.isfinite(broken)):
+            row, column = np.argwhere(~np.isfinite(broken))[0]
+            raise SettingsError(
+                f'constraint "{self.constraints[column].words}" is {broken[row, column]} for a design; it must be a '
+                "finite number for every design"
+            )
+        return np.hstack([values, broken])
+
+    def split(self, judged: Array) -> tuple[Array, Array]:
+        """(N, M) and (N, C): the objectives and the constraints of `judged`."""
+        return judged[:, : len(self.objectives)], judged[:, len(self.objectives) :]
+
+    def judge(self, designs: Sequence[Design]) -> tuple[Array, Array]:
+        """(N, M) and (N, C): the objectives of N designs, and how far they break each constraint, <= 0: not at all.
+
+        With a tolerance, the worst of each by itself.
+        """
+        found = self.judged(self.evaluation(designs))
         if self.tolerance > 0.0:
             for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
-                values = np.maximum(values, self.values(self.evaluation_of_rows(copies)))
-        return values
+                found = np.maximum(found, self.judged(self.evaluation_of_rows(copies)))
+        return self.split(found)
+
+    def evaluate(self, designs: Sequence[Design]) -> Array:
+        """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
+        return self.judge(designs)[0]

@@ -38,7 +38,7 @@ def refine_one(history: History, seed: int) -> Refinement:
 
 
 def worth_refining(history: History) -> list[FrontMember]:
-    """The front within the reference box, or the whole one where it lies outside."""
+    """The front within the reference box, or the whole one where it lies outside; none as long as none is feasible."""
     inside = [member for member in history.front if np.all(np.array(member.values) < history.reference_point)]
     return inside or history.front
 
@@ -65,7 +65,7 @@ def refine_members(history: History, members: Sequence[FrontMember], seed: int, 
     assert history.reference_point is not None
     return refine(
         problem.space.parameters,
-        problem.evaluate_matrix,
+        problem.ranked_matrix,
         problem.space.matrix([member.design for member in members]),
         values,
         history.reference_point,

@@ -16,13 +16,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from armwright.best_known import standing
 from armwright.credit import credit_by_source
 from armwright.diagnostics import diagnose
 from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
+from armwright.feasibility import violation
 from armwright.history import FinishedTrial, FrontMember, History
+from armwright.misses import why_missed
 from armwright.pareto import hypervolume
 from armwright.proposers.proposer import ProposerSummary
 from armwright.run_folder import FrontMethod, RunConfig, RunFolder, read_run
@@ -112,16 +116,18 @@ def summarize(
         "seed": config.seed,
         "n_trials": len(history),
         "by_source": dict(Counter(trial.source for trial in history)),
+        **_feasibility_record(history),
         "hypervolume": {
             "reference_point": list(history.reference_point or ()),
             "final": float(curve[-1]) if len(curve) else None,
             "mean": float(counted.mean()) if len(counted) else None,
             "history": curve.tolist(),
         },
-        "best_known": _standing_record(history, history.values),
+        "best_known": _standing_record(history, history.counted),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         "evaluations": sum(trial.evaluations for trial in history),
+        "same_arms": sum(trial.same_as is not None for trial in history),
         "polish": None,
         "credit": {source: asdict(credit) for source, credit in credit_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
@@ -145,6 +151,7 @@ def summarize_front(
         "seed": config.seed,
         "n_trials": len(history),
         "by_source": dict(Counter(trial.source for trial in history)),
+        **_feasibility_record(history),
         "hypervolume": {"reference_point": list(reference), "final": hypervolume(found, reference)},
         "best_known": _standing_record(history, found),
         "front_size": len(history.front),
@@ -165,6 +172,43 @@ def resummarize(
     if new["polish"] is not None:
         new["evaluations"] += new["polish"]["in_vain"]
     return new
+
+
+def unmet(history: History) -> str:
+    """Where no design is feasible: how near the nearest comes, and which constraint is in the way."""
+    (number,) = history.nearest(1)
+    broken = history.broken[number]
+    constraints = history.problem.constraints
+    words = [
+        f"{constraints[i].words} ({constraints[i].measured(float(broken[i])):.4g} {constraints[i].quantity.unit})"
+        for i in np.argsort(-broken, kind="stable")
+        if broken[i] > 0.0
+    ]
+    rest = f", and {', '.join(words[1:])}" if len(words) > 1 else ""
+    return f"no design meets all constraints yet; the nearest, #{number}, breaks {words[0]} most{rest}"
+
+
+def _feasibility_record(history: History) -> dict[str, Any]:
+    """How many designs break constraints, and which; nothing of a task without any.
+
+    nearest: of no feasible design, the one that breaks them least, and by how much, in the quantities' own units.
+    """
+    constraints = history.problem.constraints
+    if not constraints:
+        return {}
+    breaking = (history.broken > 0.0).sum(axis=0).tolist()
+    nearest = None
+    if len(history) and not history.feasible.any():
+        (number,) = history.nearest(1)
+        measured = {c.words: c.measured(value) for c, value in zip(constraints, history.broken[number], strict=True)}
+        nearest = {"number": number, "violation": float(violation(history.broken[[number]])[0]), "measured": measured}
+    return {
+        "feasibility": {
+            "infeasible": int((~history.feasible).sum()),
+            "broken_by": {c.words: n for c, n in zip(constraints, breaking, strict=True)},
+            "nearest": nearest,
+        }
+    }
 
 
 def _standing_record(history: History, found: Array) -> dict[str, Any] | None:
@@ -285,6 +329,7 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
             "reason": history.trials[member.number].reason,
             "params": dict(member.design.params),
             "objectives": _objectives(history, member.values),
+            **_constraints(history, member.number),
             "masses": history.problem.space.mass_note,
             "targets": [
                 {
@@ -292,6 +337,8 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
                     "q": evaluation.q[row, t, : len(member.arm.joints)].tolist(),
                     "reached": evaluation.reached[row, t].tolist(),
                     "position_error": float(evaluation.position_error[row, t]),
+                    **({"angle_error": float(evaluation.angle_error[row, t])} if evaluation.goals.rows[t] else {}),
+                    "missed": why_missed(member.arm, evaluation, row, t) or None,
                     "joint_torques": evaluation.joint_torques[row, t, : len(member.arm.joints)].tolist(),
                 }
                 for t in range(len(evaluation.targets))
@@ -303,7 +350,14 @@ def _rows(history: History) -> Iterable[dict[str, Any]]:
     for trial in history:
         objectives = _objectives(history, trial.values)
         params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
-        yield {"number": trial.number, "source": trial.source, **params, **objectives}
+        broken = dict(zip((c.words for c in history.problem.constraints), trial.constraints, strict=True))
+        yield {"number": trial.number, "source": trial.source, **params, **objectives, **broken}
+
+
+def _constraints(history: History, number: int) -> dict[str, Any]:
+    """Of one design, how far it breaks each constraint (<= 0: not at all); nothing of a task without any."""
+    names = [constraint.words for constraint in history.problem.constraints]
+    return {"constraints": dict(zip(names, history.trials[number].constraints, strict=True))} if names else {}
 
 
 def _objectives(history: History, values: Sequence[float]) -> dict[str, float]:

@@ -44,6 +44,11 @@ SEARCH = "search.npz"
 BEFORE_TRIALS = {
     ".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
 }  # fmt: skip
+# Of a task; its words may change.
+IDENTITY = (
+    "name", "targets", "payload", "restarts", "obstacles", "moves", "move_step", "workspace", "constraints",
+    "reference_point",
+)  # fmt: skip
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 
@@ -53,6 +58,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     proposer: its name and settings; None for black-box trials only.
     in_flight: how many questions go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials the next free one refines a design of the front; None: never.
+    start: designs that the first of the n_init trials are, in place of random ones.
     """
 
     proposer: dict[str, Any] | None
@@ -62,6 +68,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     n_total: int = Field(ge=1)
     in_flight: int | None = Field(default=None, ge=1)
     polish_every: int | None = Field(default=None, ge=1)
+    start: tuple[dict[str, float | str], ...] = ()
 
     @property
     def n_trials(self) -> int:
@@ -234,10 +241,12 @@ class RunFolder:
         content = config.model_dump(mode="json")
         self.write_text(CONFIG, yaml.dump(content, Dumper=_ConfigDumper, sort_keys=False, allow_unicode=True))
 
-    def open_trials(self, space: DesignSpace, n_objectives: int = len(PAPER_OBJECTIVES)) -> list[FinishedTrial]:
+    def open_trials(
+        self, space: DesignSpace, n_objectives: int = len(PAPER_OBJECTIVES), n_constraints: int = 0
+    ) -> list[FinishedTrial]:
         """The finished trials; a last line that a crash cut short is dropped. Opens the file for `append`."""
         path = self.path / TRIALS
-        trials, intact = _read_trials(path, space, n_objectives)
+        trials, intact = _read_trials(path, space, n_objectives, n_constraints)
         try:
             self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
             self._trials.truncate(intact)
@@ -304,7 +313,7 @@ def read_run(path: str | Path) -> tuple[RunConfig, History]:
     """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
     path = Path(path)
     config = read_config(path)
-    trials, _ = _read_trials(path / TRIALS, config.space, len(config.objectives))
+    trials, _ = _read_trials(path / TRIALS, config.space, len(config.objectives), len(config.task.constraints))
     return config, History(config.problem, trials, config.method.n_init, config.reference_point)
 
 
@@ -320,9 +329,11 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     asked: int | None = None
     feedback: int | None = None
     refines: int | None = None
-    evaluations: int = Field(default=1, ge=1)
+    evaluations: int = Field(default=1, ge=0)
+    same_as: int | None = None
     params: dict[str, float | str]
     values: list[float] = Field(min_length=1)
+    constraints: list[float] = []
     seconds: dict[str, float]
     sampler_notes: dict[str, dict[str, Any]] = {}
 
@@ -339,15 +350,19 @@ def _trial_line(trial: FinishedTrial) -> bytes:
         feedback=trial.feedback,
         refines=trial.refines,
         evaluations=trial.evaluations,
+        same_as=trial.same_as,
         params=dict(trial.design.params),
         values=list(trial.values),
+        constraints=list(trial.constraints),
         seconds=dict(trial.seconds),
         sampler_notes={place: dict(noted) for place, noted in trial.sampler_notes.items()},
     )
     return json.dumps(record.model_dump(exclude_defaults=True)).encode() + b"\n"
 
 
-def _read_trials(path: Path, space: DesignSpace, n_objectives: int) -> tuple[list[FinishedTrial], int]:
+def _read_trials(
+    path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
+) -> tuple[list[FinishedTrial], int]:
     """The trials of a file, and its length [bytes] without a cut last line."""
     try:
         content = path.read_bytes()
@@ -355,18 +370,18 @@ def _read_trials(path: Path, space: DesignSpace, n_objectives: int) -> tuple[lis
         return [], 0
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    return _parse_trials(content, 0, path, space, n_objectives)
+    return _parse_trials(content, 0, path, space, n_objectives, n_constraints)
 
 
 def _parse_trials(
-    content: bytes, first: int, path: Path, space: DesignSpace, n_objectives: int
+    content: bytes, first: int, path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
 ) -> tuple[list[FinishedTrial], int]:
     """The trials from number `first` on in a part of a file, and its length [bytes] without a cut last line."""
     end = content.rfind(b"\n") + 1
     trials: list[FinishedTrial] = []
     for number, line in enumerate(content[:end].split(b"\n")[:-1], start=first):
         try:
-            trials.append(_parse_trial(line, number, space, n_objectives))
+            trials.append(_parse_trial(line, number, space, n_objectives, n_constraints))
         except (ValueError, DesignError) as fault:
             raise RunFolderError(
                 f"{path}, line {number + 1} is damaged ({_words(fault)}); restore the file, or delete this line and "
@@ -414,13 +429,16 @@ class TrialsReader:
 
     def _parsed(self, content: bytes) -> tuple[list[FinishedTrial], int]:
         config = self._config
-        return _parse_trials(content, len(self.trials), self._path, config.space, len(config.objectives))
+        n_objectives, n_constraints = len(config.objectives), len(config.task.constraints)
+        return _parse_trials(content, len(self.trials), self._path, config.space, n_objectives, n_constraints)
 
 
-def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int) -> FinishedTrial:
+def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int, n_constraints: int) -> FinishedTrial:
     record = _TrialRecord.model_validate_json(line)
     if len(record.values) != n_objectives:
         raise ValueError(f"{len(record.values)} values where {n_objectives} are due")
+    if len(record.constraints) != n_constraints:
+        raise ValueError(f"{len(record.constraints)} constraints where {n_constraints} are due")
     if record.number != number:
         raise ValueError(f"number {record.number} where {number} is due")
     return FinishedTrial(
@@ -428,6 +446,7 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int
         source=record.source,
         design=space.design(record.params),
         values=tuple(record.values),
+        constraints=tuple(record.constraints),
         proposal=record.proposal,
         reason=record.reason,
         expected=None if record.expected is None else tuple(record.expected),
@@ -436,6 +455,7 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int
         feedback=record.feedback,
         refines=record.refines,
         evaluations=record.evaluations,
+        same_as=record.same_as,
         seconds=record.seconds,
         sampler_notes=record.sampler_notes,
     )
@@ -475,8 +495,7 @@ def _brief(value: Any) -> str:
 def _identity(config: RunConfig) -> dict[str, Any]:
     """What makes a run this run and no other, flat."""
     content = config.model_dump(mode="json")
-    of_task = ("name", "targets", "payload", "obstacles", "moves", "move_step", "workspace", "reference_point")
-    content["task"] = {key: content["task"][key] for key in of_task}
+    content["task"] = {key: content["task"][key] for key in IDENTITY}
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)

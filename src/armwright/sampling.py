@@ -6,7 +6,7 @@ whole run would repeat its first draws, this one goes on as if it had never stop
 
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
 from types import CodeType, FunctionType, MethodType
@@ -153,10 +153,21 @@ def _distribution(parameter: Parameter) -> BaseDistribution:
 
 
 class BlackBox:
-    """An in-memory Optuna study over a design space, asked for one trial at a time."""
+    """An in-memory Optuna study over a design space, asked for one trial at a time.
 
-    def __init__(self, space: DesignSpace, sampler: str | SamplerFactory, seed: int, n_objectives: int = 2) -> None:
+    constraints: their names. Optuna's samplers prefer trials that meet them (Deb's rules), its best trials do.
+    """
+
+    def __init__(
+        self,
+        space: DesignSpace,
+        sampler: str | SamplerFactory,
+        seed: int,
+        n_objectives: int = 2,
+        constraints: Sequence[str] = (),
+    ) -> None:
         self._space = space
+        self._constraints = tuple(constraints)
         self._factory = sampler_factory(sampler)
         self._seed = seed
         self._distributions = distributions(space)
@@ -181,6 +192,7 @@ class BlackBox:
                     values=list(trial.values),
                     user_attrs=_attributes(trial.source, trial.proposal),
                     system_attrs=dict(trial.sampler_notes.get("trial", {})),
+                    constraints=dict(zip(self._constraints, trial.constraints, strict=True)),
                 )
             )
             for name, note in trial.sampler_notes.get("study", {}).items():
@@ -214,16 +226,20 @@ class BlackBox:
         self._enlist(sampler, trial)
         return trial, checked
 
-    def tell(self, trial: Trial, values: Iterable[float]) -> dict[str, dict[str, Any]]:
-        """The trial's values; from now on the sampler learns from it.
+    def tell(
+        self, trial: Trial, values: Iterable[float], constraints: Iterable[float] = ()
+    ) -> dict[str, dict[str, Any]]:
+        """The trial's values, and how far it breaks each constraint; from now on the sampler learns from it.
 
         Returns what the sampler noted meanwhile on the trial and on the study (a genetic one: generations, parents):
         `restore` needs it.
         """
+        for name, broken in zip(self._constraints, constraints, strict=True):
+            trial.set_constraint(name, broken)
         told = self._study.tell(trial, list(values))
         before, self._study_notes = self._study_notes, self._storage.get_study_system_attrs(self._study_id)
         notes = {
-            "trial": {name: note for name, note in told.system_attrs.items() if name != "fixed_params"},
+            "trial": _notes(told.system_attrs, self._constraints),
             "study": {name: note for name, note in self._study_notes.items() if before.get(name) != note},
         }
         return {place: noted for place, noted in notes.items() if noted}
@@ -250,6 +266,12 @@ class BlackBox:
         enlist = getattr(sampler, "get_trial_generation", None)
         if enlist is not None:
             enlist(self._study, self._study.get_trials(deepcopy=False)[trial.number])
+
+
+def _notes(attributes: Mapping[str, Any], constraints: Sequence[str]) -> dict[str, Any]:
+    """What a sampler noted on a trial: without what Optuna itself keeps there."""
+    own = {"fixed_params", *(f"constraints:{name}" for name in constraints)}
+    return {name: note for name, note in attributes.items() if name not in own}
 
 
 def _attributes(source: str, proposal: str | None) -> dict[str, Any]:

@@ -359,7 +359,11 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             link
             for number, (module, end) in enumerate(zip(modules, [*carried[1:], 0.0], strict=True), start=1)
             for link in [uniform_link((0.0, 0.0, 0.0), 0.0, self.link_radius)] * (len(module.joints) - 1)
-            + [replace(self._link(design, number, mount), end_mass=end)]
+            + [
+                replace(
+                    self._link(design, number, mount), end_mass=end, end_shift=self._shift(design, number + 1, mount)
+                )
+            ]
         ]
         return Arm(
             base=design.origin,
@@ -409,8 +413,21 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """What stands where a module begins: its actuators, and the rail that it slides on [kg]."""
         module = MODULES[cast("JointType", design.params[f"joint_{number}"])]
         motor = self._motor(design, number) if module.moves else None
-        rail = self.mass.mass(self.stroke_of(design, number)) if module.slides else 0.0
-        return rail + len(module.joints) * (0.0 if motor is None else motor.mass)
+        return self._rail(design, number) + len(module.joints) * (0.0 if motor is None else motor.mass)
+
+    def _rail(self, design: Design, number: int) -> float:
+        """[kg]"""
+        slides = MODULES[cast("JointType", design.params[f"joint_{number}"])].slides
+        return self.mass.mass(self.stroke_of(design, number)) if slides else 0.0
+
+    def _shift(self, design: Design, number: int, mount: Mount) -> Vector:
+        """From where a module begins to the centre of what stands there: half way along its rail, for the rail [m]."""
+        if f"joint_{number}" not in design.params or not (rail := self._rail(design, number)):
+            return (0.0, 0.0, 0.0)
+        ((_, axis),) = MODULES[cast("JointType", design.params[f"joint_{number}"])].joints
+        way = rail / self._carried(design, number) * (self.stroke_of(design, number) / 2)
+        x, y, z = mounted_vector(DIRECTIONS[cast("Direction", f"+{axis}")], mount)
+        return (way * x, way * y, way * z)
 
 
 def paper_space(joints: int = 4) -> DesignSpace:

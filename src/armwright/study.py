@@ -7,17 +7,18 @@ trials before it, so a killed run goes on where it stopped and ends as if it had
 import operator
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from armwright.canonical import SameArms
 from armwright.control import Channel
 from armwright.exceptions import ModelError, SettingsError, StoppedError
-from armwright.history import BBO, POLISH, RANDOM, FinishedTrial, FrontMember, History
+from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMember, History
 from armwright.parameters import Design
-from armwright.pareto import Array, FrontTracker, default_reference_point
+from armwright.pareto import Array, FrontTracker
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
@@ -92,6 +93,7 @@ def optimize(
     n_total: int = 200,
     in_flight: int | None = None,
     polish_every: int | None = None,
+    start: Sequence[Design] = (),
     on_model_failure: str = "stop",
     verify: bool = True,
     seed: int = 0,
@@ -105,6 +107,7 @@ def optimize(
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
+    start: designs to begin with, such as an arm that is there already: the first of the n_init trials are theirs.
     verify: whether the front is verified where results are written (`verification.py`).
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials; a run
         that has begun always goes on.
@@ -115,7 +118,9 @@ def optimize(
         proposer = choose_proposer(proposer).proposer
     elif isinstance(proposer, type):
         raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
-    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every)
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every, start)
+    for design in method.start:
+        problem.space.design(design)  # says what is wrong before anything is begun
     config = study_config(problem, method, seed)
     with ExitStack() as stack:
         folder = None
@@ -147,12 +152,17 @@ class Study:
         self._channel = Channel(None if folder is None else folder.path)
         overlap = self.method.in_flight is not None
         self._asker = None if proposer is None else Asker(proposer, config.seed, None if overlap else self._asking)
-        self.black_box = BlackBox(problem.space, sampler, config.seed, len(problem.objectives))
-        self.trials = folder.open_trials(problem.space, len(problem.objectives)) if folder is not None else []
+        n_objectives, names = len(problem.objectives), [constraint.words for constraint in problem.constraints]
+        self.black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
+        self.trials = folder.open_trials(problem.space, n_objectives, len(names)) if folder is not None else []
         self.black_box.restore(self.trials)
-        self._tracker = FrontTracker(len(problem.objectives), config.reference_point)
+        self._same_arms = SameArms(problem)
+        self._first_of: dict[Hashable, int] = {}  # the first trial of each arm
         for trial in self.trials:
-            self._tracker.add(trial.values)
+            self._first_of.setdefault(self._same_arms.key(trial.design), trial.number)
+        self._tracker = FrontTracker(n_objectives, config.reference_point)
+        for row in self._history().counted:
+            self._tracker.add(row)
         self._freeze_reference_point()
 
     @property
@@ -256,9 +266,10 @@ class Study:
         refinement = self._refinement(number) if turn is None else None
         trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
-        values = tuple(self.problem.evaluate([design])[0].tolist())
+        same_as = self._first_of.setdefault(self._same_arms.key(design), number)
+        values, constraints = self._judged(design) if same_as == number else self._known(same_as)
         evaluated = time.perf_counter()
-        noted = self.black_box.tell(trial, values)
+        noted = self.black_box.tell(trial, values, constraints)
         told = time.perf_counter()
         seconds = {
             "total": round(told - started, 6),
@@ -266,15 +277,29 @@ class Study:
             "evaluation": round(evaluated - sampled, 6),
             "proposing": round(proposed - started, 6),
         }
-        finished = _finished(number, source, design, values, turn, noted, seconds)
+        finished = replace(_finished(number, source, design, values, turn, noted, seconds), constraints=constraints)
+        if same_as != number:
+            finished = replace(finished, same_as=same_as, evaluations=0)
         if refinement is not None:
-            finished = replace(finished, refines=refinement.refines, evaluations=1 + refinement.evaluations)
+            finished = replace(
+                finished, refines=refinement.refines, evaluations=finished.evaluations + refinement.evaluations
+            )
         if self.folder is not None:
             self.folder.append(finished)
         self.trials.append(finished)
-        self._tracker.add(values)
+        if finished.is_feasible:
+            self._tracker.add(values)
         self._freeze_reference_point()
         self._report("finished", number, source, turns, finished.fault, "" if turn is None else turn.note)
+
+    def _judged(self, design: Design) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Values and constraints of a design."""
+        values, constraints = self.problem.judge([design])
+        return tuple(values[0].tolist()), tuple(constraints[0].tolist())
+
+    def _known(self, number: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Those of an earlier trial's."""
+        return self.trials[number].values, self.trials[number].constraints
 
     def _refinement(self, number: int) -> Refinement | None:
         """A design of the front refined, where one is due."""
@@ -284,7 +309,8 @@ class Study:
         due = (number - self.method.n_init) // every
         if sum(trial.refines is not None for trial in self.trials) >= due:
             return None
-        return refine_one(self._history(), self.config.seed)
+        history = self._history()
+        return refine_one(history, self.config.seed) if history.front else None  # else nothing is feasible yet
 
     def _ask(self, number: int, turn: Turn | None, refinement: Refinement | None) -> tuple[Any, Design, str]:
         """Optuna's trial with the design to evaluate, and where it comes from."""
@@ -294,6 +320,9 @@ class Study:
             assert self.proposer is not None
             source = self.proposer.name
             return *self.black_box.inject(turn.proposal.design, number, source, turn.proposal.id), source
+        if number < len(self.method.start):
+            given = Design(self.method.start[number])
+            return *self.black_box.inject(given, number, START, None), START
         source = RANDOM if number < self.method.n_init else BBO
         return *self.black_box.draw(number, source), source
 
@@ -303,7 +332,7 @@ class Study:
     def _freeze_reference_point(self) -> None:
         """Writes a reference point that the task left open into config.yaml as soon as it is known."""
         if self.config.reference_point is None and len(self.trials) >= self.method.n_init:
-            reference_point = default_reference_point(self._history().values[: self.method.n_init])
+            reference_point = self._history().found_reference_point()
             self.config = self.config.model_copy(update={"reference_point": reference_point})
             self._tracker.set_reference_point(reference_point)
             if self.folder is not None:
@@ -358,8 +387,11 @@ def study_method(
     n_total: int,
     in_flight: int | None,
     polish_every: int | None,
+    start: Sequence[Design] = (),
 ) -> Method:
     """How `optimize` searches with these arguments; SettingsError where they do not go together."""
+    if len(start) > n_init:
+        raise SettingsError(f"{len(start)} designs to start with are more than the n_init = {n_init} first trials")
     if in_flight is not None and proposer is not None and not proposer.overlaps:
         raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
     return Method(
@@ -370,6 +402,7 @@ def study_method(
         n_total=whole("n_total", n_total, 1),
         in_flight=None if in_flight is None else whole("in_flight", in_flight, 1),
         polish_every=None if polish_every is None else whole("polish_every", polish_every, 1),
+        start=tuple(dict(design.params) for design in start),
     )
 
 

@@ -1,4 +1,4 @@
-"""The task: points that the tip of the arm should reach."""
+"""The task: points that the tip of the arm should reach, and which way it should point there."""
 
 import csv
 import json
@@ -12,19 +12,28 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    ValidationError,
+    field_serializer,
+    field_validator,
+    model_validator,
+)  # fmt: skip
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
+from armwright.goals import Goals, plain_goals
 from armwright.moves import MOVE_STEP, Moves, check_moves
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
+from armwright.targets import LARGEST_COORDINATE, Point, Target, goals_of, read_target
 from armwright.workspace import MOST_POINTS, MOST_REGIONS, Region
 
-Point = tuple[float, float, float]
-
-LARGEST_COORDINATE = 1000.0  # [m]
 LARGEST_PAYLOAD = 1e4  # [kg]
 MOST_TARGETS = 10_000
+MOST_RESTARTS = 100
 IN_ORDER = "in_order"  # of moves: from each target to the next
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 _FOLDER = resources.files("armwright") / "tasks"
@@ -34,26 +43,56 @@ _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from.
 
+    targets: points; where records are given that say more (`Target`), that is in `goals` and `entries`.
     payload: what the tip carries at all targets, or at each [kg].
+    restarts: further starts of the inverse kinematics at each target, of which the best posture counts.
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
     moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
     move_step: from one sample of such a line to the next, at most [m].
     workspace: boxes that the tip should cover; where targets are left out, these are the boxes' corners.
-    objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two.
+    objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two, and where a target
+        says which way the tool points, orientation_error.
+    constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
     obstacles: tuple[Obstacle, ...] = ()
+    restarts: int = Field(default=0, ge=0, le=MOST_RESTARTS)
     moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
     move_step: Annotated[float, Field(gt=0.0, le=LARGEST_COORDINATE)] = MOVE_STEP
     workspace: tuple[Region, ...] = ()
     objectives: tuple[str, ...] | None = None
+    constraints: tuple[str, ...] = ()
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
     description: str = Field(default="", max_length=10_000)
     provenance: str = Field(default="", max_length=10_000)
+    _records: tuple[Target | None, ...] = PrivateAttr(())  # of each target that says more; empty where none does
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _take_records(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Points of all targets, and the records of those that have one, apart."""
+        given = cast("dict[str, Any]", data).get("targets") if isinstance(data, dict) else None
+        if not isinstance(given, (list, tuple)):
+            return handler(data)
+        entries = cast("list[Any]", given)
+        records = tuple(
+            read_target(entry, number) if isinstance(entry, (dict, Target)) else None
+            for number, entry in enumerate(entries, start=1)
+        )
+        points = [entry if record is None else record.position for entry, record in zip(entries, records, strict=True)]
+        task = handler({**cast("dict[str, Any]", data), "targets": points})
+        kept = tuple(record if record is not None and record.words else None for record in records)
+        if any(kept):
+            task._records = kept  # pyright: ignore[reportAttributeAccessIssue] - frozen are the fields alone
+        return task
+
+    @field_serializer("targets")
+    def _with_records(self, targets: tuple[Point, ...]) -> tuple[Point | Target, ...]:
+        return self.entries
 
     @field_validator("obstacles", mode="before")
     @classmethod
@@ -126,6 +165,25 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def points(self) -> np.ndarray:
         """The targets as an array (T, 3) [m]."""
         return np.array(self.targets, dtype=np.float64)
+
+    @property
+    def entries(self) -> tuple[Point | Target, ...]:
+        """The targets as a task file has them: a record where one says more than its point."""
+        if not self._records:
+            return self.targets
+        return tuple(record or point for point, record in zip(self.targets, self._records, strict=True))
+
+    @property
+    def goals(self) -> Goals:
+        """How the targets are to be reached."""
+        if not self._records:
+            return plain_goals(len(self.targets), self.restarts)
+        return goals_of(self._records, self.restarts)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the targets are points and nothing else, from one start."""
+        return not self._records and self.restarts == 0
 
     @property
     def payloads(self) -> np.ndarray:
@@ -241,6 +299,14 @@ name: {json.dumps(_safe_name(file.stem))}    # names the run folder: letters, di
 targets:
 {rows}
 
+# A target can say more than its point: which way the tool's own z points there (axis), or its whole orientation as
+# roll, pitch, yaw about the fixed x, y, z [rad]; from where on it counts as missed; how much it counts.
+#   - {{position: [0.45, 0.0, 0.1], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}}
+#   - {{position: [0.45, 0.2, 0.3], orientation: [3.1416, 0, 1.5708]}}
+
+# Further starts of the inverse kinematics at each target, from postures drawn at random; the best posture counts.
+# restarts: 3
+
 # What the tip carries: at every target, or a list with a value for each [kg].
 # payload: 0.5
 
@@ -261,9 +327,15 @@ targets:
 # workspace: {{low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 200}}
 
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length, collision, closeness, path_error, joint_jump,
-# unreached, clumsiness.
+# rms_torque, mass, length, collision, closeness, orientation_error, worst_angle, path_error, joint_jump, unreached,
+# clumsiness.
 # objectives: [worst_error, peak_torque, mass]
+
+# What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number
+# in its unit.
+# constraints:
+#   - worst_error <= 0.01
+#   - mass <= 3
 
 # Worst values that still count, for the hypervolume: [position error summed over the targets in m,
 # torque summed over the targets in N m, times 40], or one for each of the objectives. Without it, 1.1 x the worst

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.evaluation import Array, evaluate_arrays
+from armwright.feasibility import counted
 from armwright.history import History
 from armwright.kinematics.arrays import arrays_of
 from armwright.parameters import Design
@@ -22,7 +23,7 @@ from armwright.tolerance import moved
 
 STARTS = 20
 START_SPREAD = 0.05  # [rad], of sliding joints [m], to either side of the straight start
-ALLOWED_SHARE = 0.05  # of a value, by which the worst case may be worse
+ALLOWED_SHARE = 0.05  # of a value, by which the worst case may be worse; of a bound, by which it may break it
 ALLOWED_OF_REFERENCE = 0.005  # of the reference point's value; allowed at least
 
 
@@ -34,8 +35,9 @@ class Verification:
     exact: (N, M) in float64.
     moved: (N, M) the worst in float64 with the base or one link off by 1 mm.
     started: (N, M) the worst in float64 from other start postures.
-    solid: (N,) whether neither `exact` nor `moved` is worse than is allowed.
+    solid: (N,) whether neither `exact` nor `moved` is worse than is allowed, or breaks a constraint by more than that.
     from_any_start: (N,) whether `started` is not, either.
+    as_built: (N, M) the worst of what a workshop makes of them; infinite where that breaks a constraint.
     """
 
     values: Array
@@ -44,11 +46,7 @@ class Verification:
     started: Array
     solid: NDArray[np.bool_]
     from_any_start: NDArray[np.bool_]
-
-    @property
-    def as_built(self) -> Array:
-        """(N, M) the worst of what a workshop makes of them."""
-        return np.max([self.values, self.exact, self.moved], axis=0)
+    as_built: Array
 
 
 def verify_front(history: History) -> Verification | None:
@@ -68,20 +66,24 @@ def verify(
     values: (N, M) what the search found.  reference_point: (M,) sets the scale of what is allowed.
     """
     rows = problem.space.matrix(designs)
-    exact = _values(problem, rows)
-    off = np.max([_values(problem, copies) for copies in moved(problem.space, rows)], axis=0)
+    exact, exactly_broken = problem.split(_judged(problem, rows))
+    copies = np.max([_judged(problem, copies) for copies in moved(problem.space, rows)], axis=0)
+    off, broken_off = problem.split(copies)
     dof = arrays_of(problem.space, rows).dof
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), dof))
-    started = np.max([_values(problem, rows, start) for start in starts], axis=0)
+    started, broken_started = problem.split(np.max([_judged(problem, rows, start) for start in starts], axis=0))
     worst = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
-    solid = np.all((exact <= worst) & (off <= worst), axis=1)
-    return Verification(values, exact, off, started, solid, from_any_start=solid & np.all(started <= worst, axis=1))
+    built = np.maximum(exactly_broken, broken_off)
+    solid = np.all((exact <= worst) & (off <= worst), axis=1) & np.all(built <= ALLOWED_SHARE, axis=1)
+    from_any_start = solid & np.all(started <= worst, axis=1) & np.all(broken_started <= ALLOWED_SHARE, axis=1)
+    as_built = counted(np.max([values, exact, off], axis=0), built)
+    return Verification(values, exact, off, started, solid, from_any_start, as_built)
 
 
-def _values(problem: Problem, rows: Array, start: Array | None = None) -> Array:
-    """(N, M) in float64.  start: (T, D) angles [rad]; None for the straight start."""
+def _judged(problem: Problem, rows: Array, start: Array | None = None) -> Array:
+    """(N, M + C) in float64.  start: (T, D) angles [rad]; None for the straight start."""
     arrays = arrays_of(problem.space, rows, "float64")
     task = problem.task
-    known = (task.payloads, task.obstacles, task.lines, task.workspace)
+    known = (task.payloads, task.obstacles, task.goals, task.lines, task.workspace)
     found = evaluate_arrays(arrays, task.points, "cpu", start, *known)
-    return problem.values(found)
+    return problem.judged(found)

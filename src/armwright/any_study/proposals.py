@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Protocol
 from weakref import WeakValueDictionary
 
-import numpy as np
 import optuna
 from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
@@ -18,7 +17,6 @@ from optuna.trial import FrozenTrial, TrialState
 from armwright.any_study.parameters import Space, observed_space
 from armwright.exceptions import DesignError, RunFolderError, SettingsError
 from armwright.history import BBO, FinishedTrial, History
-from armwright.pareto import default_reference_point
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.sampling import distributions
@@ -164,13 +162,19 @@ def study_history(study: optuna.Study, problem: Problem) -> History:
         raise SettingsError(f"the study's trials are not of the design space {problem.space.name}: {refusal}")
     reference_point = problem.reference_point
     if reference_point is None and trials:
-        reference_point = default_reference_point(np.array([trial.values for trial in trials[:N_REFERENCE]]))
+        reference_point = History(problem, trials, min(N_REFERENCE, len(trials))).found_reference_point()
     return History(problem, tuple(trials), 0, reference_point)
 
 
 def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTrial:
     noted = trial.user_attrs
     expected = noted.get("expected")
+    missing = [constraint.words for constraint in problem.constraints if constraint.words not in trial.constraints]
+    if missing:
+        raise SettingsError(
+            f'trial {trial.number} of the study does not say how far it breaks "{missing[0]}": '
+            f'trial.set_constraint("{missing[0]}", ...) with the value of problem.judge'
+        )
     return FinishedTrial(
         number,
         str(noted.get("source", BBO)),
@@ -179,4 +183,5 @@ def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTria
         proposal=noted.get("proposal"),
         reason=str(noted.get("reason", "")),
         expected=None if expected is None else tuple(expected),
+        constraints=tuple(trial.constraints[constraint.words] for constraint in problem.constraints),
     )

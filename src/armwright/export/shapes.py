@@ -41,7 +41,7 @@ def inertia_tensor(link: Link) -> NDArray[np.float64]:
     around = np.outer(axis, axis)
     tensor = across * (np.eye(3) - around) + link.mass * r2 / 2.0 * around
     centre = np.array(link.total_com)
-    for mass, place in ((link.mass, link.com), (link.end_mass, link.offset)):
+    for mass, place in ((link.mass, link.com), (link.end_mass, link.end_place)):
         away = np.array(place) - centre
         tensor += mass * (away @ away * np.eye(3) - np.outer(away, away))
     return tensor

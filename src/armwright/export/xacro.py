@@ -104,7 +104,7 @@ _PROPERTIES = {
     "more": "around - across",
     "total": "mass + end_mass",
     "share": "end_mass / total if total > 0 else 0",
-    "d": "[l * u[0] - com[0], l * u[1] - com[1], l * u[2] - com[2]]",
+    "d": "[l * u[i] + end_shift[i] - com[i] for i in range(3)]",
     "pair": "mass * share",
     "dd": "d[0] * d[0] + d[1] * d[1] + d[2] * d[2]",
 }
@@ -116,8 +116,8 @@ def _moment(i: int, j: int) -> str:
 
 
 def _add_macro(robot: ElementTree.Element) -> None:
-    """`inertial` of a link; direction: of unit length, com: [m]."""
-    params = "length radius mass end_mass direction com"
+    """`inertial` of a link; direction: of unit length, com: [m]; end_shift: from its end to its end mass [m]."""
+    params = "length radius mass end_mass end_shift direction com"
     macro = ElementTree.SubElement(robot, "xacro:macro", name="armwright_inertial", params=params)
     for name, expression in _PROPERTIES.items():
         ElementTree.SubElement(macro, "xacro:property", name=name, value=f"${{{expression}}}")
@@ -171,6 +171,7 @@ def _add_link(robot: ElementTree.Element, n: int, joint: Joint, link: Link) -> N
         "radius": f"${{{own}radius}}",
         "mass": f"${{{own}mass + {own}mass_per_metre * {length}}}",
         "end_mass": f"${{{own}end_mass}}",
+        "end_shift": f"${{[{', '.join(map(repr, link.end_shift))}]}}",
         "direction": f"${{[{', '.join(map(repr, direction))}]}}",
         "com": f"${{[{', '.join(_com(link, n))}]}}",
     }

@@ -20,12 +20,15 @@ SLIDES, FIXED = 3, 6  # motions: 0 to 2 turn about local x, y, z, 3 to 5 slide a
 
 Precision = Literal["float32", "float64"]
 Motions = Literal["turning", "any"]  # what all joints of some arms do
+Rows = Literal["position", "mixed"]  # what targets ask for: points alone, or of some which way the tool points, too
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
 Array = NDArray[np.float64]
 
-FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
-ARRAYS = (*FLOATS, "motion")  # of `ArmArrays`, that inverse kinematics takes
+_FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
+TOOL = ("tool_axis", "tool_side")  # that only targets with an axis or an orientation need
+FLOATS = (*_FLOATS, *TOOL)
+ARRAYS = (*_FLOATS, "motion")  # of `ArmArrays`, that all kernels of inverse kinematics read
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,8 @@ class ArmArrays:
     mass: Floats  # (N, D) [kg]
     radius: Floats  # (N, D) of the link after a joint [m]; 0 where there is none
     tool: Array  # (N, 3) from the end of the last link to the tip [m], in its own frame; a part of `offset`
+    tool_axis: Floats  # (N, 3) the tool's own z in the world when all joints are at 0, and so in the last local frame
+    tool_side: Floats  # (N, 3) the same of its x
     n_joints: Ints  # (N,) how many of the D an arm has
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 where it turns [m/rad]
     length: Array  # (N,) of all links [m]
@@ -133,6 +138,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         mass=mass.astype(precision),
         radius=radius.astype(precision),
         tool=np.array([arm.tool for arm in arms]),
+        tool_axis=np.array([arm.tool_axis for arm in arms], dtype=precision),
+        tool_side=np.array([arm.tool_side for arm in arms], dtype=precision),
         n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
         travel=travel,
         length=np.array([arm.length for arm in arms]),
@@ -150,8 +157,6 @@ def _motion(joint: Joint) -> int:
 def _check(arm: Arm) -> None:
     if len(arm.joints) > MOST_JOINTS:
         raise ArmError(f"the kernels take up to {MOST_JOINTS} joints, not {len(arm.joints)}")
-    if all(joint.kind == "fixed" for joint in arm.joints):
-        raise ArmError("an arm needs a joint that moves")
     for number, joint in enumerate(arm.joints, start=1):
         if joint.kind == "revolute" and max(-joint.lower, joint.upper) > LARGEST_ANGLE:
             raise ArmError(f"joint {number} turns beyond ±2π rad: [{joint.lower:g}, {joint.upper:g}]")
@@ -203,12 +208,15 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
         actuation = Actuation(np.where(plan < FIXED, efforts[chosen][..., None], np.inf), price)
     ends = np.concatenate([carried[:, 1:], np.zeros((n, 1))], axis=1)  # a link carries what the next module begins with
     total = mass + ends
-    middle = np.where(ends > 0.0, (mass * middle + ends * links) / np.where(total > 0.0, total, 1.0), middle)
     direction = _direction(space, read)  # (N, M, 3)
+    centre = direction * middle[..., None]
+    end_place = direction * links[..., None] + _shift(space, read, plan, rails, carried)
+    both = (mass[..., None] * centre + ends[..., None] * end_place) / np.where(total > 0.0, total, 1.0)[..., None]
+    centre = np.where(ends[..., None] > 0.0, both, centre)
     shape = plan.shape
     offset, com, masses_ = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
     offset[..., -1, :] = direction * links[..., None]
-    com[..., -1, :] = direction * middle[..., None]
+    com[..., -1, :] = centre
     masses_[..., -1] = total
     travel = np.where(slides, space.travel, 1.0)
     motion = np.where(plan < FIXED, plan // SLIDES * SLIDES + axis, FIXED)
@@ -238,6 +246,8 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
         mass=flat["mass"].astype(precision),
         radius=flat["radius"].astype(precision),
         tool=tool,
+        tool_axis=_turned(np.broadcast_to(_VECTORS[4], (n, 1, 3)), read.mount)[:, 0].astype(precision),
+        tool_side=_turned(np.broadcast_to(_VECTORS[0], (n, 1, 3)), read.mount)[:, 0].astype(precision),
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(links, axis=1)[:, -1],
@@ -327,6 +337,19 @@ def _direction(space: DesignSpace, read: _Reader) -> Array:
     """(N, M, 3) where the links leave to, in the world's axes."""
     chosen = read.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
     return _turned(_VECTORS[chosen], read.mount)
+
+
+def _shift(space: DesignSpace, read: _Reader, plan: NDArray[np.intp], rails: Array, carried: Array) -> Array | float:
+    """(N, M, 3) from the end of each link to the centre of what the next module begins with, in the world's axes."""
+    if not rails.any():
+        return 0.0
+    ways = np.where(rails > 0.0, rails / np.where(carried > 0.0, carried, 1.0), 0.0) * (
+        read.reals("stroke", _single(space.stroke)) / 2
+    )
+    local = np.eye(3)[plan[..., -1] % SLIDES] * ways[..., None]
+    shifts = np.zeros_like(local)
+    shifts[:, :-1] = _turned(local, read.mount)[:, 1:]
+    return shifts
 
 
 def _tool(space: DesignSpace, read: _Reader) -> Array:

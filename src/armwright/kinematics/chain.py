@@ -36,6 +36,19 @@ def link_lines(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
     return [*lines, np.array([lines[-1][1], places[-1]])]
 
 
+def rails(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
+    """(2, 3) each: where the rails of sliding joints begin and end [m]; q: as above."""
+    places, frame = joint_positions(arm, q), np.eye(3)
+    lines: list[Array] = []
+    for joint, value, place in zip(arm.joints, q, places[:-1], strict=True):
+        if joint.kind == "prismatic":
+            along = frame[:, AXES.index(joint.axis)]
+            lines.append(np.array([place + (limit - value) * along for limit in (joint.lower, joint.upper)]))
+        elif joint.kind == "revolute":
+            frame = frame @ rotation(joint.axis, value)
+    return lines
+
+
 def rotation(axis: Axis, angle: float) -> Array:
     """(3, 3) about local x, y or z by `angle` [rad]."""
     s, c = np.sin(angle), np.cos(angle)

@@ -16,6 +16,7 @@ every variant: its matrix squares the condition of the Jacobian, and weights nea
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
@@ -26,10 +27,10 @@ from armwright.arm import GRAVITY
 from armwright.kinematics.arrays import FIXED, MOST_JOINTS, SLIDES, Motions, Precision
 
 # At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
-_OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
+OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
 
 # A Warp kernel in a module of its own: the fewer its callers, the more willingly LLVM inlines a function.
-_kernel = partial(wp.kernel, enable_backward=False, module="unique", module_options=_OPTIONS)
+_kernel = partial(wp.kernel, enable_backward=False, module="unique", module_options=OPTIONS)
 
 
 @dataclass(frozen=True)
@@ -37,10 +38,13 @@ class Kernels:
     """One variant of the kernels. Each compiles when it is first loaded, and is kept on disk."""
 
     lanes: int
+    real: Any  # the number type
     Lane: Any  # the vector of a number for each lane
     Arms: Any  # `ArmArrays` on the device, a Warp struct
     descend: Any  # the inverse kinematics
     hold: Any  # the posture kept, its tip and its torque
+    parts: Mapping[str, Any]  # types and functions that other kernels are made of, too
+    settle: Any = None  # before `hold`, for targets that say which way the tool points: the posture kept, its angle off
 
 
 @cache
@@ -467,4 +471,9 @@ def kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kernels:
                 arms.motion[arm, j], ux[j], uy[j], uz[j], lever_x, lever_y, mass_beyond
             )
 
-    return Kernels(lanes, Lane, Arms, descend, hold)
+    parts = {
+        "Wide": Wide, "Joints": Joints, "roots": roots, "at_least": at_least, "chosen": chosen, "damping": damping,
+        "sine_cosine": sine_cosine, "turned": turned, "slid": slid, "column_of": column_of, "margin_of": margin_of,
+        "square_of": square_of, "limit_fraction": limit_fraction,
+    }  # fmt: skip
+    return Kernels(lanes, real, Lane, Arms, descend, hold, parts)

@@ -16,7 +16,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.exceptions import ArmError, FailureError, SettingsError
-from armwright.kinematics.arrays import ARRAYS, FLOATS, ArmArrays, Floats, Precision, checked_precision
+from armwright.goals import ORIENTATION, Goals
+from armwright.kinematics.arrays import (
+    ARRAYS,
+    FIXED,
+    FLOATS,
+    TOOL,
+    ArmArrays,
+    Floats,
+    Precision,
+    Rows,
+    checked_precision,
+)
 from armwright.kinematics.devices import Device, cores, load, resolve_device
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
@@ -37,6 +48,7 @@ class Postures:
     q: Floats  # (N, T, D) joint angles [rad], or ways [m]
     reached: Floats  # (N, T, 3) position of the tip [m]
     torque: Floats  # (N, T, D) that holds the posture against gravity, +dV/dq [N m] or [N]
+    angle: Floats  # (N, T) by which the tool is off the target's axis or orientation [rad]; 0 where it has none
 
 
 def solve_postures(
@@ -46,6 +58,7 @@ def solve_postures(
     *,
     start: ArrayLike | None = None,
     payload: NDArray[np.float64] | None = None,
+    goals: Goals | None = None,
     precision: Precision = "float32",
     device: Device = "cpu",
 ) -> Postures:
@@ -53,8 +66,9 @@ def solve_postures(
 
     targets: (T, 3) [m]; how many is a question of memory alone.
     start: values [rad] or [m] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without
-    it all arms start straight, at 0.
+    it all arms start straight, at 0; fixed joints stay there.
     payload: (T,) point masses that the tip carries at the targets [kg]; without it none.
+    goals: which way the tool should point, of T targets; without them, or where none says so, points alone count.
     precision: of the results. "float64" takes arms of either precision, "float32" only its own.
     The same arm, target and start give the same bits on the same device, whatever is solved beside them.
     """
@@ -64,17 +78,24 @@ def solve_postures(
     device = resolve_device(device, many=True)
     n, t, dof = len(arms), len(targets), arms.dof
     start = None if start is None and arms.starts_at_zero else np.zeros(1) if start is None else start
-    starts = None if start is None else _broadcast(start, (n, t, dof))
-    loaded = np.column_stack([targets, np.zeros(t) if payload is None else payload])
-    solved = Postures(*(np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof)))
+    starts = None
+    if start is not None:
+        starts = np.where(arms.motion[:, None] == FIXED, 0.0, _broadcast(start, (n, t, dof)))
+    rows = _rows_of(goals)
+    wanted = _wanted(targets, np.zeros(t) if payload is None else payload, goals)
+    q, reached, torque = (np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof))
+    solved = Postures(q, reached, torque, angle=np.zeros((n, t), dtype=precision))
     parts = _parts(n, t, LANES[device])
 
-    def solve(rows: slice) -> None:
-        chunk = arms[rows]
+    def solve(chunk: slice) -> None:
+        some_arms = arms[chunk]
         for some, lanes in parts:
-            begin = None if starts is None else starts[rows, some]
-            q, reached, torque = _solve(chunk, loaded[some], updates, begin, lanes, device)
-            solved.q[rows, some], solved.reached[rows, some], solved.torque[rows, some] = q, reached, torque
+            begin = None if starts is None else starts[chunk, some]
+            found = _solve(some_arms, wanted[some], updates, begin, rows, lanes, device)
+            for whole, part in zip((solved.q, solved.reached, solved.torque), found, strict=False):
+                whole[chunk, some] = part
+            if rows == "mixed":
+                solved.angle[chunk, some] = found[3][..., 0]
 
     groups = -(-t // LANES[device])
     size = max(1, LARGEST_CHUNK[device] // _bytes_of_one(arms, groups, LANES[device]))
@@ -85,21 +106,42 @@ def solve_postures(
     return solved
 
 
-def update_once(arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats) -> tuple[Floats, Floats]:
+def update_once(
+    arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats, goals: Goals | None = None
+) -> tuple[Floats, Floats]:
     """One update of the inverse kinematics of each arm at a target of its own, from given angles, on the CPU.
 
     targets: (N, 3) [m].  q, the limit gradients h_before, and both results: (N, D). All is of the arms' precision.
+    goals: of one target, for all arms.
     """
+    shape = (len(arms), arms.dof)
+    if q.shape != shape or h_before.shape != shape:
+        raise ArmError(f"q and h_before must have the shape {shape}: arms, joints; not {q.shape} and {h_before.shape}")
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
     moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
     lanes = LANES["cpu"]
-    wp, kernels = load(arms.precision, lanes, arms.motions, "cpu")
+    wp, kernels = load(arms.precision, lanes, arms.motions, _rows_of(goals), "cpu")
+    wanted = _wanted(np.zeros((1, 3)), np.zeros(1), goals)
     at, q_last, h_last = (
         wp.array(_in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
-        for values in (np.zeros((1, 1, 4)), q[:, None], h_before[:, None])
+        for values in (wanted[None], q[:, None], h_before[:, None])
     )
     _launch(moved, at[0], 1, q_last, h_last, wp, kernels)
     return _from_lanes(q_last.numpy())[:, 0], _from_lanes(h_last.numpy())[:, 0]
+
+
+def _rows_of(goals: Goals | None) -> Rows:
+    return "mixed" if goals is not None and goals.oriented else "position"
+
+
+def _wanted(targets: NDArray[np.float64], payload: NDArray[np.float64], goals: Goals | None) -> NDArray[np.float64]:
+    """(T, C) what the kernels are told of each target: C = 4 numbers of a point, 16 where any says more."""
+    points = [targets, payload]
+    if goals is None or not goals.oriented:
+        return np.column_stack(points)
+    frame = goals.rotation.swapaxes(1, 2).reshape(-1, 9)  # the x, then y, then z that the tool should have
+    asks, whole = np.float64(goals.rows > 0), np.float64(goals.rows == ORIENTATION)
+    return np.column_stack([*points, frame, asks, whole, goals.trade])
 
 
 def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:
@@ -116,25 +158,26 @@ def _solve(
     targets: NDArray[np.float64],
     updates: int,
     start: NDArray[np.float64] | None,
+    rows: Rows,
     lanes: int,
     device: Device,
 ) -> list[NDArray[Any]]:
-    """Kept angles, reached points and torques of a chunk of arms, (N, T, ...).
+    """Kept angles, reached points, torques and, of mixed rows, angles off of a chunk of arms, (N, T, ...).
 
-    targets: (T, 4), the payload last.
+    targets: (T, C) as of `_wanted`.
     """
     at = _in_lanes(targets[None], lanes)[0]
     begin = None
     if start is not None:
         begin = _in_lanes(np.clip(start, arms.lower[:, None], arms.upper[:, None]), lanes)
     if device == "cpu" and len(arms) <= _most_kept(arms, len(at), lanes):
-        results = _kept_arrays(arms, at, updates, lanes).solve(arms, at, begin)
+        results = _kept_arrays(arms, at, updates, rows, lanes).solve(arms, at, begin)
     else:
-        wp, kernels = load(arms.precision, lanes, arms.motions, device)
+        wp, kernels = load(arms.precision, lanes, arms.motions, rows, device)
         at_ = wp.array(at, dtype=kernels.Lane, device=device, copy=False)
         q_last = wp.zeros((len(arms), len(at), arms.dof), dtype=kernels.Lane, device=device)
         if begin is not None:
-            q_last = wp.array(begin, dtype=kernels.Lane, device=device, copy=False)
+            q_last = wp.array(begin, dtype=kernels.Lane, shape=begin.shape[:-1], device=device, copy=False)
         h_last = wp.full(q_last.shape, BEFORE_THE_FIRST, dtype=kernels.Lane, device=device)
         results = [values.numpy() for values in _launch(arms, at_, updates, q_last, h_last, wp, kernels)]
     return [_from_lanes(values)[:, : len(targets)] for values in results]
@@ -143,25 +186,23 @@ def _solve(
 class _KeptArrays:
     """What the kernels read and write on the CPU for some arms at a time, made once and filled again for others."""
 
-    def __init__(self, arms: ArmArrays, at: NDArray[Any], updates: int, lanes: int) -> None:
-        wp, kernels = load(arms.precision, lanes, arms.motions, "cpu")
+    def __init__(self, arms: ArmArrays, at: NDArray[Any], updates: int, rows: Rows, lanes: int) -> None:
+        wp, kernels = load(arms.precision, lanes, arms.motions, rows, "cpu")
         most, groups, dof = _most_kept(arms, len(at), lanes), len(at), arms.dof
-        rows = {name: getattr(arms, name) for name in ARRAYS}
-        self._arms = {name: np.zeros((most, *some.shape[1:]), dtype=some.dtype) for name, some in rows.items()}
+        read = {name: getattr(arms, name) for name in (ARRAYS if rows == "position" else (*ARRAYS, *TOOL))}
+        self._arms = {name: np.zeros((most, *some.shape[1:]), dtype=some.dtype) for name, some in read.items()}
         self._at = np.zeros(at.shape, dtype=arms.precision)
         self._q_last, self._h_last, *self._results = (
-            np.zeros((most, groups, columns, lanes), dtype=arms.precision) for columns in (dof, dof, dof, 3, dof)
+            np.zeros((most, groups, columns, lanes), dtype=arms.precision)
+            for columns in (dof, dof, *_columns(dof, kernels))
         )
-        on_device = _on_device(replace(arms, **self._arms), wp, kernels, "cpu")
+        held = replace(arms, **self._arms)
         at_, q_last, h_last, *results = (
-            wp.array(values, dtype=kernels.Lane, device="cpu", copy=False)
+            wp.array(values, dtype=kernels.Lane, shape=values.shape[:-1], device="cpu", copy=False)
             for values in (self._at, self._q_last, self._h_last, *self._results)
         )
         self._launch = wp.launch
-        self._steps = (
-            (kernels.descend, [on_device, at_, updates, q_last, h_last, results[0]]),
-            (kernels.hold, [on_device, at_, q_last, *results]),
-        )
+        self._steps = _steps(held, at_, updates, q_last, h_last, results, wp, kernels)
 
     def solve(self, arms: ArmArrays, at: NDArray[Any], begin: NDArray[Any] | None) -> list[NDArray[Any]]:
         """Kept angles, reached points and torques, (N, G, ...) in lanes, as long as nothing else is solved here."""
@@ -179,14 +220,14 @@ class _KeptArrays:
 _kept = threading.local()
 
 
-def _kept_arrays(arms: ArmArrays, at: NDArray[Any], updates: int, lanes: int) -> _KeptArrays:
-    """This thread's arrays for arms with as many joints and targets."""
+def _kept_arrays(arms: ArmArrays, at: NDArray[Any], updates: int, rows: Rows, lanes: int) -> _KeptArrays:
+    """This thread's arrays for arms with as many joints and targets of a kind."""
     sets: dict[tuple[Any, ...], _KeptArrays] = _kept.__dict__.setdefault("sets", {})
-    key = (arms.dof, arms.precision, arms.motions, len(at), updates, lanes)
+    key = (arms.dof, arms.precision, arms.motions, len(at), updates, rows, lanes)
     if key not in sets:
         if len(sets) == MOST_KEPT:
             sets.clear()
-        sets[key] = _KeptArrays(arms, at, updates, lanes)
+        sets[key] = _KeptArrays(arms, at, updates, rows, lanes)
     return sets[key]
 
 
@@ -201,16 +242,40 @@ def _bytes_of_one(arms: ArmArrays, groups: int, lanes: int) -> int:
 
 
 def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, wp: Any, kernels: Any) -> list[Any]:
-    """Kept angles, reached points and torques, (N, G, ...) in lanes, on the device of the other arrays.
+    """Kept angles, reached points, torques and, of mixed rows, angles off, (N, G, ...) in lanes, on the same device.
 
-    at: (G, 4) targets and payloads in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
+    at: (G, C) what targets ask for, in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
     """
     device, dim = q_last.device, (len(arms), len(at))
-    on_device = _on_device(arms, wp, kernels, device)
-    results = [wp.empty((*dim, columns), dtype=kernels.Lane, device=device) for columns in (arms.dof, 3, arms.dof)]
-    wp.launch(kernels.descend, dim, inputs=[on_device, at, updates, q_last, h_last, results[0]], device=device)
-    wp.launch(kernels.hold, dim, inputs=[on_device, at, q_last, *results], device=device)
+    results = [wp.empty((*dim, n), dtype=kernels.Lane, device=device) for n in _columns(arms.dof, kernels)]
+    for kernel, inputs in _steps(arms, at, updates, q_last, h_last, results, wp, kernels):
+        wp.launch(kernel, dim, inputs=inputs, device=device)
     return results
+
+
+def _columns(dof: int, kernels: Any) -> tuple[int, ...]:
+    """Of the results: kept angles, reached points, torques and, of mixed rows, angles off."""
+    return (dof, 3, dof) if kernels.settle is None else (dof, 3, dof, 1)
+
+
+def _steps(
+    arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, results: list[Any], wp: Any, kernels: Any
+) -> tuple[tuple[Any, list[Any]], ...]:
+    """The kernels in their order, each with what it takes; results: as of `_columns`."""
+    on_device = _on_device(arms, wp, kernels, q_last.device)
+    kept, *held = results[:3]
+    if kernels.settle is None:
+        return (
+            (kernels.descend, [on_device, at, updates, q_last, h_last, kept]),
+            (kernels.hold, [on_device, at, q_last, kept, *held]),
+        )
+    vector = kernels.Arms.vars["base"].type.dtype
+    tool = [wp.array(getattr(arms, name), dtype=vector, device=q_last.device, copy=False) for name in TOOL]
+    return (
+        (kernels.descend, [on_device, *tool, at, updates, q_last, h_last, kept]),
+        (kernels.settle, [on_device, *tool, at, q_last, kept, results[3]]),
+        (kernels.hold, [on_device, at, kept, kept, *held]),
+    )
 
 
 def _on_device(arms: ArmArrays, wp: Any, kernels: Any, device: Any) -> Any:

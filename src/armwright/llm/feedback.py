@@ -14,12 +14,12 @@ from armwright.history import History
 from armwright.llm.answer import LONGEST_REASON
 from armwright.llm.lines import LISTS, NOTHING
 from armwright.llm.words import one_line
+from armwright.misses import AT_LIMIT, why_missed
 from armwright.parameters import Design
 from armwright.space import DesignSpace
 
 N_PARETO = 5  # members of the front shown
 N_RANDOM = 5  # other finished designs shown
-AT_LIMIT = 1e-3  # [rad] or [m] from a limit, from which a joint counts as standing at it
 LARGE = 1e6  # from which on numbers are written with an exponent
 NOISE = 1e-9  # below it a number counts as 0
 
@@ -57,12 +57,13 @@ class Digits:
 class Feedback:
     """Members of the front and other finished designs, drawn by `seed`, as text.
 
-    front, others: numbers of the trials; of the front by its first objective, else in the order of the run.
+    front, others: numbers of the trials; of the front by its first objective, else in the order of the run. As long as
+        no design is feasible, what comes nearest to it stands in for the front.
     """
 
     def __init__(self, history: History, seed: int) -> None:
         rng = np.random.default_rng(seed)
-        front = [member.number for member in history.front]
+        front = [member.number for member in history.front] or history.nearest(N_PARETO)
         on_front = set(front)
         others = [trial.number for trial in history if trial.number not in on_front]
         self.front = _draw(front, N_PARETO, rng)
@@ -88,11 +89,22 @@ class Feedback:
             **_parameters(self._history, number, at.length),
             "e_each": points(self._each[row, shown], at.shares) if at.shares else "",
             "p_ik": points(evaluation.reached[row, shown], at.length),
+            "a_ik": _angles(evaluation, row, shown),
+            "missed": self._missed(number, row, shown),
             "tau_ik": points(evaluation.motor_torques[row, shown, : len(joints)], at.torque),
             "limits": _limits(evaluation, row, joints),
             "load": _load(evaluation.motor_torques[row], joints),
             "e_all": vector(self._history.trials[number].values, at.objectives),
+            "broken": _broken(self._history, number),
         }
+
+    def _missed(self, number: int, row: int, shown: list[int]) -> str:
+        """Why targets are missed, counted as shown; empty for points alone, whose reasons stand in the other lists."""
+        if not self._evaluation.goals.oriented:
+            return ""
+        arm = self._history.problem.arm(self._history.trials[number].design)
+        reasons = [why_missed(arm, self._evaluation, row, target) for target in shown]
+        return "; ".join(f"target {k} by {why}" for k, why in enumerate(reasons, start=1) if why) or "none"
 
 
 def proposal_records(history: History, name: str) -> list[Record]:
@@ -104,6 +116,7 @@ def proposal_records(history: History, name: str) -> list[Record]:
             **_parameters(history, trial.number, at.length),
             "expected": "not said" if trial.expected is None else vector(trial.expected, at.objectives),
             "e_all": vector(trial.values, at.objectives),
+            "broken": _broken(history, trial.number),
             "on_front": trial.number in front,
             "reason": one_line(trial.reason, LONGEST_REASON) or "not said",
         }
@@ -145,6 +158,17 @@ def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
     }
 
 
+def _broken(history: History, number: int) -> str:
+    """The constraints that a design does not keep, with what it has instead; empty where the task has none."""
+    constraints = history.problem.constraints
+    words = [
+        f"{c.quantity.symbol} = {c.measured(value):.4g}, not {c.relation} {c.bound:.12g}"
+        for c, value in zip(constraints, history.trials[number].constraints, strict=True)
+        if value > 0.0
+    ]
+    return ("; ".join(words) or "none") if constraints else ""
+
+
 def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str, str]]:
     """What a design has beside base, joints and links, as the lines of an answer: name and value."""
     names = {parameter.name for parameter in space.parameters}
@@ -177,6 +201,15 @@ def _limits(evaluation: Evaluation, row: int, joints: Sequence[str]) -> str:
             if stands.any():
                 found.append(f"{name} {word} at {int(stands.sum())} of {len(q)}")
     return ", ".join(found) or "none"
+
+
+def _angles(evaluation: Evaluation, row: int, shown: list[int]) -> str:
+    """By how many degrees the tool is off at targets, "-" where any direction will do; empty where no target asks."""
+    goals = evaluation.goals
+    if not goals.oriented:
+        return ""
+    degrees = np.degrees(evaluation.angle_error[row])
+    return "(" + ", ".join(f"{degrees[t]:.1f}" if goals.rows[t] else "-" for t in shown) + ")"
 
 
 def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:

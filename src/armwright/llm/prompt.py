@@ -4,7 +4,7 @@ import os
 import re
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -15,6 +15,7 @@ from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 from armwright.arm import GRAVITY
 from armwright.control import LONGEST_HINT
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.goals import REACHED
 from armwright.history import History
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.kinematics.solve import UPDATES
@@ -23,8 +24,9 @@ from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
-from armwright.objectives import OF_THE_WAY
+from armwright.objectives import MISSED, OF_THE_WAY, ORIENTATION_ERROR, POSITION_ERROR, Objective
 from armwright.problem import Problem
+from armwright.targets import target_words
 from armwright.task import IN_ORDER, Task
 from armwright.tolerance import measured_columns
 
@@ -60,6 +62,9 @@ VARIABLES = {
     "payload": "what the tip carries at the targets, as text; empty for nothing",
     "obstacles": "what the arm should keep away from, each as text; none as a rule",
     "collisions": "whether what the arm touches counts in an objective",
+    "asks": "what targets say beside their points, such as an axis for the tool, a line each; empty for points alone",
+    "oriented": "whether any target asks for an axis or an orientation of the tool",
+    "restarts": "further starts of the inverse kinematics at each target",
     "moves": "the straight lines that the tip goes along, as text; empty where none counts in an objective",
     "workspace": "boxes that the tip should cover, each as text; none where they count in no objective",
     "of_the_way": "the objectives of which a target's share is the worst of it and of the moves that end there",
@@ -70,14 +75,17 @@ VARIABLES = {
     "target_high": "the largest x, y and z of all targets",
     "updates": "updates of the inverse kinematics",
     "objectives": "what is minimised, each with symbol, label, unit, words, over (sum, max, mean square or arm)",
+    "constraints": "what a design has to keep, each with quantity (as an objective), relation, bound",
+    "n_feasible": "how many of the evaluated designs keep all of these",
     "tolerance": "[m] by which base and links may be off, the worst case of which counts; 0: designs as they stand",
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
     "n_front": "how many of them are Pareto-optimal",
     "front": "members of the front, by rising first objective: number, origin, joints, links, extras, e_each, p_ik, "
-    "tau_ik, limits, load, e_all",
+    "a_ik, missed, tau_ik, limits, load, e_all, broken (which constraints, or none; empty where there are none); as "
+    "long as no design is feasible (n_feasible), those nearest to it",
     "others": "some other designs, with the same",
-    "proposed": "--memory own: earlier proposals: number, origin, joints, links, extras, expected, e_all, on_front, "
+    "proposed": "--memory own: earlier proposals: number, origin, joints, links, extras, expected, e_all, broken, "
     "reason",
     "n_proposed": "how many proposals there were",
     "proposals": "how many designs to propose",
@@ -275,13 +283,17 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "payload": _payload_words(problem.task),
         "obstacles": [obstacle.words() for obstacle in problem.task.obstacles],
         "collisions": problem.heeds_clearance,
+        "oriented": problem.task.goals.oriented,
+        "restarts": problem.task.restarts,
         "moves": _move_words(problem.task) if problem.heeds_moves else "",
         "workspace": [region.words() for region in problem.task.workspace] if problem.heeds_workspace else [],
-        "of_the_way": [objective for objective in problem.objectives if objective in OF_THE_WAY],
+        "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.counts(quantity)],
         "updates_of_step": UPDATES_OF_STEP,
         "n_targets": len(problem.task.points),
         "updates": UPDATES,
-        "objectives": problem.objectives,
+        "objectives": [_spoken(objective, problem.task) for objective in problem.objectives],
+        "constraints": problem.constraints,
+        "n_feasible": int(history.feasible.sum()),
         "tolerance": problem.tolerance,
         "reference_point": history.reference_point,
         "n_finished": len(history),
@@ -295,6 +307,17 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
 def _lines(hints: Sequence[str]) -> list[str]:
     """Each hint on one line; one in which nothing is to be seen is left out."""
     return [line for hint in hints if (line := one_line(hint, LONGEST_HINT))]
+
+
+def _spoken(objective: Objective, task: Task) -> Objective:
+    """An objective whose words say what this task's tolerances and weights make of it."""
+    goals = task.goals
+    if objective == MISSED and (goals.oriented or np.any(goals.tolerance != REACHED)):
+        angle = " or the tool's direction by its angle tolerance" if goals.oriented else ""
+        return replace(objective, words=f"1 where the tip misses the target by its tolerance{angle} or more, else 0")
+    if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(goals.weight != 1.0):
+        return replace(objective, words=f"{objective.words}, times the target's weight")
+    return objective
 
 
 def _payload_words(task: Task) -> str:
@@ -336,6 +359,7 @@ def _shown(
     others = [feedback.others[place] for place in spread(len(feedback.others), most_designs)]
     return {
         "targets": points(points_[shown], decimals),
+        "asks": target_words([history.problem.task.entries[place] for place in shown]),
         "target_low": vector(points_.min(axis=0), decimals),
         "target_high": vector(points_.max(axis=0), decimals),
         "n_targets_shown": len(shown),

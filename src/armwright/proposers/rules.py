@@ -84,7 +84,7 @@ def members_inside(history: History) -> list[FrontMember]:
 
 def most_promising(history: History, name: str) -> str:
     """The rule whose proposals, one imagined among them, have added most hypervolume on average."""
-    volume = hypervolume_history(history.values, bounds(history))
+    volume = hypervolume_history(history.counted, bounds(history))
     gain = np.diff(volume, prepend=0.0)
     added = {rule: [expected * float(volume[-1])] for rule, expected in EXPECTED.items()}
     for trial in history:

@@ -84,7 +84,7 @@ def _closer(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[st
         history = runs[0].history()
         if len(history.problem.objectives) > 1:
             yield f"samples-{task}", draw_samples(history)
-        solutions = solution_numbers(history.values, comparison.reference_point(task))
+        solutions = solution_numbers(history.counted, comparison.reference_point(task))
         for i, number in enumerate(dict.fromkeys(solutions or ()), start=1):
             title = f"{task}, {shown}, seed {runs[0].seed}: Solution {i}"
             yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number))
@@ -128,7 +128,8 @@ def draw_area(comparison: Comparison) -> Figure:
     reference = run.reference_point
     values = history.values[: config.study.n_trials, :2]
     figure, axes = one_panel(4.4, 3.8)
-    inside = values[[n for n in front_numbers(values) if np.all(values[n] < reference[:2])]]
+    kept = history.counted[: config.study.n_trials, :2]
+    inside = values[[n for n in front_numbers(kept) if np.all(values[n] < reference[:2])]]
     axes.scatter(*values.T, s=12, color="#9A9A9A", label="designs")
     if len(inside):
         x = [inside[0, 0], *inside[:, 0], reference[0]]
@@ -152,7 +153,7 @@ def draw_area(comparison: Comparison) -> Figure:
     axes.set_xlim(0, 1.15 * reference[0])
     axes.set_ylim(0, 1.15 * reference[1])
     _name_axes(axes, config)
-    area = hypervolume(history.values[: config.study.n_trials], reference)
+    area = hypervolume(history.counted[: config.study.n_trials], reference)
     axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
     axes.legend(loc="lower left")
     return figure
@@ -363,8 +364,8 @@ def _name_axes(axes: Any, config: RunConfig) -> None:
 
 def _front(run: Run) -> np.ndarray:
     """(K, 2) the front of a run, in the first two objectives."""
-    values = run.history().values
-    return values[front_numbers(values)][:, :2]
+    counted = run.history().counted
+    return counted[front_numbers(counted)][:, :2]
 
 
 def _stairs(surface: np.ndarray, reference: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:

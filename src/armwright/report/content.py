@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Joint, Link
 from armwright.best_known import known_front
+from armwright.buying import read_bought, standing
 from armwright.comparison import method_words
-from armwright.decision import numbers_of
+from armwright.decision import bounded_numbers, numbers_of
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
+from armwright.goals import Goals
 from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
@@ -26,7 +28,7 @@ from armwright.obstacles import Obstacle
 from armwright.parameters import FloatParameter
 from armwright.pareto import front_numbers, hypervolume, hypervolume_history
 from armwright.report.repeat import repeat_command
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
+from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.results import read_summary
 from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
 
@@ -85,8 +87,8 @@ class RunContent:
         arrays = _joined([arrays for first, arrays in self._chunks if first >= designs_from])
         curve = np.zeros(0)
         if self.history.reference_point is not None and len(self.history):
-            curve = hypervolume_history(self.history.values, self.history.reference_point)
-        front = front_numbers(self.history.values) if len(self.history) else []
+            curve = hypervolume_history(self.history.counted, self.history.reference_point)
+        front = front_numbers(self.history.counted) if len(self.history) else []
         search = None if self.summary is None or self.study is not None else self.summary["search"]
         spent = None if search is None else search["evaluations"]
         head = {
@@ -98,12 +100,27 @@ class RunContent:
             "proposals": _proposals(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
             "looks": {trial.source: _look(trial.source) for trial in self.history},
+            "existing": {"label": EXISTING.label, "colour": EXISTING.colour},
+            "bought": _bought(self.folder, self.history),
             "result": _result(self.config, self.history, self.summary),
             "calls_from": calls_from,
             "calls": [asdict(call) for call in self.calls[calls_from:]],
             "files": {number: design_files(self.history, number) for number in front} if with_files else {},
         }
         return pack(head, {**arrays, "curve": curve})
+
+
+def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
+    """Arms that exist already, as they were last compared with the run, and where they stand beside its front now."""
+    return [
+        {
+            "name": arm.name,
+            "values": list(arm.values),
+            "breaks": list(arm.breaks),
+            "standing": standing(arm.values, arm.breaks, history),
+        }
+        for arm in read_bought(folder)
+    ]
 
 
 def design_files(history: History, number: int) -> dict[str, str]:
@@ -115,7 +132,7 @@ def design_files(history: History, number: int) -> dict[str, str]:
 def _of_arm(history: History, number: int) -> dict[str, float]:
     """What an arm is, whatever the targets, by the names that `armwright pick` knows."""
     numbers = numbers_of(history, history.member(number))
-    return {name: numbers[name] for name in ("length", "mass")}
+    return {name: numbers[name] for name in ("length", "mass", *bounded_numbers(history, number))}
 
 
 def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
@@ -148,6 +165,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
         "values": history.values[numbers.start : numbers.stop],
         "params": space.matrix([trial.design for trial in trials]),
+        "broken": history.broken[numbers.start : numbers.stop],
         "q": evaluation.q.astype(np.float32),
         **_arm_arrays(arms, evaluation.arms.dof),
     }
@@ -163,8 +181,9 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
 
     return {
         "base": floats([arm.base for arm in arms]),
-        "stands": floats([arm.tool_axis for arm in arms]),
         "tool": floats([arm.tool for arm in arms]),
+        "tool_axis": floats([arm.tool_axis for arm in arms]),
+        "tool_side": floats([arm.tool_side for arm in arms]),
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
         "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
         "axis": np.array([[AXES.index(j.axis) for j in row] for row in own], dtype=np.uint8),
@@ -196,10 +215,22 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
         "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
+        "goals": _goals(task.goals),
         "workspace": [{"low": list(r.low), "high": list(r.high), "words": r.words()} for r in task.workspace],
         "moves": [list(pair) for pair in task.lines.pairs],
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
+        "constraints": [
+            {
+                "words": constraint.words,
+                "name": constraint.quantity.name,
+                "unit": constraint.quantity.unit,
+                "bound": constraint.bound,
+                "sign": 1 if constraint.relation == "<=" else -1,
+                "scale": constraint.scale,
+            }
+            for constraint in config.problem.constraints
+        ],
         "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
         "parameters": [
             {"name": p.name, "needs": space.needs(p.name)}
@@ -220,7 +251,14 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "command": repeat_command(config, any(trial.source == POLISH for trial in history), spent),
         "config": config.model_dump(mode="json"),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
-        "colours": {"front": FRONT, "missed": MISSED, "target": TARGET, "joint": JOINT, "obstacle": OBSTACLE},
+        "colours": {
+            "front": FRONT,
+            "missed": MISSED,
+            "target": TARGET,
+            "joint": JOINT,
+            "obstacle": OBSTACLE,
+            "infeasible": INFEASIBLE,
+        },
         "joint_words": JOINT_LABEL,
     }
 
@@ -236,16 +274,28 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
     }
 
 
+def _goals(goals: Goals) -> dict[str, Any]:
+    """How the targets are to be reached; frames: the axes that the tool should have, as columns, by rows."""
+    return {
+        "oriented": goals.oriented,
+        "rows": goals.rows.tolist(),
+        "frames": goals.rotation.reshape(-1, 9).tolist() if goals.oriented else [],
+        "tolerance": goals.tolerance.tolist(),
+        "angle_tolerance": goals.angle_tolerance.tolist(),
+    }
+
+
 def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
     """What the run has come to."""
     reference = history.reference_point
-    final = hypervolume(history.values, reference) if reference is not None and len(history) else None
+    final = hypervolume(history.counted, reference) if reference is not None and len(history) else None
     found: dict[str, Any] = {
         "finished": summary is not None,
         "hypervolume": final,
         "by_source": dict(Counter(trial.source for trial in history)),
         "seconds": sum(trial.seconds.get("total", 0.0) for trial in history),
         "evaluations": sum(trial.evaluations for trial in history),
+        "infeasible": int((~history.feasible).sum()),
         "solid": None,
         "cost_usd": None,
         "search": None,
@@ -260,6 +310,7 @@ def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | No
     if isinstance(config.method, FrontMethod):
         search = summary["search"]
         found |= {"seconds": search["seconds"], "evaluations": search["evaluations"]}
+        found["infeasible"] = search.get("infeasible", 0)
         found["search"] = search["hypervolume_history"]
     return found
 

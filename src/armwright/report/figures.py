@@ -14,26 +14,43 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from armwright.best_known import standing
+from armwright.buying import ComparedArm, read_bought
 from armwright.credit import front_by_source, gained_by_source
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError
+from armwright.goals import AXIS
 from armwright.history import FrontMember, History
-from armwright.kinematics.chain import joint_positions, link_lines
+from armwright.kinematics.chain import joint_positions, link_lines, rails
 from armwright.objectives import POSITION_ERROR, TORQUE, Objective
 from armwright.obstacles import Ground
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.solids import draw_obstacles
-from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, REGION, TARGET, WAY, Look, look
+from armwright.report.style import (
+    EXISTING,
+    FRONT,
+    INFEASIBLE,
+    JOINT,
+    JOINT_LABEL,
+    LINK,
+    MISSED,
+    OBSTACLE,
+    REGION,
+    TARGET,
+    WAY,
+    Look,
+    look,
+)
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
 from armwright.workspace import Region
 
-REACHED = 1e-3  # [m]; a target missed by less counts as reached
+ARROW = 0.15  # of an arm's reach, long: which way a target asks the tool to point
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # of the reference point, the part of the plane that is drawn
 MOST_PANELS = 12
+HIGHEST_LABEL, LOWEST_LABEL = 0.8, 0.3  # of existing arms, as parts of the panel's height
 
 
 def write_figures(folder: str | Path) -> list[Path]:
@@ -41,26 +58,29 @@ def write_figures(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     config, history = read_run(folder)
     summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
-    drawn = _figures(history) if summary is None else _search_figures(history, summary)
+    bought = read_bought(folder)
+    drawn = _figures(history, bought) if summary is None else _search_figures(history, summary, bought)
     return write_drawn(folder / FIGURES, drawn)
 
 
-def _figures(history: History) -> Iterator[tuple[str, Figure]]:
+def _figures(history: History, bought: Sequence[ComparedArm]) -> Iterator[tuple[str, Figure]]:
     plane = len(history.problem.objectives) > 1  # of the first two objectives
     yield "hypervolume", draw_hypervolume(history)
     if plane:
         yield "samples", draw_samples(history)
     yield "credit", draw_credit(history)
     if plane:
-        yield "front", draw_front(history)
+        yield "front", draw_front(history, bought)
     yield from _arm_figures(history)
 
 
-def _search_figures(history: History, summary: Mapping[str, Any]) -> Iterator[tuple[str, Figure]]:
+def _search_figures(
+    history: History, summary: Mapping[str, Any], bought: Sequence[ComparedArm]
+) -> Iterator[tuple[str, Figure]]:
     """Of a search for the whole front, whose trials are that front."""
     yield "hypervolume", draw_search(history, summary)
     if len(history.problem.objectives) > 1:
-        yield "front", draw_front(history)
+        yield "front", draw_front(history, bought)
     yield from _arm_figures(history)
 
 
@@ -75,12 +95,14 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     """Solution 1 (least position error), the knee, Solution 2 (least torque), all within the reference box.
 
     Before them the most precise design of all, where it lies beyond the box. Of other objectives, the first and the
-    last one take the places of position error and torque.
+    last one take the places of position error and torque. As long as no design is feasible: the nearest.
     """
     reference, objectives = _reference(history), history.problem.objectives
-    numbers = front_numbers(history.values)
+    numbers = front_numbers(history.counted)
+    if not numbers:
+        return [("Nearest to feasible", history.member(number)) for number in history.nearest(1)]
     first, last = (f"least {objective.label.lower()}" for objective in (objectives[0], objectives[-1]))
-    solutions = solution_numbers(history.values, reference)
+    solutions = solution_numbers(history.counted, reference)
     if solutions is None:
         lowest = min(numbers, key=lambda n: history.values[n, -1])
         titled = {numbers[0]: f"{first.capitalize()} of all", lowest: f"{last.capitalize()} of all"}
@@ -89,7 +111,7 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     if numbers[0] != solutions[0]:
         best = "Most precise" if objectives[0] is POSITION_ERROR else first.capitalize()
         titled = {numbers[0]: f"{best} of all, beyond the reference point", **titled}
-    knee = knee_number(history.values, reference)
+    knee = knee_number(history.counted, reference)
     if knee is not None:
         titled.setdefault(knee, "Knee of the front")
     titled.setdefault(solutions[1], f"Solution 2: {last}")
@@ -100,7 +122,7 @@ def draw_hypervolume(history: History) -> Figure:
     """The hypervolume over the counted trials, with the trials of the proposer marked where they enlarged it."""
     figure, axes = one_panel(5.2, 3.2)
     curve = history.hypervolume
-    start = hypervolume(history.values[: history.n_init], _reference(history))
+    start = hypervolume(history.counted[: history.n_init], _reference(history))
     iterations = np.arange(len(curve) + 1)
     axes.step(iterations, [start, *curve], where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     gains = np.diff(np.array([start, *curve])) > 0.0
@@ -125,7 +147,7 @@ def draw_hypervolume(history: History) -> Figure:
     axes.set_ylim(bottom=0)
     axes.legend(loc="lower right")
     if len(curve) and curve[-1] == 0.0:
-        _say(axes, "No design lies within the reference box.")
+        _say(axes, _nothing(history))
     return figure
 
 
@@ -159,7 +181,7 @@ def draw_samples(history: History) -> Figure:
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     panels[0].set_ylabel(_label(history, 1))
-    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_sources(history)) + 1)
+    figure.legend(handles=_legend(history), loc="outside lower center", ncols=len(_legend(history)))
     return figure
 
 
@@ -175,14 +197,14 @@ def draw_credit(history: History) -> Figure:
     volume.set_title(f"{history.problem.task.name}, reference point {_pair(_reference(history))}")
     members.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     if not np.any(history.hypervolume > 0.0):
-        _say(volume, "No design lies within the reference box.")
+        _say(volume, _nothing(history))
     areas = [Patch(**_fill(look(source)), label=look(source).label) for source in reversed(_sources(history))]
     figure.legend(handles=areas, loc="outside right center", title="found by", alignment="left")
     return figure
 
 
-def draw_front(history: History) -> Figure:
-    """The front at the end, its designs by source, the chosen ones named."""
+def draw_front(history: History, bought: Sequence[ComparedArm] = ()) -> Figure:
+    """The front at the end, its designs by source, the chosen ones named, and arms that exist already."""
     figure, axes = one_panel(5.2, 4.2)
     reference = _reference(history)
     _scatter(axes, history, reference, faint=True)
@@ -209,10 +231,54 @@ def draw_front(history: History) -> Figure:
         )
     axes.set_xlabel(_label(history, 0))
     axes.set_ylabel(_label(history, 1))
-    axes.legend(handles=_legend(history), loc="upper right")
-    area = hypervolume(history.values, reference)
+    shown = _draw_bought(axes, reference, bought)
+    axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if shown else [])], loc="upper right")
+    area = hypervolume(history.counted, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     return figure
+
+
+def _draw_bought(axes: Any, reference: Sequence[float], bought: Sequence[ComparedArm]) -> int:
+    """Arms that exist already in the plane of the first two objectives; one beyond it at its edge, with its values.
+
+    How many were drawn: those whose values are known.
+    """
+    edge = SHOWN * np.array(reference[:2])
+    known = [(arm, arm.values[0], arm.values[1]) for arm in bought]
+    places = [(arm, np.array([x, y])) for arm, x, y in known if x is not None and y is not None]
+    height = HIGHEST_LABEL  # names stand apart from the front's and from each other, the highest arm's first
+    for arm, place in sorted(places, key=lambda known: -known[1][1]):
+        at = np.minimum(place, edge)
+        beyond = "" if np.all(place <= edge) else f"\nbeyond, at {_short(place[0])}, {_short(place[1])}"
+        axes.scatter(
+            *at,
+            s=EXISTING.size,
+            marker=EXISTING.marker,
+            color=EXISTING.colour,
+            edgecolors=FRONT,
+            zorder=6,
+            clip_on=False,
+        )
+        column, row = at / edge
+        height = min(height, max(row, LOWEST_LABEL))
+        axes.annotate(
+            f"{arm.name}{beyond}",
+            at,
+            xytext=(column + 0.33 if column < 0.5 else column - 0.33, height),
+            textcoords="axes fraction",
+            ha="left" if column < 0.5 else "right",
+            va="center",
+            fontsize=8,
+            zorder=5,
+            bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": EXISTING.colour, "alpha": 0.9},
+            arrowprops={"arrowstyle": "-", "color": EXISTING.colour, "linewidth": 0.8},
+        )
+        height -= 0.11 if beyond else 0.08
+    return len(places)
+
+
+def _short(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
@@ -257,9 +323,9 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
         _draw_moves(axes, evaluation, 0, [target])
         _draw_postures(axes, member, evaluation, 0, [target])
         frame(axes, extent)
-        error = evaluation.position_error[0, target]
-        verdict = "reached" if error < REACHED else f"missed by {1e3 * error:.0f} mm"
-        axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=FRONT if error < REACHED else MISSED)
+        missed = evaluation.missed[0, target]
+        verdict = f"missed by {_missed_by(evaluation, target)}" if missed else "reached"
+        axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=MISSED if missed else FRONT)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_words(history, member)}", fontsize=10)
     figure.legend(handles=_arm_legend(evaluation), loc="lower center", ncols=_columns(evaluation) if columns > 2 else 3)
@@ -268,9 +334,14 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
 
 def _scatter(axes: Any, history: History, reference: Sequence[float], faint: bool = False) -> None:
     values = history.values
+    broken = values[~history.feasible]
+    if len(broken):
+        axes.scatter(
+            broken[:, 0], broken[:, 1], s=14, facecolors="none", edgecolors=INFEASIBLE, linewidths=0.7, zorder=2
+        )
     for source in _sources(history):
         style = look(source)
-        rows = values[[trial.source == source for trial in history]]
+        rows = values[history.feasible & np.array([trial.source == source for trial in history])]
         axes.scatter(
             rows[:, 0],
             rows[:, 1],
@@ -280,7 +351,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
             zorder=3,
             **_paint(style),
         )
-    front = values[front_numbers(values)]
+    front = values[front_numbers(history.counted)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # of more objectives there is no line to draw
         x = [inside[0, 0], *inside[:, 0], reference[0]]
@@ -291,12 +362,12 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
     axes.set_xlim(0, SHOWN * reference[0])
     axes.set_ylim(0, SHOWN * reference[1])
     if not len(inside):
-        _say(axes, "No design lies within the reference box.")
+        _say(axes, _nothing(history))
 
 
 def _best_known(axes: Any, history: History) -> None:
     """A line at the best known hypervolume of the task, where there is one."""
-    found = standing(history.problem, history.values, _reference(history))
+    found = standing(history.problem, history.counted, _reference(history))
     if found is not None:
         words = f"best known ({found.hypervolume:.2f})"
         axes.axhline(found.hypervolume, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=words)
@@ -321,14 +392,16 @@ def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: 
     for target in targets:
         q = evaluation.q[row, target, : len(member.arm.joints)]
         places = joint_positions(member.arm, q)
+        for line in rails(member.arm, q):
+            axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
         for line in link_lines(member.arm, q):
             axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
         for joint, place in zip(member.arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
         goal = evaluation.targets[target]
-        reached = evaluation.position_error[row, target] < REACHED
         axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
-        if not reached:
+        _draw_goal(axes, evaluation, target, ARROW * member.arm.reach)
+        if evaluation.missed[row, target]:
             axes.plot(*np.array([places[-1], goal]).T, color=MISSED, linewidth=1.2, linestyle=(0, (2, 2)))
     axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
 
@@ -351,6 +424,24 @@ def _draw_workspace(axes: Any, workspace: Sequence[Region]) -> None:
         for one, other in combinations(corners, 2):
             if (one != other).sum() == 1:
                 axes.plot(*np.array([one, other]).T, color=REGION, linewidth=0.8)
+
+
+def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
+    """Where the tool should point to: an arrow for its z, of a whole orientation its x and y, too."""
+    goal, rows = evaluation.targets[target], evaluation.goals.rows[target]
+    if not rows:
+        return
+    for k in (2,) if rows == AXIS else (0, 1, 2):
+        colour = TARGET if rows == AXIS else JOINT["xyz"[k]]
+        way = (1.0 if k == 2 else 0.6) * size * evaluation.goals.rotation[target, :, k]
+        axes.quiver(*goal, *way, color=colour, linewidth=1.4, arrow_length_ratio=0.3)
+
+
+def _missed_by(evaluation: Evaluation, target: int) -> str:
+    words = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
+    if not evaluation.goals.rows[target]:
+        return words
+    return f"{words}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
 
 
 def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
@@ -387,12 +478,26 @@ def _sources(history: History) -> list[str]:
 
 
 def _legend(history: History) -> list[Line2D]:
-    marks = [
-        Line2D([], [], linestyle="", marker=look(s).marker, color=look(s).colour, markersize=5, label=look(s).label)
-        for s in _sources(history)
-    ]
+    marks = [_mark(look(source)) for source in _sources(history)]
+    if not history.feasible.all():
+        marks.append(
+            Line2D(
+                [],
+                [],
+                linestyle="",
+                marker="o",
+                markerfacecolor="none",
+                color=INFEASIBLE,
+                markersize=4,
+                label="infeasible",
+            )
+        )
     line = Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front")
     return [*marks, line] if len(history.problem.objectives) == 2 else marks
+
+
+def _mark(style: Look) -> Line2D:
+    return Line2D([], [], linestyle="", marker=style.marker, color=style.colour, markersize=5, label=style.label)
 
 
 def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:
@@ -458,6 +563,13 @@ def _reference(history: History) -> tuple[float, ...]:
     if reference is None:
         raise RunFolderError(f"figures need the {history.n_init} random trials; the run has only {len(history)} so far")
     return reference
+
+
+def _nothing(history: History) -> str:
+    """Why no design counts."""
+    if not history.feasible.any():
+        return "No design meets all constraints."
+    return "No design lies within the reference box."
 
 
 def _say(axes: Any, words: str) -> None:

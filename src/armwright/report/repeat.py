@@ -25,18 +25,20 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
     """The command for a shell; what is as usual is left out.
 
     polished: whether the run was polished afterwards. spent: evaluations of a search for the whole front.
-    A task or a space of the user's is named TASK.yaml or SPACE.yaml: both stand in the run's config.yaml. Objectives,
+    A task or a space of the user's is named TASK.yaml or SPACE.yaml, a design to start with START-1.json: all stand in
+    the run's config.yaml. Objectives,
     samplers and proposers that are code of the user's cannot be named: then it is empty.
     """
     name, task = config.task.name, config.task
     if any(record.name not in OBJECTIVES for record in config.objectives) or config.tolerance not in (0.0, TOLERANCE):
         return ""
     builtin = load_task(name) if name in builtin_names() or name.startswith("random-") else None
-    as_told = ("targets", "payload", "obstacles", "moves", "move_step", "workspace")
-    as_told += ("objectives", "reference_point")
+    as_told = ("entries", "payload", "restarts", "obstacles", "moves", "move_step", "workspace")
+    as_told += ("constraints", "objectives", "reference_point")
     alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in as_told)
     words = [name if alike else OWN_TASK]
     said: dict[str, Any] = {}
+    n_starts = 0
     known = {name: load_space(name).model_dump(exclude={"name"}) for name in builtin_spaces()}
     alike = [name for name, content in known.items() if content == config.space.model_dump(exclude={"name"})]
     if "paper" not in alike:
@@ -50,8 +52,10 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
         if not _is_known(config.method):
             return ""
         said |= _study_options(config.method)
+        n_starts = len(config.method.start)
     given = {key: value for key, value in said.items() if value is not None and value != USUAL.get(key)}
     options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
+    options += [text for n in range(n_starts) for text in ("--start", f"START-{n + 1}.json")]
     options += ["--robust"] * (config.tolerance > 0.0)
     options += ["--overlap"] * ("in_flight" in given)
     line = shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])

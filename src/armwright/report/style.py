@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from armwright.history import BBO, RANDOM
+from armwright.history import BBO, RANDOM, START
 
 
 class Look(NamedTuple):
@@ -17,6 +17,7 @@ class Look(NamedTuple):
 
 _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
+    START: Look("start", "#111111", "P", 36),
     BBO: Look("black box", "#0072B2", "o", 20),
     "polish": Look("polish", "#009E73", "D", 28, "...."),
     "front": Look("front search", "#0072B2", "o", 14),
@@ -25,9 +26,11 @@ _LOOKS = {
     "scripted": Look("scripted stand-in", "#CC79A7", "v", 44, "\\\\\\\\"),
     "manual": Look("people", "#E69F00", "s", 36, "xxxx"),
 }
+EXISTING = Look("existing arm", "#56B4E9", "P", 70)
 FRONT = "#111111"
 MISSED = "#CC0000"
 TARGET = "#CC79A7"
+INFEASIBLE = "#B0B0B0"
 LINK = "#5A5A60"
 OBSTACLE = "#6E7F91"
 REGION = "#8A8A8A"  # to cover

@@ -1,10 +1,10 @@
 // The selected arm in space, in one posture for each target.
 
-import { postures, REACHED } from "./design.js";
+import { missWords, postures, why } from "./design.js";
 import { PRISMATIC, chain, length, rail } from "./kinematics.js";
 import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
-import { $, colour, element, millimetres, number, onTheme, shown } from "./words.js";
+import { $, colour, element, number, onTheme, shown } from "./words.js";
 
 const CELLS = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // m, sides of the grid's cells
 const MOST_CELLS = 16; // along one side
@@ -12,6 +12,7 @@ const MOVE = 700; // ms from one posture to the next
 const REST = 500; // ms at a target, when playing
 const VIEW = [0.55, -1, 0.42]; // from where one looks at first
 const FILLS = 0.8; // of the frame's radius, below which an arm is seen too small
+const ARROW = 0.16; // of the frame's radius, long
 const SLACK = 0.2; // of the frame's radius, by which an arm may leave it before it grows
 
 const [HIT, NOW] = ["#009E73", "#E69F00"]; // of targets
@@ -82,7 +83,7 @@ export function drawnObstacles() {
 }
 
 function begin() {
-  unit = { rod: new THREE.CylinderGeometry(1, 1, 1, 20), ball: new THREE.SphereGeometry(1, 20, 14) };
+  unit = { rod: new THREE.CylinderGeometry(1, 1, 1, 20), cone: new THREE.CylinderGeometry(0, 1, 1, 20), ball: new THREE.SphereGeometry(1, 20, 14) };
   renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
   scene = new THREE.Scene();
   camera = new THREE.PerspectiveCamera(35, 1, 0.001, 1e5);
@@ -91,7 +92,7 @@ function begin() {
   const sun = new THREE.DirectionalLight(0xffffff, 1.6);
   sun.position.set(3, -5, 8);
   scene.add(sun);
-  for (const name of ["floor", "obstacles", "moves", "workspace", "targets", "ghost", "compared", "arm"]) {
+  for (const name of ["floor", "obstacles", "moves", "workspace", "targets", "goals", "ghost", "compared", "arm"]) {
     groups[name] = new THREE.Group();
     scene.add(groups[name]);
   }
@@ -150,7 +151,7 @@ function render() {
 }
 
 function empty(group) {
-  for (const { geometry } of group.children) if (geometry !== unit.rod && geometry !== unit.ball) geometry?.dispose();
+  for (const { geometry } of group.children) if (!Object.values(unit).includes(geometry)) geometry?.dispose();
   group.clear();
 }
 
@@ -272,6 +273,23 @@ function drawWorkspace() {
 function drawTargets() {
   empty(groups.targets);
   for (const target of content.targets) groups.targets.add(ball(target, ballSize(), materials.missed));
+  empty(groups.goals);
+  content.targets.forEach(drawGoal);
+}
+
+// Where the tool should point to: an arrow for its z, of a whole orientation its x and y, too.
+function drawGoal(target, t) {
+  const { rows, frames } = content.head.goals, size = ARROW * frame.radius;
+  if (!rows[t]) return;
+  for (const k of rows[t] === 3 ? [0, 1, 2] : [2]) {
+    const way = [0, 3, 6].map((r) => frames[t][r + k]), long = k === 2 ? size : 0.6 * size;
+    const [end, neck] = [1, 0.72].map((share) => target.map((v, c) => v + share * long * way[c]));
+    const paint_ = rows[t] === 3 ? materials.joints[k] : materials.missed;
+    groups.goals.add(rod(target, end, 0.006 * frame.radius, paint_));
+    const head = rod(neck, end, 0.02 * frame.radius, paint_);
+    head.geometry = unit.cone;
+    groups.goals.add(head);
+  }
 }
 
 const ballSize = () => 0.028 * frame.radius;
@@ -303,7 +321,7 @@ function drawPosture(group, arm, q, paints) {
     group.add(joint);
   }
   const radius = thick(arm, 0);
-  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.stands[k]); // the base's plate
+  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.tool_axis[k]); // the base's plate
   group.add(rod(behind(2.05 * radius), behind(1.15 * radius), 2.4 * radius, paints.base));
   if (length(arm.tool) > 0) group.add(rod(ends.at(-1), joints.at(-1), 0.6 * radius, paints.base));
   const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
@@ -321,7 +339,7 @@ export function drawArm() {
   const tip = drawPosture(groups.arm, arm, content.q(state.design, state.target), shape);
   gap(tip);
   groups.targets.children.forEach((mesh, t) => {
-    mesh.material = t === state.target ? materials.now : posed[t].error < REACHED ? materials.reached : materials.missed;
+    mesh.material = t === state.target ? materials.now : posed[t].missed ? materials.missed : materials.reached;
     mesh.scale.setScalar((t === state.target ? 1.6 : 1) * ballSize());
   });
   empty(groups.ghost);
@@ -403,9 +421,9 @@ function words() {
   if (i === null) return;
   const one = postures(i)[state.target], n = content.targets.length;
   $("arm-title").textContent = `#${i} ${content.joints(i)}`;
-  const verdict = one.error < REACHED ? "reached" : `missed by ${millimetres(one.error)}`;
+  const verdict = one.missed ? `missed by ${missWords(one)}: ${why(content.arm(i), one)}` : "reached";
   $("target-words").textContent = `Target ${state.target + 1} of ${n}: ${verdict}`;
-  $("target-words").className = one.error < REACHED ? "" : "missed";
+  $("target-words").className = one.missed ? "missed" : "";
   $("compare").setAttribute("aria-pressed", state.compared !== null);
   $("compare").textContent = state.compared === null ? "Compare" : `Beside #${state.compared} ✕`;
 }

@@ -74,6 +74,8 @@ export class Content {
   source(i) { return this.head.sources[this._part("source", i)[0]]; }
   look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }
+  broken(i) { return this._part("broken", i); } // by how much, one a constraint: <= 0 is met
+  isFeasible(i) { return this.broken(i).every((value) => value <= 0); }
 
   // Those that matter: the arm has their module, and it is of a type that they are for.
   params(i) {
@@ -103,7 +105,8 @@ export class Content {
   }
 
   arm(i) {
-    const arm = { base: this._part("base", i), tool: this._part("tool", i), stands: this._part("stands", i) }, n = this._part("joints", i)[0];
+    const arm = {}, n = this._part("joints", i)[0];
+    for (const name of ["base", "tool", "tool_axis", "tool_side"]) arm[name] = this._part(name, i);
     for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
     for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
     return arm;

@@ -1,10 +1,9 @@
 // The selected design in numbers, and as files.
 
-import { chain, distance, holding, length, linkLength } from "./kinematics.js";
+import { angleOff, chain, distance, holding, length, linkLength, reach } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
 import { $, element, metres, millimetres, number, save } from "./words.js";
 
-export const REACHED = 1e-3; // m
 const AT_LIMIT = 1e-3; // rad or m
 const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv" };
 const ENDINGS = { urdf: "urdf", mjcf: "xml", csv: "csv" };
@@ -26,13 +25,34 @@ export function openDesign(shownContent, fetched) {
   drawDesign();
 }
 
-// A design at every target: error [m], joint values, what holds each joint.
+// A design at every target: error [m], angle [rad] (null where none is asked for), whether it is missed, joint values,
+// what holds each joint.
 export function postures(i) {
-  const arm = content.arm(i);
+  const arm = content.arm(i), { rows, frames, tolerance, angle_tolerance } = content.head.goals;
   return content.targets.map((target, t) => {
-    const q = content.q(i, t), posed = chain(arm, q);
-    return { target, q, ...posed, error: distance(posed.joints.at(-1), target), torques: holding(arm, posed, content.head.payloads[t]) };
+    const q = content.q(i, t), posed = chain(arm, q), error = distance(posed.joints.at(-1), target);
+    const angle = rows[t] ? angleOff(posed.tool, frames[t], rows[t] === 3) : null;
+    const missed = error >= tolerance[t] || (angle ?? 0) >= angle_tolerance[t];
+    return { target, q, ...posed, error, angle, missed, torques: holding(arm, posed, content.head.payloads[t]) };
   });
+}
+
+// By how much a target is missed.
+export function missWords(one) {
+  return one.angle === null ? millimetres(one.error) : `${millimetres(one.error)}, ${degrees(one.angle)}`;
+}
+
+const degrees = (angle) => `${number((180 * angle) / Math.PI, 3)}°`;
+
+// Why a target is missed: as armwright/misses.py has it.
+export function why(arm, one) {
+  const beyond = distance(one.target, arm.base) - reach(arm);
+  const reasons = beyond > 0 ? [`out of reach by ${millimetres(beyond)}`] : [];
+  for (let j = 0; j < one.q.length; j++) {
+    const side = arm.kind[j] < 2 ? at(arm, one.q, j) : "";
+    if (side) reasons.push(`joint ${j + 1} at its ${side} limit`);
+  }
+  return reasons.join(", ") || "no better posture was found";
 }
 
 function at(arm, q, j) {
@@ -53,11 +73,12 @@ export function drawDesign() {
     const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
     return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
   });
+  const feasible = head.constraints.length ? ` ${constraintWords(i)}` : "";
   const motors = content.chosen(i, "motor").length ? ` Motors: ${content.chosen(i, "motor").join(", ")}.` : "";
   const mount = content.param(i, "mount");
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${iteration}${motors}`;
+  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${feasible}${iteration}${motors}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -71,6 +92,16 @@ export function drawDesign() {
   const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.words).join("; ")}.` : "";
   const lines = head.moves.length ? ` Straight moves between targets: ${head.moves.map(([a, b]) => `${a + 1} to ${b + 1}`).join(", ")}.` : "";
   $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.${solids}${lines}${boxes}`;
+}
+
+// What the design has where it is bounded.
+function constraintWords(i) {
+  const broken = content.broken(i);
+  const words = content.head.constraints.map((c, k) => {
+    const has = c.bound + c.sign * c.scale * broken[k];
+    return `${c.words}: ${number(has)} ${c.unit}${broken[k] > 0 ? " (broken)" : ""}`;
+  });
+  return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${words.join("; ")}.`;
 }
 
 function drawLinks(arm) {
@@ -104,7 +135,7 @@ function drawPostures(arm, posed) {
   },
   element("td", {}, String(t + 1)),
   element("td", { class: "text" }, one.target.map((v) => number(v, 3)).join(", ")),
-  element("td", { class: one.error < REACHED ? "" : "missed" }, one.error < REACHED ? "reached" : millimetres(one.error)),
+  element("td", { class: one.missed ? "missed" : "", title: one.missed ? why(arm, one) : null }, one.missed ? missWords(one) : "reached"),
   element("td", { title: one.torques.map((v, j) => `joint ${j + 1}: ${number(v, 3)} N m`).join("\n") }, number(length(one.torques), 3)),
   ...joints.map((j) => {
     const side = at(arm, one.q, j);
@@ -147,8 +178,9 @@ async function download(format) {
 
 function asCsv(i) {
   const arm = content.arm(i), joints = [...arm.axis.keys()].map((j) => j + 1);
-  const head = ["target", "x", "y", "z", "position_error", "torque_norm",
+  const { oriented } = content.head.goals;
+  const head = ["target", "x", "y", "z", "position_error", ...(oriented ? ["angle_error"] : []), "torque_norm",
     ...joints.map((j) => `q_${j}`), ...joints.map((j) => `torque_${j}`)];
-  const rows = postures(i).map((one, t) => [t + 1, ...one.target, one.error, length(one.torques), ...one.q, ...one.torques]);
+  const rows = postures(i).map((one, t) => [t + 1, ...one.target, one.error, ...(oriented ? [one.angle ?? ""] : []), length(one.torques), ...one.q, ...one.torques]);
   return [head, ...rows].map((row) => row.join(",")).join("\n") + "\n";
 }

@@ -35,6 +35,7 @@ export function drawHeader() {
   }
   const solid = result.solid === null ? "" : `, ${result.solid.length} solid`;
   facts.push(fact("front", `${plural(head.front.length, "design")}${solid}`));
+  if (head.result.infeasible) facts.push(fact("infeasible", `${head.result.infeasible}`));
   for (const [source, n] of Object.entries(result.by_source)) {
     facts.push(fact(head.looks[source].label, `${n}`, head.looks[source].colour));
   }

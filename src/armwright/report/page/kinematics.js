@@ -5,6 +5,8 @@ const REVOLUTE = 0;
 export const PRISMATIC = 1;
 
 const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const at = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
 const column = (m, k) => [m[k], m[3 + k], m[6 + k]];
 const turned = (m, v) => [0, 3, 6].map((r) => m[r] * v[0] + m[r + 1] * v[1] + m[r + 2] * v[2]);
@@ -21,7 +23,7 @@ function rotated(m, k, angle) {
 }
 
 // joints: positions of the joints and, last, of the tip [m]; ends: of the links; axes: of the joints, in the world;
-// centres: of mass.
+// centres: of mass; tool: its own x, y and z in the world.
 export function chain(arm, q) {
   let frame = [1, 0, 0, 0, 1, 0, 0, 0, 1], place = Array.from(arm.base);
   const joints = [], ends = [], axes = [], centres = [];
@@ -35,7 +37,8 @@ export function chain(arm, q) {
     place = add(place, turned(frame, at(arm.offset, j)));
     ends.push(place);
   }
-  return { joints: [...joints, add(place, turned(frame, arm.tool))], ends, axes, centres };
+  const [x, z] = [turned(frame, arm.tool_side), turned(frame, arm.tool_axis)];
+  return { joints: [...joints, add(place, turned(frame, arm.tool))], ends, axes, centres, tool: [x, cross(z, x), z] };
 }
 
 // Torques of the joints' motors [N m] that hold the arm and its payload [kg] up against gravity.
@@ -57,6 +60,23 @@ export function holding(arm, posed, payload) {
 export function rail(arm, posed, q, j) {
   const along = (way) => posed.joints[j].map((v, k) => v + posed.axes[j][k] * (way - q[j]));
   return [along(arm.lower[j]), along(arm.upper[j])];
+}
+
+// By which angle [rad] a tool is off a target's frame (3 x 3 by rows): of its z alone, or of all its axes.
+export function angleOff(tool, frame, isWhole) {
+  const goal = [0, 1, 2].map((k) => column(frame, k));
+  if (!isWhole) return Math.atan2(length(cross(tool[2], goal[2])), dot(tool[2], goal[2]));
+  const skew = tool.map((axis, k) => cross(axis, goal[k])).reduce(add); // 2 sin of the angle, along what it turns about
+  return Math.atan2(length(skew), tool.reduce((sum, axis, k) => sum + dot(axis, goal[k]), -1));
+}
+
+// The longest distance from the first joint that the tip could have [m].
+export function reach(arm) {
+  let sum = length(arm.tool);
+  for (let j = 0; j < arm.kind.length; j++) {
+    sum += linkLength(arm, j) + (arm.kind[j] === PRISMATIC ? Math.max(Math.abs(arm.lower[j]), Math.abs(arm.upper[j])) : 0);
+  }
+  return sum;
 }
 
 export const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);

@@ -1,7 +1,7 @@
 // The designs in the plane of two objectives: who found them, their front, and which one is selected.
 
 import { listen, set, state } from "./state.js";
-import { $, colour, element, isTouched, number, onTheme, plain, title } from "./words.js";
+import { $, colour, element, isTouched, number, onTheme, plain, plural, title } from "./words.js";
 
 const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
 const VIEW = 1.35; // of the reference point, the part of the plane that is shown first
@@ -73,14 +73,14 @@ const counted = () => Math.max(0, content.n - content.head.n_init);
 const until = () => (state.iteration === null ? content.n : content.head.n_init + state.iteration);
 const placed = (value, axis) => (log && axis === 0 ? Math.max(value, FLOOR) : value);
 
-// Numbers of the non-dominated designs among the first n in the two objectives that are shown, by rising x.
+// Numbers of the feasible, non-dominated designs among the first n in the two objectives that are shown, by rising x.
 export function frontUntil(n) {
   const order = [...Array(n).keys()].sort((a, b) => {
     const [u, v] = [content.values(a), content.values(b)];
     return u[x] - v[x] || u[y] - v[y] || a - b;
   });
   let least = Infinity;
-  return order.filter((i) => content.values(i)[y] < least && ((least = content.values(i)[y]), true));
+  return order.filter((i) => content.isFeasible(i) && content.values(i)[y] < least && ((least = content.values(i)[y]), true));
 }
 
 function slider() {
@@ -129,9 +129,21 @@ function draw() {
     });
   }
   const onFront = new Set(many && n === content.n ? content.head.front : front);
+  const infeasible = [...Array(n).keys()].filter((i) => !content.isFeasible(i));
+  if (infeasible.length) {
+    traces.push({
+      x: infeasible.map((i) => placed(content.values(i)[x], 0)),
+      y: infeasible.map((i) => content.values(i)[y]),
+      customdata: infeasible,
+      text: infeasible.map((i) => plain(`#${i} ${content.joints(i)}`)),
+      hovertemplate: `%{text}<br>%{x:.4g}, %{y:.4g}<extra>infeasible</extra>`,
+      mode: "markers", name: "infeasible",
+      marker: { symbol: "circle-open", color: content.head.colours.infeasible, size: 7, line: { width: 1 } },
+    });
+  }
   for (const source of content.head.sources) {
     const look = content.head.looks[source], rows = [];
-    for (let i = 0; i < n; i++) if (content.source(i) === source) rows.push(i);
+    for (let i = 0; i < n; i++) if (content.source(i) === source && content.isFeasible(i)) rows.push(i);
     if (!rows.length) continue;
     traces.push({
       x: rows.map((i) => placed(content.values(i)[x], 0)),
@@ -150,6 +162,19 @@ function draw() {
           color: look.marker === "x" ? look.colour : colour("paper"),
         },
       },
+    });
+  }
+  const bought = content.head.bought.filter((arm) => arm.values[x] !== null && arm.values[y] !== null);
+  if (bought.length) {
+    const { label, colour: paint } = content.head.existing;
+    traces.push({
+      x: bought.map((arm) => placed(arm.values[x], 0)),
+      y: bought.map((arm) => arm.values[y]),
+      text: bought.map((arm) => plain(arm.name)),
+      hovertext: bought.map((arm) => plain(`${arm.name}: ${standing(arm)}`)),
+      hovertemplate: `%{hovertext}<br>%{x:.4g}, %{y:.4g}<extra>${plain(label)}</extra>`,
+      mode: "markers+text", textposition: "middle right", cliponaxis: false, name: plain(label),
+      marker: { symbol: "cross", size: 12, color: paint, line: { width: 1, color: colour("ink") } },
     });
   }
   if (reference !== null) {
@@ -175,10 +200,27 @@ function draw() {
     : [...Array(n).keys()].filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
   const notes = ["Click a design to see its arm."];
   if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
+  if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
+  for (const arm of content.head.bought) notes.push(boughtWords(arm, high));
   if (many) notes.push("Large: on the front in all objectives; in this plane others may lie before them.");
   if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
   if (content.head.is_toy) notes.push("Toy masses: torques compare designs, and say nothing of motors.");
   $("pareto-note").textContent = notes.join(" ");
+}
+
+// What the note says of an arm that exists already.
+function boughtWords(arm, high) {
+  const [u, v] = [arm.values[x], arm.values[y]];
+  const place = high(x) !== undefined && (u > high(x) || v > high(y)) ? ` lies outside this view, at ${number(u)}, ${number(v)};` : ":";
+  if (u === null || v === null) return `${arm.name}: not comparable, as it does not state all of these numbers.`;
+  return `${arm.name}${place} ${standing(arm)}.`;
+}
+
+function standing(arm) {
+  if (arm.breaks.length) return `breaks ${arm.breaks.join(", ")}`;
+  if (arm.standing === null) return "not comparable";
+  const [worse, better] = arm.standing;
+  return `dominates ${plural(worse, "design")} of the front, dominated by ${better}`;
 }
 
 function axis(objective, range, isLog) {

@@ -15,7 +15,7 @@ let names = [];
 
 export function openPick(shownContent) {
   content = shownContent;
-  names = [...content.objectives.map((o) => o.name), "length", "mass",
+  names = [...content.objectives.map((o) => o.name), "length", "mass", ...content.head.constraints.map((c) => c.name),
     ...content.head.parameters.filter((p) => !p.choices).map((p) => p.name)];
   names = [...new Set(names)];
   $("pick-by").append(new Option("the knee", KNEE), new Option("weights", WEIGHTS),
@@ -105,6 +105,7 @@ function ordered(left, told) {
 
 // Why none is left: the first condition that none meets, and how near the front comes to it.
 function nearestMiss(asked, told) {
+  if (!told.size) return "No design meets all constraints yet.";
   for (const { name, relation, bound } of asked) {
     const values = [...told.values()].map((numbers) => numbers.get(name));
     if (values.some((value) => HOLDS[relation](value, bound))) continue;

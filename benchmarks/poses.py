@@ -1,0 +1,60 @@
+"""How fast targets with an axis or an orientation are solved on one core, beside points.
+
+Random arms of 6 and 7 joints at 8 targets, 100 updates from the straight start each; designs per second of processor
+time, which other programs on the machine hardly change, the best of five rounds. Last, how long each variant of the
+kernels takes to compile, with an empty cache.
+
+    python benchmarks/poses.py
+"""
+
+import os
+import sys
+import tempfile
+import time
+from dataclasses import replace
+
+import numpy as np
+
+ARMS, TARGETS = 4000, 8
+
+
+def main() -> None:
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])  # before any thread begins
+    os.environ["WARP_CACHE_PATH"] = tempfile.mkdtemp(prefix="armwright-poses-")  # where nothing is compiled yet
+    from armwright.goals import AXIS, ORIENTATION, plain_goals, turned
+    from armwright.kinematics.arrays import arrays_of
+    from armwright.kinematics.devices import load
+    from armwright.kinematics.solve import LANES, solve_postures
+    from armwright.space import paper_space
+
+    compiled = {}
+    for rows in ("position", "mixed"):
+        began = time.process_time()
+        load("float32", LANES["cpu"], "turning", rows, "cpu")
+        compiled[rows] = time.process_time() - began
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.5, 0.5, (TARGETS, 3))
+    rotation = np.array([turned(*angles) for angles in rng.uniform(-np.pi, np.pi, (TARGETS, 3))])
+    print(f"designs/s on one core, {TARGETS} targets, 100 updates")
+    for joints in (6, 7):
+        space = paper_space(joints)
+        arms = arrays_of(space, space.matrix(space.sample(ARMS, seed=0)))
+        kinds = ([0] * 8, [AXIS] * 8, [ORIENTATION] * 8, [0, AXIS, ORIENTATION, AXIS] * 2)
+        best = np.full(len(kinds), np.inf)
+        for _ in range(5):
+            for i, rows in enumerate(kinds):
+                goals = replace(plain_goals(TARGETS), rows=np.array(rows), rotation=rotation)
+                began = time.process_time()
+                solve_postures(arms, points, goals=goals)
+                best[i] = min(best[i], time.process_time() - began)
+        points_, axes, orientations, mixed = ARMS / best
+        print(
+            f"  D = {joints}: points {points_:8.0f}, axes {axes:8.0f} ({axes / points_:.2f} of that), "
+            f"orientations {orientations:8.0f}, of all kinds {mixed:8.0f}"
+        )
+        sys.stdout.flush()
+    print("compiled in " + ", ".join(f"{seconds:.1f} s ({rows})" for rows, seconds in compiled.items()))
+
+
+if __name__ == "__main__":
+    main()

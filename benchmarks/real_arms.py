@@ -1,0 +1,73 @@
+"""What a real design problem costs: designs a second on one core, with axis targets, capsules and motors.
+
+Six joints, eight targets where the tool's axis counts, links against each other and three obstacles, an actuator for
+each joint; position, orientation, collision and torque use are asked. Beside it the same arms in the paper's problem.
+
+    python benchmarks/real_arms.py
+"""
+
+import os
+import statistics
+import subprocess
+import sys
+import time
+
+from armwright.problem import Problem
+from armwright.space import DesignSpace
+from armwright.task import Task, load_task
+
+N, ROUNDS = 4000, 7
+REAL = Task.model_validate(
+    {
+        "name": "real",
+        "targets": [
+            {"position": list(point), "axis": [0.0, 0.0, -1.0]} for point in load_task("target-1").points.tolist()
+        ],
+        "payload": 0.2,
+        "obstacles": [
+            {"kind": "ground", "z": -0.6},
+            {"kind": "box", "center": [0.5, 0.0, 0.2], "size": [0.3, 0.7, 0.02], "yaw": 0.3},
+            {"kind": "cylinder", "center": [0.3, 0.3, 0.0], "radius": 0.03, "height": 1.2},
+        ],
+        "objectives": ["position_error", "orientation_error", "collision", "torque_use"],
+    }
+)
+SPACE = DesignSpace.model_validate(
+    {
+        "name": "real", "joints": 6, "actuators": ["XL430-W250", "XM430-W350", "XM540-W270"],
+        "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
+    }
+)  # fmt: skip
+
+
+def main() -> None:
+    if "--one-core" not in sys.argv:
+        # In a process of its own, which never had more threads than that.
+        subprocess.run(
+            [sys.executable, __file__, "--one-core"],
+            check=True,
+            preexec_fn=lambda: os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1]),
+        )
+        return
+    matrix = SPACE.matrix(SPACE.sample(N, seed=0))
+    problems = {
+        "the paper's objectives, points alone": Problem(load_task("target-1"), SPACE),
+        "axes, capsules, obstacles and motors": Problem(REAL, SPACE),
+    }
+    for problem in problems.values():
+        problem.evaluate_matrix(matrix)  # compiles and loads
+    rounds = [{name: N / seconds(problem, matrix) for name, problem in problems.items()} for _ in range(ROUNDS)]
+    print(f"Designs/s on one core, D = 6, 8 targets; median of {ROUNDS} (least, most)")
+    for name in problems:
+        found = [one[name] for one in rounds]
+        print(f"  {name:40} {statistics.median(found):8,.0f}  ({min(found):,.0f}, {max(found):,.0f})")
+
+
+def seconds(problem: Problem, matrix: object) -> float:
+    start = time.perf_counter()
+    problem.evaluate_matrix(matrix)  # type: ignore[arg-type]
+    return time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""Designs from files, to start a search with: an arm that is there already, or one of another run."""
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from armwright.documents import read_document
+from armwright.exceptions import DesignError
+from armwright.parameters import Design
+from armwright.space import DesignSpace
+
+
+class DesignFile(BaseModel, frozen=True, extra="forbid"):
+    """A design as a run writes it into designs/NNNN/design.json; of a file of one's own, `params` is enough."""
+
+    params: dict[str, float | str]
+    number: Any = None
+    source: Any = None
+    reason: Any = None
+    objectives: Any = None
+    constraints: Any = None
+    masses: Any = None
+    targets: Any = None
+    verification: Any = None
+
+
+def read_design(path: str | Path, space: DesignSpace) -> Design:
+    """The design of a YAML or JSON file; DesignError where it is none of this space."""
+    content = read_document(Path(path), DesignFile, DesignError)
+    try:
+        return space.design(content.params)
+    except DesignError as refusal:
+        raise DesignError(f"{path}: {refusal}") from refusal

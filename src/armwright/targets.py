@@ -1,0 +1,141 @@
+"""A target of a task file that says more than its point, and its checks."""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, Self
+
+import numpy as np
+from pydantic import BaseModel, Field, GetJsonSchemaHandler, ValidationError, model_serializer, model_validator
+
+from armwright.exceptions import did_you_mean
+from armwright.goals import ALIGNED, AXIS, ORIENTATION, REACHED, Goals, pointing, turned
+
+Point = tuple[float, float, float]
+
+LARGEST_COORDINATE = 1000.0  # [m]
+LARGEST_WEIGHT = 1e6
+
+
+class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """A point that the tip should reach [m], and how.
+
+    axis: where the tool's own z should point to in the world, of any length; the tool may turn about it.
+    orientation: instead of it, roll, pitch and yaw of the tool's frame about the world's x, then y, then z [rad].
+    tolerance: from which on it counts as missed [m].  angle_tolerance: the same of its axis or orientation [rad].
+    weight: that multiplies its share of a sum of errors.
+    """
+
+    position: Point
+    axis: Point | None = None
+    orientation: Point | None = None
+    tolerance: float = Field(default=REACHED, gt=0.0, le=LARGEST_COORDINATE)
+    angle_tolerance: float = Field(default=ALIGNED, gt=0.0, le=math.pi)
+    weight: float = Field(default=1.0, gt=0.0, le=LARGEST_WEIGHT)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.axis is not None and self.orientation is not None:
+            raise ValueError("give axis or orientation, not both: an orientation says where every axis points to")
+        if self.axis is not None and not 1e-6 <= math.hypot(*self.axis) <= LARGEST_COORDINATE:
+            raise ValueError(
+                f"axis = {list(self.axis)} is no direction: such as [0, 0, -1] for a tool that points down"
+            )
+        if self.orientation is not None and max(map(abs, self.orientation)) > 2 * math.pi:
+            raise ValueError(
+                f"orientation = {list(self.orientation)} is roll, pitch, yaw in rad, each within ±2π; 90° is 1.5708"
+            )
+        if self.axis is None and self.orientation is None and "angle_tolerance" in self.model_fields_set:
+            raise ValueError("angle_tolerance needs an axis or an orientation, of which it is the tolerance")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _brief(self, handler: Any) -> Any:
+        """Without what is as usual."""
+        usual = {name: field.default for name, field in type(self).model_fields.items()}
+        return {name: value for name, value in handler(self).items() if value != usual[name]}
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> Any:
+        """As if all were written: what `_brief` makes has no schema of its own."""
+        return handler(_without_serializer(core_schema))
+
+    @property
+    def rows(self) -> int:
+        """How many angles it asks for."""
+        return AXIS if self.axis is not None else ORIENTATION if self.orientation is not None else 0
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """(3, 3) the tool's axes as they should be; what does not count is any."""
+        if self.axis is not None:
+            return pointing(self.axis)
+        return np.eye(3) if self.orientation is None else turned(*self.orientation)
+
+    @property
+    def words(self) -> str:
+        """What it says beside its point, on one line."""
+        parts = [] if self.axis is None else [f"axis {_vector(self.axis)}"]
+        parts += [] if self.orientation is None else [f"orientation {_vector(self.orientation)} rad"]
+        parts += [f"tolerance {1e3 * self.tolerance:g} mm"] * (self.tolerance != REACHED)
+        parts += [f"angle tolerance {math.degrees(self.angle_tolerance):.4g}°"] * (self.angle_tolerance != ALIGNED)
+        parts += [f"weight {self.weight:g}"] * (self.weight != 1.0)
+        return ", ".join(parts)
+
+
+def target_words(entries: Sequence[Point | Target]) -> list[str]:
+    """What targets say beside their points, a line for all that say the same, counted from 1."""
+    numbers: dict[str, list[int]] = {}
+    for number, entry in enumerate(entries, start=1):
+        if isinstance(entry, Target):
+            numbers.setdefault(entry.words, []).append(number)
+    return [
+        f"target{'s' if len(group) > 1 else ''} {', '.join(map(str, group))}: {words}"
+        for words, group in numbers.items()
+    ]
+
+
+def _vector(values: Point) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.4g}" for value in values) + ")"
+
+
+def _without_serializer(core_schema: Any) -> Any:
+    return {
+        key: _without_serializer(value) if key == "schema" else value
+        for key, value in core_schema.items()
+        if key != "serialization"
+    }
+
+
+def read_target(value: Any, number: int) -> Target:
+    """A record of a task file as a target; ValueError says what is wrong with the target of that number."""
+    if isinstance(value, Target):
+        return value
+    for key in value:
+        if key not in Target.model_fields:
+            allowed = tuple(Target.model_fields)
+            raise ValueError(
+                f'target {number}: unknown key "{key}". Allowed: {", ".join(allowed)}.{did_you_mean(str(key), allowed)}'
+            )
+    try:
+        return Target.model_validate(value)
+    except ValidationError as fault:
+        first = fault.errors(include_url=False, include_context=False)[0]
+        at = "".join(f"[{part}]" if isinstance(part, int) else str(part) for part in first["loc"])
+        words = first["msg"].removeprefix("Value error, ")
+        got = "" if first["type"] in ("missing", "value_error") else f" (got {str(first['input'])[:80]})"
+        raise ValueError(f"target {number}: {at + ': ' if at else ''}{words}{got}") from fault
+
+
+@lru_cache
+def goals_of(records: tuple[Target | None, ...], restarts: int) -> Goals:
+    """How targets are to be reached, as arrays; None: of a point alone."""
+    targets = [record or Target(position=(0.0, 0.0, 0.0)) for record in records]
+    return Goals(
+        rows=np.array([target.rows for target in targets], dtype=np.intp),
+        rotation=np.array([target.rotation for target in targets]),
+        tolerance=np.array([target.tolerance for target in targets]),
+        angle_tolerance=np.array([target.angle_tolerance for target in targets]),
+        weight=np.array([target.weight for target in targets]),
+        restarts=restarts,
+    )

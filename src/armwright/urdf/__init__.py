@@ -1,0 +1,1 @@
+"""Arms that exist already, read from URDF."""

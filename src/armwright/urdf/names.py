@@ -1,0 +1,71 @@
+"""URDF files by path, or by the name of an arm in the package `robot_descriptions`, which fetches it."""
+
+import re
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import ArmError, FailureError, MissingExtraError, did_you_mean
+
+ALIASES = {"so100": "soarm100", "so101": "soarm101"}
+_SUFFIX = "_description"
+
+
+def find_urdf(name_or_path: str | Path) -> Path:
+    """The URDF file of this path; else of the arm of this name, such as `ur5e` or `panda`.
+
+    ArmError where there is neither; MissingExtraError and FailureError where a name cannot be looked up or fetched.
+    """
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise ArmError(f"{path} is a folder; a URDF file is needed, or the name of an arm, such as ur5e")
+    if path.suffix or len(path.parts) != 1:
+        raise ArmError(f"there is no file {path}")
+    return _fetched(str(name_or_path))
+
+
+def _fetched(name: str) -> Path:
+    try:
+        robots = import_module("robot_descriptions")
+    except ImportError as fault:
+        raise MissingExtraError(
+            f'there is no file {name}; arms by name need: pip install "armwright[arms]" (robot_descriptions)'
+        ) from fault
+    known: dict[str, str] = {}
+    for module, description in robots.DESCRIPTIONS.items():
+        if description.has_urdf:
+            known[_plain(module.removesuffix(_SUFFIX))] = module
+    key = _plain(name)
+    module = known.get(ALIASES.get(key, key))
+    if module is None:
+        names = [module.removesuffix(_SUFFIX) for module in known.values()]
+        raise ArmError(
+            f'there is no file {name}, and robot_descriptions has no URDF "{name}".{did_you_mean(name, names)}'
+        )
+    return _path_of(module, name)
+
+
+def _path_of(module: str, name: str) -> Path:
+    """The file of a description; to import it fetches what is not there yet."""
+    git: Any = import_module("git")  # comes with robot_descriptions
+    try:
+        description = import_module(f"robot_descriptions.{module}")
+        path = import_module("robot_descriptions._xacro").get_urdf_path(description)
+    except (ImportError, OSError, ValueError, RuntimeError, git.GitError) as fault:
+        raise FailureError(
+            f"robot_descriptions cannot give the URDF of {name}: {_reason(fault)}. The first time it needs the network "
+            "and git, and xacrodoc for some; a URDF file of your own needs neither"
+        ) from fault
+    return Path(path)
+
+
+def _reason(fault: Exception) -> str:
+    """In one line; of git, what it calls fatal."""
+    text = " ".join(str(fault).split())
+    return text[max(0, text.find("fatal:")) :][:200].strip("'. ")
+
+
+def _plain(name: str) -> str:
+    return re.sub("[^a-z0-9]", "", name.lower())
