@@ -337,13 +337,7 @@ def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
 
 
 def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:
-    sentences = (
-        "path_error <= 0.01",
-        "joint_jump <= 0.5",
-        "unreached <= 0.4",
-        "manipulability >= 0.001",
-        "clumsiness <= 0.99",
-    )
+    sentences = ["path_error <= 0.01", "joint_jump <= 0.5", "unreached <= 0.4", "manipulability >= 0.001"]
     box = {"low": (0.2, -0.2, 0.1), "high": (0.5, 0.2, 0.3), "points": 30}
     problem = Problem(
         task(moves="in_order", workspace=box, constraints=[*sentences, "clumsiness <= 0.99"]), paper_space(6)
