@@ -101,8 +101,10 @@ def test_what_is_no_constraint_is_refused_in_one_line(sentences: list[str], word
 
 
 def test_the_template_shows_constraints_that_are_some(tmp_path: Path) -> None:
-    text = task_template(tmp_path / "mine.yaml").replace("# constraints:", "constraints:")
-    text = text.replace("#   - worst_error", "  - worst_error").replace("#   - mass", "  - mass")
+    shown = "# constraints:\n#   - worst_error <= 0.01\n#   - mass <= 3\n"
+    text = task_template(tmp_path / "mine.yaml")
+    assert shown in text
+    text = text.replace(shown, shown.replace("#   - ", "  - ").replace("# ", ""))
     (tmp_path / "mine.yaml").write_text(text)
     found = Problem(load_task(tmp_path / "mine.yaml")).constraints
     assert [constraint.words for constraint in found] == ["worst_error <= 0.01", "mass <= 3"]
