@@ -8,12 +8,15 @@ import numpy as np
 from armwright.evaluation import Array, Evaluation
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.arrays import arrays_of
+from armwright.kinematics.paths import Paths
+from armwright.moves import lines_of
 from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
 from armwright.parameters import Design
 from armwright.pareto import default_reference_point
 from armwright.problem import Problem
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
+from armwright.workspace import points_of
 
 
 class FixedProblem(Problem):
@@ -38,9 +41,27 @@ class FixedProblem(Problem):
         arms = arrays_of(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
         angle = np.zeros_like(error)
-        return Evaluation(
-            arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals, self.task.obstacles
-        )
+        known = (arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals)
+        evaluation = Evaluation(*known, self.task.obstacles, moves=self.task.lines, workspace=self.task.workspace)
+        if evaluation.moves:
+            vars(evaluation)["paths"] = _fixed_paths(evaluation)
+        ways = np.linalg.norm(points_of(self.task.workspace) - base[:, None], axis=-1)
+        vars(evaluation)["workspace_error"] = np.maximum(0.0, ways - reach[:, None])
+        return evaluation
+
+
+def _fixed_paths(evaluation: Evaluation) -> Paths:
+    """Between two targets, all is between what it is at them, but for a bow of the tip."""
+    lines = lines_of(evaluation.moves, evaluation.targets)
+    start, end = np.array(evaluation.moves.pairs)[lines.move].T
+    share = lines.share[:, None]
+    q, reached, torques = (
+        (1 - share) * at[:, start] + share * at[:, end]
+        for at in (evaluation.q, evaluation.reached, evaluation.joint_torques)
+    )
+    reached = reached + 0.1 * share * (1 - share)
+    error = np.linalg.norm(reached - lines.points, axis=-1)
+    return Paths(evaluation.moves, lines, np.zeros(len(lines)), q, reached, error, torques)
 
 
 LENGTH = Objective(

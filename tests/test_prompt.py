@@ -67,6 +67,23 @@ IN_THE_WAY = Task.model_validate(
         "reference_point": (2.0, 0.5),
     }
 )
+ON_LINES = IN_THE_WAY.model_copy(
+    update={
+        "moves": ((1, 2), (2, 1)),
+        "objectives": ("position_error", "closeness", "path_error"),
+        "reference_point": None,
+    }
+)
+COVERING = Task.model_validate(
+    {
+        "name": "cover",
+        "workspace": [
+            {"low": (0.2, -0.3, 0.0), "high": (0.6, 0.3, 0.5)},
+            {"low": (0, 0, 1), "high": (0, 0, 1.5), "points": 20},
+        ],
+        "objectives": ("unreached", "torque"),
+    }
+)
 DESIGNS = paper_space().sample(30, seed=9)
 REASONS = ("a universal shoulder at the centre", "", "longer links, because the far corners were missed", "x")
 
@@ -105,6 +122,8 @@ CASES: dict[str, Callable[[], str]] = {
     "one-objective": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=ONE_OBJECTIVE))),
     "three-objectives": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES))),
     "obstacles": lambda: rendered(fixed_history(FixedProblem(IN_THE_WAY)), "minus"),
+    "moves": lambda: rendered(fixed_history(FixedProblem(ON_LINES)), "minus"),
+    "workspace": lambda: rendered(fixed_history(FixedProblem(COVERING)), "minus"),
     "one-target-one-joint": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
     "two-joints-two-designs": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
     "nothing-yet": lambda: rendered(fixed_history(PAPER, n=0), "minus"),

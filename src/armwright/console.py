@@ -24,7 +24,7 @@ from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
 from armwright.history import FrontMember, History
-from armwright.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
+from armwright.objectives import OF_MOVES, POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.polish import Polished
 from armwright.problem import Problem
 from armwright.results import REPORT, unmet
@@ -81,7 +81,8 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     scaled = TORQUE in history.problem.objectives
     words = f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|; " if scaled else ""
     problem = history.problem
-    console.print(f"{words}{problem.space.mass_note}{_payload_note(problem.task)}{_obstacle_note(problem)}")
+    notes = f"{_payload_note(problem.task)}{_obstacle_note(problem)}{_move_note(problem)}{_workspace_note(problem)}"
+    console.print(f"{words}{problem.space.mass_note}{notes}")
     _show_places(console, run.folder, figures)
 
 
@@ -299,6 +300,11 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
         console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
     for obstacle in task.obstacles:
         console.print(f"  obstacle: {obstacle.words()}")
+    if task.lines:
+        listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.lines.pairs)
+        console.print(f"  straight moves between targets: {listed}; a step of {1e3 * task.move_step:g} mm")
+    for region in task.workspace:
+        console.print(f"  workspace: {region.words()}")
     console.print(f"  reference point: {reference}")
     console.print(f"  provenance: {task.provenance}")
     if known is not None:
@@ -409,6 +415,21 @@ def _obstacle_note(problem: Problem) -> str:
     if not problem.task.obstacles or problem.heeds_clearance:
         return ""
     return "; the task's obstacles count in none of the objectives (collision and closeness heed them)"
+
+
+def _move_note(problem: Problem) -> str:
+    """That a task's moves count for nothing, where that is so."""
+    if not problem.task.lines or problem.heeds_moves:
+        return ""
+    names = ", ".join(objective.name for objective in OF_MOVES)
+    return f"; the task's moves count in none of the objectives (these heed them: {names})"
+
+
+def _workspace_note(problem: Problem) -> str:
+    """That a task's workspace counts for nothing, where that is so."""
+    if not problem.task.workspace or problem.heeds_workspace:
+        return ""
+    return "; the task's workspace counts in none of the objectives (unreached heeds it)"
 
 
 def _payload_note(task: DesignTask) -> str:

@@ -11,7 +11,7 @@ from typing import Literal, Protocol, cast
 
 from armwright.evaluation import Array, Evaluation
 from armwright.exceptions import TaskError, did_you_mean
-from armwright.objectives import CLEARANCES, OBJECTIVES
+from armwright.objectives import OBJECTIVES, TO_BOUND
 
 Relation = Literal["<=", ">="]
 
@@ -42,7 +42,7 @@ class Quantity(Protocol):
 
 
 # What a task's constraints may bound. A quantity of which more is better, and which is no objective, belongs here.
-QUANTITIES: Mapping[str, Quantity] = {**OBJECTIVES, **{quantity.name: quantity for quantity in CLEARANCES}}
+QUANTITIES: Mapping[str, Quantity] = {**OBJECTIVES, **{quantity.name: quantity for quantity in TO_BOUND}}
 
 
 @dataclass(frozen=True)

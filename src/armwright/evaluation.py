@@ -1,6 +1,6 @@
 """What the physics says of an arm at its targets: no preference, no sums."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,13 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
-from armwright.exceptions import TaskError
+from armwright.exceptions import SettingsError, TaskError
 from armwright.goals import Goals, plain_goals
 from armwright.kinematics.arrays import FIXED, MOST_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
+from armwright.kinematics.jacobian import jacobians
+from armwright.kinematics.paths import Paths, follow
 from armwright.kinematics.solve import Postures, solve_postures
+from armwright.moves import NO_MOVES, Moves
 from armwright.obstacles import Obstacle
+from armwright.workspace import Region, points_of
 
 Array = NDArray[np.float64]
 
@@ -23,7 +27,7 @@ Array = NDArray[np.float64]
 class Evaluation:
     """N arms of up to J joints at T targets; 0 for joints that an arm does not have.
 
-    Clearances are computed when they are first asked for.
+    Clearances, moves, the workspace and Jacobians are computed when they are first asked for.
     """
 
     arms: ArmArrays
@@ -37,6 +41,8 @@ class Evaluation:
     goals: Goals  # how the targets are to be reached
     obstacles: tuple[Obstacle, ...] = ()
     device: Device = "cpu"
+    moves: Moves = NO_MOVES
+    workspace: tuple[Region, ...] = ()  # to cover, by W points together
 
     def __len__(self) -> int:
         return len(self.q)
@@ -46,6 +52,55 @@ class Evaluation:
         """(N, T, J) at the actuators: of a sliding joint its force times its travel [N m]."""
         return self.joint_torques * self.arms.travel[:, None]
 
+    def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
+        """(N, T) a measure of motor torques, the largest of a target's posture and of the moves that end there.
+
+        measure: from torques (N, K, J) [N m] to (N, K), of K postures.
+        """
+        at_targets = measure(self.motor_torques)
+        if not self.moves:
+            return at_targets
+        along = measure(self.paths.joint_torques * self.arms.travel[:, None])
+        return self.paths.with_largest(at_targets, along)
+
+    @cached_property
+    def paths(self) -> Paths:
+        """The arms along the moves; SettingsError where there are none."""
+        if not self.moves:
+            raise SettingsError(
+                "path_error, joint_jump and all else of moves need some in the task: moves: in_order, or "
+                "moves: [[1, 2], [2, 3]]"
+            )
+        return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
+
+    @property
+    def manipulability(self) -> Array:
+        """(N, T) sqrt(det J Jᵀ) of the position Jacobian J in the kept posture (Yoshikawa 1985) [m³]."""
+        return self._singular_values.prod(axis=-1)
+
+    @property
+    def dexterity(self) -> Array:
+        """(N, T) the smallest singular value of J over the largest; 0 where the tip cannot move in some direction."""
+        largest = self._singular_values[..., 0]
+        return self._singular_values[..., -1] / np.where(largest > 0.0, largest, 1.0)
+
+    @cached_property
+    def _singular_values(self) -> Array:
+        """(N, T, 3) of J, from the largest on."""
+        jacobian = jacobians(self.arms, self.q)
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(-1, -2))[..., ::-1], 0.0))
+
+    @cached_property
+    def workspace_error(self) -> Array:
+        """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
+        if not self.workspace:
+            raise SettingsError(
+                "unreached needs a workspace in the task: workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
+            )
+        points = points_of(self.workspace)
+        reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
+        return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
+
     @property
     def missed(self) -> NDArray[np.bool_]:
         """(N, T) whether the tip or the tool's direction is off by a target's tolerance or more."""
@@ -54,7 +109,10 @@ class Evaluation:
 
     @property
     def self_clearance(self) -> Array:
-        """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none."""
+        """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none.
+
+        It and the other clearances are of a target's posture and of the moves that end there.
+        """
         return self._clearances[0]
 
     @property
@@ -69,7 +127,12 @@ class Evaluation:
 
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:
-        return clearances(self.arms, self.q, self.obstacles, self.device)
+        own, clear = clearances(self.arms, self.q, self.obstacles, self.device)
+        if not self.moves:
+            return own, clear
+        along = clearances(self.arms, self.paths.q, self.obstacles, self.device)
+        own, clear = (-self.paths.with_largest(-at, -way) for at, way in zip((own, clear), along, strict=True))
+        return own, clear
 
 
 def evaluate(
@@ -79,14 +142,18 @@ def evaluate(
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
     goals: Goals | None = None,
+    moves: Moves = NO_MOVES,
+    workspace: Sequence[Region] = (),
 ) -> Evaluation:
     """Every arm at every target. Not reaching a target is a result, never an exception.
 
     targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
     obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
     goals: how they are to be reached (`Task.goals`); without them, as points.
+    moves: lines between targets that the tip goes along.
+    workspace: boxes to cover.
     """
-    return evaluate_arrays(stack_arms(arms), targets, device, payload=payload, obstacles=obstacles, goals=goals)
+    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, goals, moves, workspace)
 
 
 def evaluate_arrays(
@@ -97,6 +164,8 @@ def evaluate_arrays(
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
     goals: Goals | None = None,
+    moves: Moves = NO_MOVES,
+    workspace: Sequence[Region] = (),
 ) -> Evaluation:
     """The same for arms that are stacked already, in their precision.
 
@@ -126,6 +195,8 @@ def evaluate_arrays(
         goals=goals,
         obstacles=tuple(obstacles),
         device=device,
+        moves=moves,
+        workspace=tuple(workspace),
     )
 
 

@@ -79,7 +79,15 @@ def _actuation(evaluation: Evaluation, name: str) -> Actuation:
 
 def _torque_use(evaluation: Evaluation) -> Array:
     effort = _actuation(evaluation, "torque_use").effort
-    return np.abs(evaluation.motor_torques / effort[:, None]).max(axis=-1)
+    return evaluation.worst_torques(lambda torques: np.abs(torques / effort[:, None]).max(axis=-1))
+
+
+def _path_error(evaluation: Evaluation) -> Array:
+    return evaluation.paths.with_largest(np.zeros(evaluation.position_error.shape), evaluation.paths.error)
+
+
+def _joint_jump(evaluation: Evaluation) -> Array:
+    return evaluation.paths.with_largest(np.zeros(evaluation.position_error.shape), evaluation.paths.jumps)
 
 
 def _price(evaluation: Evaluation) -> Array:
@@ -150,7 +158,7 @@ PEAK_TORQUE = Objective(
     unit="N m",
     symbol="E_peak",
     words="the largest of the joint torques' absolute values [N m] that hold the kept posture up against gravity",
-    each=lambda evaluation: np.abs(evaluation.motor_torques).max(axis=-1),
+    each=lambda evaluation: evaluation.worst_torques(lambda torques: np.abs(torques).max(axis=-1)),
     over="max",
 )
 RMS_TORQUE = Objective(
@@ -226,11 +234,50 @@ CLOSENESS = Objective(
     each=lambda evaluation: np.maximum(0.0, COMFORTABLE - evaluation.clearance),
     over="max",
 )
+PATH_ERROR = Objective(
+    name="path_error",
+    label="Path error",
+    unit="m",
+    symbol="E_path",
+    words="the largest distance between the tip and where it should be on the straight moves that end at the target; 0 "
+    "where none does",
+    each=_path_error,
+    over="max",
+)
+JOINT_JUMP = Objective(
+    name="joint_jump",
+    label="Joint jump",
+    unit="rad",
+    symbol="E_jump",
+    words="the largest change of any joint [rad, of sliding ones m] from one step of the moves that end at the target "
+    "to the next, large where the arm flips into another posture on the way; 0 where no move ends there",
+    each=_joint_jump,
+    over="max",
+)
+UNREACHED = Objective(
+    name="unreached",
+    label="Unreached",
+    unit="share",
+    symbol="E_unreached",
+    words=f"the share of the workspace's points that the tip misses by {1e3 * REACHED:g} mm or more",
+    each=lambda evaluation: (evaluation.workspace_error >= REACHED).mean(axis=1),
+    over="arm",
+)
+CLUMSINESS = Objective(
+    name="clumsiness",
+    label="Clumsiness",
+    unit="share",
+    symbol="E_clumsy",
+    words="1 less the tip's speed in the direction in which the joints move it worst over that in the best, in the "
+    "kept posture: 0 where all directions are alike, 1 where there is one in which the tip cannot move at all",
+    each=lambda evaluation: 1.0 - evaluation.dexterity,
+    over="max",
+)
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
 OF_ORIENTATION = (ORIENTATION_ERROR, WORST_ANGLE)
 _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS,
-    *OF_ORIENTATION, COLLISION, CLOSENESS,
+    *OF_ORIENTATION, COLLISION, CLOSENESS, PATH_ERROR, JOINT_JUMP, UNREACHED, CLUMSINESS,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 
@@ -257,6 +304,18 @@ CLEARANCES: tuple[Objective, ...] = (
                lambda e: e.obstacle_clearance),
 )  # fmt: skip
 OF_CLEARANCE = (COLLISION, CLOSENESS, *CLEARANCES)
+OF_THE_WAY = (*OF_CLEARANCE, PEAK_TORQUE, TORQUE_USE)  # a target's share is the worst of it and of the moves there
+OF_MOVES = (*OF_THE_WAY, PATH_ERROR, JOINT_JUMP)
+MANIPULABILITY = Objective(
+    name="manipulability",
+    label="Manipulability",
+    unit="m³",
+    symbol="manipulability",
+    words="the square root of det(J J^T) in the kept posture, with the position Jacobian J",
+    each=lambda evaluation: evaluation.manipulability,
+    over="min",
+)
+TO_BOUND = (*CLEARANCES, MANIPULABILITY)  # of which more is better: no objectives
 
 
 def named_objectives(names: Sequence[str]) -> tuple[Objective, ...]:

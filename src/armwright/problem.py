@@ -14,9 +14,11 @@ from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.objectives import (
     OF_CLEARANCE,
+    OF_MOVES,
     OF_ORIENTATION,
     ORIENTATION_ERROR,
     PAPER_OBJECTIVES,
+    UNREACHED,
     Objective,
     named_objectives,
 )  # fmt: skip
@@ -79,11 +81,36 @@ class Problem:
         """The worst values that count for the hypervolume, where the task states them."""
         return self.task.reference_point
 
+    def counts(self, quantity: Objective) -> bool:
+        """Whether it is an objective, or bounded by a constraint."""
+        counted = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
+        return quantity.name in counted
+
     @property
     def heeds_clearance(self) -> bool:
         """Whether it counts where the arm is in an obstacle or in itself."""
-        counted = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
-        return any(quantity.name in counted for quantity in OF_CLEARANCE)
+        return any(map(self.counts, OF_CLEARANCE))
+
+    @property
+    def heeds_moves(self) -> bool:
+        """Whether it counts what the arm does on its moves."""
+        return any(map(self.counts, OF_MOVES))
+
+    @property
+    def heeds_workspace(self) -> bool:
+        """Whether it counts how much of the workspace is covered."""
+        return self.counts(UNREACHED)
+
+    @property
+    def _postures(self) -> int:
+        """Of each arm, at most."""
+        task = self.task
+        return (
+            len(task.points)
+            + sum(task.lines.steps(task.points))
+            + len(task.lines)
+            + sum(r.points for r in task.workspace)
+        )
 
     def arm(self, design: Design) -> Arm:
         """The physical chain that a design builds."""
@@ -100,7 +127,8 @@ class Problem:
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
         task = self.task
-        return evaluate_arrays(arms, task.points, self.device, start, task.payloads, task.obstacles, task.goals)
+        known = (task.payloads, task.obstacles, task.goals, task.lines, task.workspace)
+        return evaluate_arrays(arms, task.points, self.device, start, *known)
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""
@@ -112,7 +140,7 @@ class Problem:
         Only the postures of a chunk of them are in memory at a time.
         """
         matrix = self.space.settled(matrix)
-        size = max(1, POSTURES_AT_ONCE[self.device] // len(self.task.points))
+        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
         found = np.empty((len(matrix), len(self.objectives) + len(self.constraints)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)

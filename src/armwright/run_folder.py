@@ -45,7 +45,10 @@ BEFORE_TRIALS = {
     ".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
 }  # fmt: skip
 # Of a task; its words may change.
-IDENTITY = ("name", "targets", "payload", "restarts", "obstacles", "constraints", "reference_point")
+IDENTITY = (
+    "name", "targets", "payload", "restarts", "obstacles", "moves", "move_step", "workspace", "constraints",
+    "reference_point",
+)  # fmt: skip
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 

@@ -9,7 +9,7 @@ import shlex
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 from pydantic import (
@@ -17,6 +17,7 @@ from pydantic import (
     Field,
     ModelWrapValidatorHandler,
     PrivateAttr,
+    ValidationError,
     field_serializer,
     field_validator,
     model_validator,
@@ -25,12 +26,15 @@ from pydantic import (
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.goals import Goals, plain_goals
+from armwright.moves import MOVE_STEP, Moves, check_moves
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
 from armwright.targets import LARGEST_COORDINATE, Point, Target, goals_of, read_target
+from armwright.workspace import MOST_POINTS, MOST_REGIONS, Region
 
 LARGEST_PAYLOAD = 1e4  # [kg]
 MOST_TARGETS = 10_000
 MOST_RESTARTS = 100
+IN_ORDER = "in_order"  # of moves: from each target to the next
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 _FOLDER = resources.files("armwright") / "tasks"
 _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
@@ -43,6 +47,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     payload: what the tip carries at all targets, or at each [kg].
     restarts: further starts of the inverse kinematics at each target, of which the best posture counts.
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
+    moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
+    move_step: from one sample of such a line to the next, at most [m].
+    workspace: boxes that the tip should cover; where targets are left out, these are the boxes' corners.
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two, and where a target
         says which way the tool points, orientation_error.
     constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
@@ -53,6 +60,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     payload: float | tuple[float, ...] = 0.0
     obstacles: tuple[Obstacle, ...] = ()
     restarts: int = Field(default=0, ge=0, le=MOST_RESTARTS)
+    moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
+    move_step: Annotated[float, Field(gt=0.0, le=LARGEST_COORDINATE)] = MOVE_STEP
+    workspace: tuple[Region, ...] = ()
     objectives: tuple[str, ...] | None = None
     constraints: tuple[str, ...] = ()
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
@@ -96,6 +106,35 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             check_obstacle(record, number)
         return records
 
+    @model_validator(mode="before")
+    @classmethod
+    def _take_corners(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or "targets" in content or "workspace" not in content:
+            return cast("Any", content)
+        try:
+            regions = [Region.model_validate(region) for region in _listed(content["workspace"])]
+        except ValidationError:
+            corners = ((0.0, 0.0, 0.0),)  # what is wrong with the workspace is said of itself, by its field
+        else:
+            corners = tuple(dict.fromkeys(corner for region in regions for corner in region.corners))
+        return {**cast("dict[str, Any]", content), "targets": corners}
+
+    @field_validator("workspace", mode="before")
+    @classmethod
+    def _check_workspace(cls, value: Any) -> Any:
+        regions = _listed(value)
+        if len(regions) > MOST_REGIONS:
+            raise ValueError(f"workspace has {len(regions)} boxes; at most {MOST_REGIONS} are allowed")
+        return regions
+
+    @field_validator("moves", mode="before")
+    @classmethod
+    def _check_moves(cls, value: Any) -> Any:
+        pairs = cast("list[Any]", value) if isinstance(value, (list, tuple)) else [None]
+        if value != IN_ORDER and not all(_is_pair(pair) for pair in pairs):
+            raise ValueError(f"moves is {IN_ORDER}, or a list of pairs of targets counted from 1: [[1, 2], [2, 3]]")
+        return cast("Any", value)
+
     @model_validator(mode="after")
     def _check_numbers(self) -> Self:
         if not self.targets:
@@ -113,6 +152,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(f"payload has {len(self.payload)} values for {len(self.targets)} targets; give one or all")
         if not all(0.0 <= kg <= LARGEST_PAYLOAD for kg in payloads):
             raise ValueError(f"payload = {self.payload} kg is outside 0 <= payload <= {LARGEST_PAYLOAD:g} kg")
+        if self.moves == IN_ORDER and len(self.targets) < 2:
+            raise ValueError(f"moves: {IN_ORDER} needs two targets or more")
+        check_moves([(start + 1, end + 1) for start, end in self.lines.pairs], self.targets, self.move_step)
+        if sum(region.points for region in self.workspace) > MOST_POINTS:
+            raise ValueError(f"workspace has more than {MOST_POINTS} points together")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
             raise ValueError(f"reference_point = {list(self.reference_point)} must be above 0 in each objective")
         return self
@@ -145,6 +189,13 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def payloads(self) -> np.ndarray:
         """What the tip carries at each target, (T,) [kg]."""
         return np.broadcast_to(np.array(self.payload, dtype=np.float64), (len(self.targets),)).copy()
+
+    @property
+    def lines(self) -> Moves:
+        """The straight moves, with targets counted from 0."""
+        if self.moves == IN_ORDER:
+            return Moves(tuple((i, i + 1) for i in range(len(self.targets) - 1)), self.move_step)
+        return Moves(tuple((start - 1, end - 1) for start, end in self.moves), self.move_step)
 
 
 def builtin_names() -> list[str]:
@@ -266,8 +317,18 @@ targets:
 #   - {{kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}}
 #   - {{kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}}
 
+# Straight lines that the tip goes along: from each target to the next, or pairs of targets counted from 1. They count
+# in path_error, joint_jump, peak_torque, torque_use, collision and closeness.
+# moves: in_order    # or [[1, 2], [2, 1]]
+# move_step: 0.02    # m between two samples of a line
+
+# A box that the tip should cover, in metres, or a list of boxes; it counts with the objective unreached. Where targets
+# are left out, they are its corners.
+# workspace: {{low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 200}}
+
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length, collision, closeness, orientation_error, worst_angle.
+# rms_torque, mass, length, collision, closeness, orientation_error, worst_angle, path_error, joint_jump, unreached,
+# clumsiness.
 # objectives: [worst_error, peak_torque, mass]
 
 # What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number
@@ -284,6 +345,22 @@ targets:
 # description: What the arm has to do there.
 # provenance: Who measured the points, and when.
 """
+
+
+def _listed(workspace: Any) -> list[Any]:
+    """One box, or a list of them, as a list."""
+    if isinstance(workspace, (dict, Region)):
+        return [workspace]
+    if isinstance(workspace, (list, tuple)):
+        return list(cast("list[Any]", workspace))
+    raise ValueError("workspace is {low: [x, y, z], high: [x, y, z], points: 200} in metres, or a list of such boxes")
+
+
+def _is_pair(value: Any) -> bool:
+    if not isinstance(value, (list, tuple)):
+        return False
+    pair = cast("list[Any]", value)
+    return len(pair) == 2 and all(isinstance(target, int) and not isinstance(target, bool) for target in pair)
 
 
 def _safe_name(stem: str) -> str:

@@ -84,5 +84,6 @@ def _judged(problem: Problem, rows: Array, start: Array | None = None) -> Array:
     """(N, M + C) in float64.  start: (T, D) angles [rad]; None for the straight start."""
     arrays = arrays_of(problem.space, rows, "float64")
     task = problem.task
-    found = evaluate_arrays(arrays, task.points, "cpu", start, task.payloads, task.obstacles, task.goals)
+    known = (task.payloads, task.obstacles, task.goals, task.lines, task.workspace)
+    found = evaluate_arrays(arrays, task.points, "cpu", start, *known)
     return problem.judged(found)

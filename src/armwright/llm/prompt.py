@@ -17,16 +17,17 @@ from armwright.control import LONGEST_HINT
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.goals import REACHED
 from armwright.history import History
+from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.kinematics.solve import UPDATES
 from armwright.llm.feedback import Feedback, Record, points, proposal_records, vector
 from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
-from armwright.objectives import MISSED, ORIENTATION_ERROR, POSITION_ERROR, Objective
+from armwright.objectives import MISSED, OF_THE_WAY, ORIENTATION_ERROR, POSITION_ERROR, Objective
 from armwright.problem import Problem
 from armwright.targets import target_words
-from armwright.task import Task
+from armwright.task import IN_ORDER, Task
 from armwright.tolerance import measured_columns
 
 PROMPTS = ("plus", "minus")
@@ -64,6 +65,10 @@ VARIABLES = {
     "asks": "what targets say beside their points, such as an axis for the tool, a line each; empty for points alone",
     "oriented": "whether any target asks for an axis or an orientation of the tool",
     "restarts": "further starts of the inverse kinematics at each target",
+    "moves": "the straight lines that the tip goes along, as text; empty where none counts in an objective",
+    "workspace": "boxes that the tip should cover, each as text; none where they count in no objective",
+    "of_the_way": "the objectives of which a target's share is the worst of it and of the moves that end there",
+    "updates_of_step": "updates of the inverse kinematics from one sample of a move to the next",
     "n_targets": "how many targets the task has",
     "n_targets_shown": "how many of them are listed",
     "target_low": "the least x, y and z of all targets",
@@ -280,6 +285,10 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "collisions": problem.heeds_clearance,
         "oriented": problem.task.goals.oriented,
         "restarts": problem.task.restarts,
+        "moves": _move_words(problem.task) if problem.heeds_moves else "",
+        "workspace": [region.words() for region in problem.task.workspace] if problem.heeds_workspace else [],
+        "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.counts(quantity)],
+        "updates_of_step": UPDATES_OF_STEP,
         "n_targets": len(problem.task.points),
         "updates": UPDATES,
         "objectives": [_spoken(objective, problem.task) for objective in problem.objectives],
@@ -322,6 +331,17 @@ def _payload_words(task: Task) -> str:
     each = "each" if len(shown) == len(payloads) else "some of"
     listed = ", ".join(f"{payloads[i]:g}" for i in shown)
     return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
+
+
+def _move_words(task: Task) -> str:
+    """The straight moves, by numbers of targets; empty where there are none."""
+    pairs = task.lines.pairs
+    if task.moves == IN_ORDER:
+        return "from each target to the next, in the order of the list"
+    shown = [pairs[i] for i in spread(len(pairs), MOST_TARGETS)]
+    listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in shown)
+    more = "" if len(shown) == len(pairs) else f" (some of {len(pairs)})"
+    return f"between the targets of these numbers, counted from 1: {listed}{more}" if pairs else ""
 
 
 def _shown(

@@ -216,6 +216,8 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "payloads": task.payloads.tolist(),
         "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
         "goals": _goals(task.goals),
+        "workspace": [{"low": list(r.low), "high": list(r.high), "words": r.words()} for r in task.workspace],
+        "moves": [list(pair) for pair in task.lines.pairs],
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
         "constraints": [

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -34,13 +35,16 @@ from armwright.report.style import (
     LINK,
     MISSED,
     OBSTACLE,
+    REGION,
     TARGET,
+    WAY,
     Look,
     look,
 )
 from armwright.results import FIGURES, read_summary
 from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
 from armwright.space import DesignSpace
+from armwright.workspace import Region
 
 ARROW = 0.15  # of an arm's reach, long: which way a target asks the tool to point
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials: 10, 70, 130 and 200 of 200, as in the paper
@@ -289,6 +293,8 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
         targets = range(len(evaluation.targets))
         extent = _extent(evaluation, [m for _, m in chosen])
         draw_obstacles(axes, evaluation.obstacles, extent)
+        _draw_workspace(axes, evaluation.workspace)
+        _draw_moves(axes, evaluation, column, targets)
         _draw_postures(axes, member, evaluation, column, targets)
         frame(axes, extent)
         axes.set_title(f"{title}\n{_words(history, member)}", y=1.0)
@@ -313,6 +319,8 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
         draw_obstacles(axes, evaluation.obstacles, extent)
+        _draw_workspace(axes, evaluation.workspace)
+        _draw_moves(axes, evaluation, 0, [target])
         _draw_postures(axes, member, evaluation, 0, [target])
         frame(axes, extent)
         missed = evaluation.missed[0, target]
@@ -398,6 +406,26 @@ def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: 
     axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
 
 
+def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
+    """The moves that end at these targets: the line, and the way that the tip takes."""
+    if not evaluation.moves:
+        return
+    lines = evaluation.paths.lines
+    for (_, end), first, beyond in zip(evaluation.moves.pairs, lines.first, lines.first[1:], strict=False):
+        if end in targets:
+            axes.plot(*lines.points[first:beyond].T, color=TARGET, linewidth=1.2)
+            axes.plot(*evaluation.paths.reached[row, first:beyond].T, color=WAY, linewidth=1.4, linestyle=(0, (3, 1)))
+
+
+def _draw_workspace(axes: Any, workspace: Sequence[Region]) -> None:
+    """The edges of the boxes to cover."""
+    for region in workspace:
+        corners = np.array(list(product(*zip(region.low, region.high, strict=True))))
+        for one, other in combinations(corners, 2):
+            if (one != other).sum() == 1:
+                axes.plot(*np.array([one, other]).T, color=REGION, linewidth=0.8)
+
+
 def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
     """Where the tool should point to: an arrow for its z, of a whole orientation its x and y, too."""
     goal, rows = evaluation.targets[target], evaluation.goals.rows[target]
@@ -435,7 +463,8 @@ def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.
         for row, member in enumerate(members)
         for q in evaluation.q[row]
     ]
-    points = np.vstack([evaluation.targets, *places])
+    corners = [corner for region in evaluation.workspace for corner in region.corners]
+    points = np.vstack([evaluation.targets, *corners, *places])
     low, high = points.min(axis=0), points.max(axis=0)
     for obstacle in evaluation.obstacles:
         if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor that is near
@@ -474,12 +503,19 @@ def _mark(style: Look) -> Line2D:
 def _arm_legend(evaluation: Evaluation) -> list[Line2D | Patch]:
     joints = [Line2D([], [], linestyle="", marker="o", color=JOINT[a], label=JOINT_LABEL[a]) for a in "xyz"]
     obstacles = [Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle")] if evaluation.obstacles else []
+    moves = [
+        Line2D([], [], color=TARGET, linewidth=1.2, label="straight move"),
+        Line2D([], [], color=WAY, linewidth=1.4, linestyle=(0, (3, 1)), label="its tip"),
+    ][: 2 * bool(evaluation.moves)]
+    regions = [Line2D([], [], color=REGION, linewidth=0.8, label="workspace")] if evaluation.workspace else []
     return [
         Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
         *joints,
         Line2D([], [], linestyle="", marker="*", markersize=9, color=TARGET, markeredgecolor=FRONT, label="target"),
         Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
         *obstacles,
+        *moves,
+        *regions,
     ]
 
 

@@ -33,6 +33,8 @@ TARGET = "#CC79A7"
 INFEASIBLE = "#B0B0B0"
 LINK = "#5A5A60"
 OBSTACLE = "#6E7F91"
+REGION = "#8A8A8A"  # to cover
+WAY = "#111111"  # of the tip on a move
 JOINT = {"x": "#D55E00", "y": "#0072B2", "z": "#009E73"}
 JOINT_LABEL = {"x": "R (roll, x)", "y": "P (pitch, y)", "z": "Y (yaw, z)"}
 

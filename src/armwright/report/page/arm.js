@@ -92,7 +92,7 @@ function begin() {
   const sun = new THREE.DirectionalLight(0xffffff, 1.6);
   sun.position.set(3, -5, 8);
   scene.add(sun);
-  for (const name of ["floor", "obstacles", "targets", "goals", "ghost", "compared", "arm"]) {
+  for (const name of ["floor", "obstacles", "moves", "workspace", "targets", "goals", "ghost", "compared", "arm"]) {
     groups[name] = new THREE.Group();
     scene.add(groups[name]);
   }
@@ -126,6 +126,8 @@ function legend() {
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], words[axis]]),
     [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
   if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
+  if (content.head.moves.length) parts.push([content.head.colours.target, "straight move (line)"]);
+  if (content.head.workspace.length) parts.push([colour("soft"), "workspace (edges)"]);
   $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
     const dot = element("span", { class: "dot" });
     dot.style.background = paint_;
@@ -162,7 +164,7 @@ function ball(place, radius, material) {
 
 // What there is to see of the selected design: the targets, and the arm in all postures.
 function extent() {
-  const points = [...content.targets];
+  const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high])];
   for (const i of new Set([state.design, state.compared ?? state.design])) {
     content.targets.forEach((_, t) => points.push(...chain(content.arm(i), content.q(i, t)).joints));
   }
@@ -183,6 +185,8 @@ function reframe() {
   frame = { centre, low, high, radius };
   drawFloor();
   drawObstacles();
+  drawMoves();
+  drawWorkspace();
   drawTargets();
   look();
 }
@@ -245,6 +249,25 @@ function label(text, place) {
 function drawObstacles() {
   empty(groups.obstacles);
   for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, frame, materials.obstacle));
+}
+
+// The straight lines that the tip is asked to go along.
+function drawMoves() {
+  empty(groups.moves);
+  const points = content.head.moves.flatMap(([start, end]) => [...content.targets[start], ...content.targets[end]]);
+  if (points.length) groups.moves.add(segments(points, new THREE.LineBasicMaterial({ color: content.head.colours.target })));
+}
+
+// The edges of the boxes that the tip should cover.
+function drawWorkspace() {
+  empty(groups.workspace);
+  const points = content.head.workspace.flatMap(({ low, high }) => [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].flatMap((corner) => {
+    const others = [0, 1, 2].filter((k) => k !== axis), [start, end] = [[...low], [...low]];
+    others.forEach((k, bit) => { start[k] = end[k] = corner >> bit & 1 ? high[k] : low[k]; });
+    end[axis] = high[axis];
+    return [...start, ...end];
+  })));
+  if (points.length) groups.workspace.add(segments(points, new THREE.LineBasicMaterial({ color: colour("soft") })));
 }
 
 function drawTargets() {

@@ -89,7 +89,9 @@ export function drawDesign() {
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
   const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.words).join("; ")}.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.${solids}`;
+  const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.words).join("; ")}.` : "";
+  const lines = head.moves.length ? ` Straight moves between targets: ${head.moves.map(([a, b]) => `${a + 1} to ${b + 1}`).join(", ")}.` : "";
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.${solids}${lines}${boxes}`;
 }
 
 // What the design has where it is bounded.

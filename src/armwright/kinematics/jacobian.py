@@ -1,0 +1,49 @@
+"""Frames and Jacobians of posed arms: plain numpy in float64, for what is asked of kept postures alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.kinematics.arrays import FIXED, SLIDES, ArmArrays
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Where the joints of N arms in K postures are in the world."""
+
+    rotation: Array  # (N, K, D, 3, 3) the frame of what joint j carries, its axes as columns
+    place: Array  # (N, K, D, 3) of the joint, after it has slid [m]
+    axis: Array  # (N, K, D, 3) that it turns about, or slides along; of a fixed one 0
+    tip: Array  # (N, K, 3) [m]
+
+
+def frames_of(arms: ArmArrays, q: Array) -> Frames:
+    """The frames in postures q (N, K, D) [rad] or [m]."""
+    n, k, dof = q.shape
+    turns, slides = arms.motion < SLIDES, (arms.motion >= SLIDES) & (arms.motion < FIXED)  # (N, D)
+    local = np.where((turns | slides)[..., None], np.eye(3)[arms.motion % SLIDES], 0.0)  # (N, D, 3)
+    cross = np.cross(local[:, :, None], np.eye(3)).swapaxes(-1, -2)[:, None]  # (N, 1, D, 3, 3): v ↦ local x v
+    angle = np.where(turns[:, None], q, 0.0)[..., None, None]
+    turned = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    way = np.where(slides[:, None], q, 0.0)[..., None]
+    rotation, place, axis = np.empty((n, k, dof, 3, 3)), np.empty((n, k, dof, 3)), np.empty((n, k, dof, 3))
+    frame = np.broadcast_to(np.eye(3), (n, k, 3, 3))
+    at = np.broadcast_to(arms.base.astype(np.float64)[:, None], (n, k, 3))
+    offset = arms.offset.astype(np.float64)
+    for j in range(dof):
+        axis[:, :, j] = (frame @ local[:, None, j, :, None])[..., 0]
+        place[:, :, j] = at + axis[:, :, j] * way[:, :, j]
+        frame = rotation[:, :, j] = frame @ turned[:, :, j]
+        at = place[:, :, j] + (frame @ offset[:, None, j, :, None])[..., 0]
+    return Frames(rotation, place, axis, at)
+
+
+def jacobians(arms: ArmArrays, q: Array) -> Array:
+    """(N, K, 3, D): how the tip moves with each joint [m/rad] or [m/m]; q: (N, K, D)."""
+    frames = frames_of(arms, q)
+    slides = (arms.motion >= SLIDES)[:, None, :, None]
+    turning = np.cross(frames.axis, frames.tip[:, :, None] - frames.place)
+    return np.where(slides, frames.axis, turning).swapaxes(-1, -2)
