@@ -302,7 +302,10 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
         console.print(f"  obstacle: {obstacle.words()}")
     if task.lines:
         listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.lines.pairs)
-        console.print(f"  straight moves between targets: {listed}; a step of {1e3 * task.move_step:g} mm")
+        timed = ""
+        if task.move_time is not None:
+            timed = f"; in {', '.join(f'{time:g}' for time in np.atleast_1d(task.move_time))} s"
+        console.print(f"  straight moves between targets: {listed}; a step of {1e3 * task.move_step:g} mm{timed}")
     for region in task.workspace:
         console.print(f"  workspace: {region.words()}")
     console.print(f"  reference point: {reference}")

@@ -13,6 +13,7 @@ from armwright.goals import Goals, plain_goals
 from armwright.kinematics.arrays import FIXED, MOST_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
+from armwright.kinematics.dynamics import Drives, driven
 from armwright.kinematics.jacobian import jacobians
 from armwright.kinematics.paths import Paths, follow
 from armwright.kinematics.solve import Postures, solve_postures
@@ -72,6 +73,25 @@ class Evaluation:
                 "moves: [[1, 2], [2, 3]]"
             )
         return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
+
+    @cached_property
+    def drives(self) -> Drives:
+        """What the joints do along the timed moves; SettingsError where these take no time."""
+        paths = self.paths
+        if not self.moves.times:
+            raise SettingsError(
+                "dynamic_torque, dynamic_use and speed_use need to know how long the task's moves take: move_time: 1.5 "
+                "[s], or one for each move"
+            )
+        return driven(self.arms, paths)
+
+    def worst_drives(self, measure: Callable[[Array, Array], Array]) -> Array:
+        """(N, T) a measure of what actuators do, the largest along the moves that end at a target; 0 where none does.
+
+        measure: from torques [N m] and speeds [rad/s], each (N, F, J), to (N, F), of F moments.
+        """
+        drives, travel = self.drives, self.arms.travel[:, None]
+        return drives.largest(measure(drives.torques * travel, drives.speeds / travel), len(self.targets))
 
     @property
     def manipulability(self) -> Array:

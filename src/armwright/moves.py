@@ -12,17 +12,20 @@ Array = NDArray[np.float64]
 MOVE_STEP = 0.02  # [m] from one sample of a line to the next, at most
 MOST_STEPS = 200  # of a move
 MOST_SAMPLES = 10_000  # of all moves
+LONGEST_TIME = 1e4  # [s] of a move
+FEWEST_PARTS = 32  # of a timed line: the torques of a shorter one are looked at between its samples, too
 
 
 @dataclass(frozen=True)
 class Moves:
     """Lines that the tip goes along, each from one target to another.
 
-    pairs: the targets' places in the task's list, from 0.  step: [m].
+    pairs: the targets' places in the task's list, from 0.  step: [m].  times: of each move [s]; none where not timed.
     """
 
     pairs: tuple[tuple[int, int], ...] = ()
     step: float = MOVE_STEP
+    times: tuple[float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.pairs)
@@ -48,6 +51,22 @@ class Lines:
         return len(self.points)
 
 
+@dataclass(frozen=True)
+class Timing:
+    """F moments of M timed lines, one line after the other: their samples, and as many between as make 32 parts."""
+
+    first: NDArray[np.intp]  # (M + 1,) where each line's moments begin, and last F
+    sample: NDArray[np.intp]  # (F,) the last before
+    beyond: Array  # (F,) it, as a share of the step to the next
+    speed: Array  # (F,) of the share of the line [1/s]
+    acceleration: Array  # (F,) [1/s²]
+
+    def between(self, values: Array) -> Array:
+        """(N, F, D) on straight lines between those of samples (N, S, D)."""
+        share, after = self.beyond[:, None], np.minimum(self.sample + 1, values.shape[1] - 1)
+        return (1.0 - share) * values[:, self.sample] + share * values[:, after]
+
+
 def steps_of(length: float, step: float) -> int:
     """Into how many equal steps a line is cut [m]: a hair above a whole number is that number."""
     return max(1, math.ceil(length / step - 1e-9))
@@ -66,6 +85,55 @@ def lines_of(moves: Moves, targets: Array) -> Lines:
         share=np.concatenate(share),
         points=np.concatenate(points),
     )
+
+
+def timing_of(moves: Moves, lines: Lines) -> Timing:
+    """When the tip is where, if each line is run from rest to rest by the fifth-order profile of `moments`."""
+    sample: list[NDArray[np.intp]] = []
+    beyond: list[Array] = []
+    speed: list[Array] = []
+    acceleration: list[Array] = []
+    for first, end, time in zip(lines.first, lines.first[1:], moves.times, strict=False):
+        steps = int(end - first) - 1
+        parts = math.ceil(FEWEST_PARTS / steps)
+        number = np.arange(steps * parts + 1)
+        rate, change = moments(number / (steps * parts))
+        sample.append(first + number // parts)
+        beyond.append(number % parts / parts)
+        speed.append(rate / time)
+        acceleration.append(change / time**2)
+    return Timing(
+        first=np.concatenate([[0], np.cumsum([len(number) for number in sample])]),
+        sample=np.concatenate(sample),
+        beyond=np.concatenate(beyond),
+        speed=np.concatenate(speed),
+        acceleration=np.concatenate(acceleration),
+    )
+
+
+def moments(share: Array) -> tuple[Array, Array]:
+    """ds/dt and d²s/dt² where s = 10 t³ - 15 t⁴ + 6 t⁵ comes to these shares, of a move of one second.
+
+    Of all ways from rest to rest it is the one of the least mean square jerk; s grows with t, so t is found by halving.
+    """
+    low, high = np.zeros(share.shape), np.ones(share.shape)
+    for _ in range(60):
+        t = 0.5 * (low + high)
+        short = t**3 * (10.0 - 15.0 * t + 6.0 * t**2) < share
+        low, high = np.where(short, t, low), np.where(short, high, t)
+    t = np.where(share == 0.0, 0.0, np.where(share == 1.0, 1.0, 0.5 * (low + high)))
+    return 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
+
+
+def check_times(times: float | Sequence[float], moves: int) -> None:
+    """ValueError where moves cannot take these times [s]; one is for every move."""
+    if not moves:
+        raise ValueError("move_time is of moves, and there are none; give some: moves: in_order")
+    if not isinstance(times, float) and len(times) != moves:
+        raise ValueError(f"move_time has {len(times)} values for {moves} moves; give one or all")
+    for time in [times] if isinstance(times, float) else times:
+        if not 0.0 < time <= LONGEST_TIME:
+            raise ValueError(f"move_time = {time:g} s is outside 0 < move_time <= {LONGEST_TIME:g} s")
 
 
 def check_moves(pairs: Sequence[tuple[int, int]], targets: Sequence[tuple[float, float, float]], step: float) -> None:

@@ -82,6 +82,25 @@ def _torque_use(evaluation: Evaluation) -> Array:
     return evaluation.worst_torques(lambda torques: np.abs(torques / effort[:, None]).max(axis=-1))
 
 
+def _dynamic_torque(evaluation: Evaluation) -> Array:
+    return evaluation.worst_drives(lambda torques, _: np.abs(torques).max(axis=-1))
+
+
+def _dynamic_use(evaluation: Evaluation) -> Array:
+    effort = _actuation(evaluation, "dynamic_use").effort
+    return evaluation.worst_drives(lambda torques, _: np.abs(torques / effort[:, None]).max(axis=-1))
+
+
+def _speed_use(evaluation: Evaluation) -> Array:
+    speed = _actuation(evaluation, "speed_use").speed
+    if np.isnan(speed).any():
+        raise SettingsError(
+            "objective speed_use needs the speed of every actuator; the space names one without (speed [rad/s] in its "
+            "record)"
+        )
+    return evaluation.worst_drives(lambda _, speeds: np.abs(speeds / speed[:, None]).max(axis=-1))
+
+
 def _path_error(evaluation: Evaluation) -> Array:
     return evaluation.paths.with_largest(np.zeros(evaluation.position_error.shape), evaluation.paths.error)
 
@@ -273,11 +292,42 @@ CLUMSINESS = Objective(
     each=lambda evaluation: 1.0 - evaluation.dexterity,
     over="max",
 )
+DYNAMIC_TORQUE = Objective(
+    name="dynamic_torque",
+    label="Dynamic torque",
+    unit="N m",
+    symbol="E_dynamic",
+    words="the largest of the motors' torques' absolute values [N m] that move the arm, from rest to rest in the time "
+    "given, along the straight moves that end at the target, gravity and inertia included; 0 where none does",
+    each=_dynamic_torque,
+    over="max",
+)
+DYNAMIC_USE = Objective(
+    name="dynamic_use",
+    label="Dynamic use",
+    unit="of allowed",
+    symbol="E_dynuse",
+    words="the largest share of its actuator's torque that any joint needs to move the arm, from rest to rest in the "
+    "time given, along the straight moves that end at the target; above 1 it cannot; 0 where none does",
+    each=_dynamic_use,
+    over="max",
+)
+SPEED_USE = Objective(
+    name="speed_use",
+    label="Speed use",
+    unit="of allowed",
+    symbol="E_speed",
+    words="the largest share of its actuator's no-load speed that any joint needs along the straight moves that end at "
+    "the target, from rest to rest in the time given; above 1 it cannot; 0 where none does",
+    each=_speed_use,
+    over="max",
+)
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
 OF_ORIENTATION = (ORIENTATION_ERROR, WORST_ANGLE)
 _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS,
-    *OF_ORIENTATION, COLLISION, CLOSENESS, PATH_ERROR, JOINT_JUMP, UNREACHED, CLUMSINESS,
+    *OF_ORIENTATION, COLLISION, CLOSENESS, PATH_ERROR, JOINT_JUMP, DYNAMIC_TORQUE, DYNAMIC_USE, SPEED_USE, UNREACHED,
+    CLUMSINESS,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 
@@ -305,7 +355,8 @@ CLEARANCES: tuple[Objective, ...] = (
 )  # fmt: skip
 OF_CLEARANCE = (COLLISION, CLOSENESS, *CLEARANCES)
 OF_THE_WAY = (*OF_CLEARANCE, PEAK_TORQUE, TORQUE_USE)  # a target's share is the worst of it and of the moves there
-OF_MOVES = (*OF_THE_WAY, PATH_ERROR, JOINT_JUMP)
+OF_TIME = (DYNAMIC_TORQUE, DYNAMIC_USE, SPEED_USE)
+OF_MOVES = (*OF_THE_WAY, PATH_ERROR, JOINT_JUMP, *OF_TIME)
 MANIPULABILITY = Objective(
     name="manipulability",
     label="Manipulability",

@@ -16,6 +16,7 @@ from armwright.objectives import (
     OF_CLEARANCE,
     OF_MOVES,
     OF_ORIENTATION,
+    OF_TIME,
     ORIENTATION_ERROR,
     PAPER_OBJECTIVES,
     UNREACHED,
@@ -95,6 +96,11 @@ class Problem:
     def heeds_moves(self) -> bool:
         """Whether it counts what the arm does on its moves."""
         return any(map(self.counts, OF_MOVES))
+
+    @property
+    def heeds_time(self) -> bool:
+        """Whether it counts how fast the moves are."""
+        return any(map(self.counts, OF_TIME))
 
     @property
     def heeds_workspace(self) -> bool:

@@ -26,7 +26,7 @@ from pydantic import (
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.goals import Goals, plain_goals
-from armwright.moves import MOVE_STEP, Moves, check_moves
+from armwright.moves import MOVE_STEP, Moves, check_moves, check_times
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
 from armwright.targets import LARGEST_COORDINATE, Point, Target, goals_of, read_target
 from armwright.workspace import MOST_POINTS, MOST_REGIONS, Region
@@ -49,6 +49,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
     moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
     move_step: from one sample of such a line to the next, at most [m].
+    move_time: of every move, or of each, from rest to rest [s]; without it they are not timed.
     workspace: boxes that the tip should cover; where targets are left out, these are the boxes' corners.
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two, and where a target
         says which way the tool points, orientation_error.
@@ -62,6 +63,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     restarts: int = Field(default=0, ge=0, le=MOST_RESTARTS)
     moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
     move_step: Annotated[float, Field(gt=0.0, le=LARGEST_COORDINATE)] = MOVE_STEP
+    move_time: float | tuple[float, ...] | None = None
     workspace: tuple[Region, ...] = ()
     objectives: tuple[str, ...] | None = None
     constraints: tuple[str, ...] = ()
@@ -155,6 +157,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if self.moves == IN_ORDER and len(self.targets) < 2:
             raise ValueError(f"moves: {IN_ORDER} needs two targets or more")
         check_moves([(start + 1, end + 1) for start, end in self.lines.pairs], self.targets, self.move_step)
+        if self.move_time is not None:
+            check_times(self.move_time, len(self.lines))
         if sum(region.points for region in self.workspace) > MOST_POINTS:
             raise ValueError(f"workspace has more than {MOST_POINTS} points together")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
@@ -194,8 +198,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def lines(self) -> Moves:
         """The straight moves, with targets counted from 0."""
         if self.moves == IN_ORDER:
-            return Moves(tuple((i, i + 1) for i in range(len(self.targets) - 1)), self.move_step)
-        return Moves(tuple((start - 1, end - 1) for start, end in self.moves), self.move_step)
+            pairs = tuple((i, i + 1) for i in range(len(self.targets) - 1))
+        else:
+            pairs = tuple((start - 1, end - 1) for start, end in self.moves)
+        times = () if self.move_time is None else self.move_time
+        return Moves(pairs, self.move_step, times if isinstance(times, tuple) else (times,) * len(pairs))
 
 
 def builtin_names() -> list[str]:
@@ -321,14 +328,15 @@ targets:
 # in path_error, joint_jump, peak_torque, torque_use, collision and closeness.
 # moves: in_order    # or [[1, 2], [2, 1]]
 # move_step: 0.02    # m between two samples of a line
+# move_time: 1.5     # s from rest to rest, for each move or a list; counts in dynamic_torque, dynamic_use, speed_use
 
 # A box that the tip should cover, in metres, or a list of boxes; it counts with the objective unreached. Where targets
 # are left out, they are its corners.
 # workspace: {{low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 200}}
 
 # What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length, collision, closeness, orientation_error, worst_angle, path_error, joint_jump, unreached,
-# clumsiness.
+# rms_torque, mass, length, collision, closeness, orientation_error, worst_angle, path_error, joint_jump,
+# dynamic_torque, unreached, clumsiness.
 # objectives: [worst_error, peak_torque, mass]
 
 # What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number

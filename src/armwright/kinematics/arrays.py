@@ -36,14 +36,63 @@ class Actuation:
     """What moves the joints of N arms of up to D joints.
 
     effort: (N, D) the torque that may be asked of each actuator [N m]; infinite where there is no joint to move.
+    speed: (N, D) its largest [rad/s]; NaN where not known, infinite where there is no joint to move.
     price: (N,) of all together [USD]; NaN where one has none.
     """
 
     effort: Array
+    speed: Array
     price: Array
 
     def __getitem__(self, rows: slice) -> "Actuation":
-        return Actuation(self.effort[rows], self.price[rows])
+        return Actuation(self.effort[rows], self.speed[rows], self.price[rows])
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What the links of N arms of up to D joints are made of, in float64 whatever the precision of the arms.
+
+    A link is a solid cylinder, which carries a point mass at its end (`armwright.arm.Link`).
+    """
+
+    mass: Array  # (N, D) of the cylinder [kg]
+    com: Array  # (N, D, 3) of the cylinder, from its joint [m]
+    offset: Array  # (N, D, 3) along the cylinder, from its joint to the next or to the end of the last link [m]
+    radius: Array  # (N, D) [m]
+    end_mass: Array  # (N, D) [kg]
+    end_place: Array  # (N, D, 3) from its joint [m]
+
+    @property
+    def total_mass(self) -> Array:
+        """(N, D) of both [kg]."""
+        return self.mass + self.end_mass
+
+    @property
+    def total_com(self) -> Array:
+        """(N, D, 3) of both, from the joint [m]."""
+        total = self.total_mass[..., None]
+        both = self.mass[..., None] * self.com + self.end_mass[..., None] * self.end_place
+        return both / np.where(total > 0.0, total, 1.0)
+
+    @property
+    def inertia(self) -> Array:
+        """(N, D, 3, 3) of both about their centre, in the link's frame [kg m²]; as the exported files have it."""
+        square = (self.offset**2).sum(axis=-1)
+        long = np.sqrt(square)[..., None]
+        axis = np.where(long > 0.0, self.offset / np.where(long > 0.0, long, 1.0), (0.0, 0.0, 1.0))
+        around = axis[..., :, None] * axis[..., None, :]
+        across_it = (self.mass * (3.0 * self.radius**2 + square) / 12.0)[..., None, None]
+        around_it = (self.mass * self.radius**2 / 2.0)[..., None, None]
+        tensor = across_it * (np.eye(3) - around) + around_it * around
+        centre = self.total_com
+        for mass, place in ((self.mass, self.com), (self.end_mass, self.end_place)):
+            away = place - centre
+            squared = (away**2).sum(axis=-1)[..., None, None] * np.eye(3)
+            tensor += mass[..., None, None] * (squared - away[..., :, None] * away[..., None, :])
+        return tensor
+
+    def __getitem__(self, rows: slice) -> "Bodies":
+        return Bodies(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
 @dataclass(frozen=True)
@@ -68,6 +117,7 @@ class ArmArrays:
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 where it turns [m/rad]
     length: Array  # (N,) of all links [m]
     base_mass: Array  # (N,) of what stands with the base [kg]
+    bodies: Bodies  # what only dynamics asks for
     actuation: Actuation | None = None  # where all moving joints have actuators
 
     def __len__(self) -> int:
@@ -117,6 +167,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     lower *= -1.0
     mass, radius = np.zeros((2, n, dof))
     offset, com = np.zeros((2, n, dof, 3))
+    bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,))))
     for i, arm in enumerate(arms):
         own = slice(len(arm.joints))
         motion[i, own] = [_motion(joint) for joint in arm.joints]
@@ -128,6 +179,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         com[i, own] = [link.total_com for link in arm.links]
         mass[i, own] = [link.total_mass for link in arm.links]
         radius[i, own] = [link.radius if link.length > 0.0 else 0.0 for link in arm.links]
+        for part in fields(Bodies):
+            getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
     return ArmArrays(
         base=np.array([arm.base for arm in arms], dtype=precision),
         motion=motion,
@@ -144,6 +197,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         travel=travel,
         length=np.array([arm.length for arm in arms]),
         base_mass=np.array([arm.base_mass for arm in arms]),
+        bodies=bodies,
         actuation=_actuation(arms, dof),
     )
 
@@ -164,7 +218,8 @@ def _check(arm: Arm) -> None:
 
 def _actuation(arms: Sequence[Arm], dof: int) -> Actuation | None:
     """None where a moving joint has no actuator."""
-    efforts, prices = np.full((len(arms), dof), np.inf), np.zeros(len(arms))
+    efforts, speeds = np.full((2, len(arms), dof), np.inf)
+    prices = np.zeros(len(arms))
     for i, arm in enumerate(arms):
         for j, joint in enumerate(arm.joints):
             if joint.kind == "fixed":
@@ -172,8 +227,9 @@ def _actuation(arms: Sequence[Arm], dof: int) -> Actuation | None:
             if joint.actuator is None:
                 return None
             efforts[i, j] = joint.actuator.effort
+            speeds[i, j] = np.nan if joint.actuator.speed is None else joint.actuator.speed
             prices[i] += np.nan if joint.actuator.price is None else joint.actuator.price
-    return Actuation(efforts, prices)
+    return Actuation(efforts, speeds, prices)
 
 
 def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32") -> ArmArrays:
@@ -202,17 +258,18 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
     carried, actuation = rails, None
     if space.actuators:
         chosen = read.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
-        efforts, masses, prices = _catalogue(space)
+        efforts, speeds, masses, prices = _catalogue(space)
         carried = rails + moving * masses[chosen]
         price = np.where(moving > 0, moving * prices[chosen], 0.0).sum(axis=1)
-        actuation = Actuation(np.where(plan < FIXED, efforts[chosen][..., None], np.inf), price)
+        effort, speed = (np.where(plan < FIXED, each[chosen][..., None], np.inf) for each in (efforts, speeds))
+        actuation = Actuation(effort, speed, price)
     ends = np.concatenate([carried[:, 1:], np.zeros((n, 1))], axis=1)  # a link carries what the next module begins with
     total = mass + ends
     direction = _direction(space, read)  # (N, M, 3)
-    centre = direction * middle[..., None]
+    middles = direction * middle[..., None]
     end_place = direction * links[..., None] + _shift(space, read, plan, rails, carried)
-    both = (mass[..., None] * centre + ends[..., None] * end_place) / np.where(total > 0.0, total, 1.0)[..., None]
-    centre = np.where(ends[..., None] > 0.0, both, centre)
+    both = (mass[..., None] * middles + ends[..., None] * end_place) / np.where(total > 0.0, total, 1.0)[..., None]
+    centre = np.where(ends[..., None] > 0.0, both, middles)
     shape = plan.shape
     offset, com, masses_ = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
     offset[..., -1, :] = direction * links[..., None]
@@ -228,12 +285,15 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
         "travel": travel,
     }  # fmt: skip
     if actuation is not None:
-        flat["effort"] = actuation.effort
+        flat |= {"effort": actuation.effort, "speed": actuation.speed}
     places = shape[1] * shape[2]
     flat = {name: values.reshape(n, places, *values.shape[3:]) for name, values in flat.items()}
     there = there.reshape(n, places)
     n_joints = there.sum(axis=1).astype(np.int32)
     flat = _compact(flat, there)
+    along = direction * links[..., None]
+    thick = np.where(read.there, space.link_radius, 0.0)
+    bodies = _spread(Bodies(mass, middles, along, thick, ends, end_place), there, shape[2])
     tool = _tool(space, read)
     flat["offset"][np.arange(n), n_joints - 1] += tool
     return ArmArrays(
@@ -252,7 +312,8 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
         travel=flat["travel"],
         length=np.cumsum(links, axis=1)[:, -1],
         base_mass=carried[:, 0],
-        actuation=None if actuation is None else Actuation(flat["effort"], actuation.price),
+        bodies=bodies,
+        actuation=None if actuation is None else Actuation(flat["effort"], flat["speed"], actuation.price),
     )
 
 
@@ -376,12 +437,28 @@ def _compact(arrays: dict[str, Any], there: NDArray[np.bool_]) -> dict[str, Any]
     return {name: values[rows, order] for name, values in arrays.items()}
 
 
+def _spread(modules: Bodies, there: NDArray[np.bool_], places: int) -> Bodies:
+    """Of joints, from bodies of modules (N, M): each follows the last of its module's places."""
+    if places == 1:
+        spread = {field.name: getattr(modules, field.name) for field in fields(Bodies)}
+    else:
+        spread: dict[str, Any] = {}
+        for field in fields(Bodies):
+            values = getattr(modules, field.name)
+            n, m, *size = values.shape
+            spread[field.name] = np.zeros((n, m, places, *size))
+            spread[field.name][:, :, -1] = values
+            spread[field.name] = spread[field.name].reshape(n, m * places, *size)
+    return Bodies(**_compact(spread, there))
+
+
 @cache
-def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array]:
-    """Effort [N m], mass [kg] and price [USD] of each of a space's actuators."""
+def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array, Array]:
+    """Effort [N m], speed [rad/s], mass [kg] and price [USD] of each of a space's actuators."""
     actuators = space.arm_actuators
     return (
         np.array([actuator.effort for actuator in actuators]),
+        np.array([np.nan if actuator.speed is None else actuator.speed for actuator in actuators]),
         np.array([actuator.mass for actuator in actuators]),
         np.array([np.nan if actuator.price is None else actuator.price for actuator in actuators]),
     )

@@ -43,7 +43,31 @@ def frames_of(arms: ArmArrays, q: Array) -> Frames:
 
 def jacobians(arms: ArmArrays, q: Array) -> Array:
     """(N, K, 3, D): how the tip moves with each joint [m/rad] or [m/m]; q: (N, K, D)."""
-    frames = frames_of(arms, q)
-    slides = (arms.motion >= SLIDES)[:, None, :, None]
+    return jacobian_of(arms, frames_of(arms, q))
+
+
+def jacobian_of(arms: ArmArrays, frames: Frames) -> Array:
+    """The same of postures whose frames are known."""
     turning = np.cross(frames.axis, frames.tip[:, :, None] - frames.place)
-    return np.where(slides, frames.axis, turning).swapaxes(-1, -2)
+    return np.where(_slides(arms), frames.axis, turning).swapaxes(-1, -2)
+
+
+def jacobian_rate(arms: ArmArrays, frames: Frames, velocity: Array) -> Array:
+    """(N, K, 3, D) how the Jacobian changes while joints move at `velocity` (N, K, D)."""
+    slides = _slides(arms)
+    along = frames.axis * velocity[..., None]
+    turning = np.cumsum(np.where(slides, 0.0, along), axis=2)  # (N, K, D, 3) of each link
+    spin = np.zeros(turning.shape)  # of the link that each joint stands on
+    spin[:, :, 1:] = turning[:, :, :-1]
+    arm = frames.tip[:, :, None] - frames.place
+    share = np.where(slides, along, np.cross(along, arm))  # of each joint in the tip's velocity
+    # The tip's velocity against a joint's place comes of the spin of its own link, and of the joints after it.
+    after = np.cumsum(share[:, :, ::-1], axis=2)[:, :, ::-1] - share
+    moving = np.cross(turning, arm) + after
+    turned = np.cross(spin, frames.axis)
+    return np.where(slides, turned, np.cross(turned, arm) + np.cross(frames.axis, moving)).swapaxes(-1, -2)
+
+
+def _slides(arms: ArmArrays) -> Array:
+    """(N, 1, D, 1)"""
+    return (arms.motion >= SLIDES)[:, None, :, None]

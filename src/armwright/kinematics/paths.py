@@ -40,10 +40,18 @@ class Paths:
 
         at_targets: (N, T).  along: (N, S) of the samples.
         """
-        worst = at_targets.copy()
-        for (_, end), first, beyond in zip(self.moves.pairs, self.lines.first, self.lines.first[1:], strict=False):
-            worst[:, end] = np.maximum(worst[:, end], along[:, first:beyond].max(axis=1))
-        return worst
+        return largest_of(self.moves, self.lines.first, at_targets, along)
+
+
+def largest_of(moves: Moves, first: NDArray[np.intp], at_targets: Array, along: Array) -> Array:
+    """(N, T) the larger of what is at a target and of what is along the moves that end there.
+
+    first: (M + 1,) where each move begins in `along` (N, ...), and last its end.  at_targets: (N, T).
+    """
+    worst = at_targets.copy()
+    for (_, end), begin, beyond in zip(moves.pairs, first, first[1:], strict=False):
+        worst[:, end] = np.maximum(worst[:, end], along[:, begin:beyond].max(axis=1))
+    return worst
 
 
 def follow(arms: ArmArrays, q: Array, targets: Array, payload: Array, moves: Moves, device: Device = "cpu") -> Paths:

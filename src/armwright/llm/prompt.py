@@ -66,6 +66,7 @@ VARIABLES = {
     "oriented": "whether any target asks for an axis or an orientation of the tool",
     "restarts": "further starts of the inverse kinematics at each target",
     "moves": "the straight lines that the tip goes along, as text; empty where none counts in an objective",
+    "move_times": "how long the moves take, as text; empty where that counts in no objective",
     "workspace": "boxes that the tip should cover, each as text; none where they count in no objective",
     "of_the_way": "the objectives of which a target's share is the worst of it and of the moves that end there",
     "updates_of_step": "updates of the inverse kinematics from one sample of a move to the next",
@@ -286,6 +287,7 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "oriented": problem.task.goals.oriented,
         "restarts": problem.task.restarts,
         "moves": _move_words(problem.task) if problem.heeds_moves else "",
+        "move_times": _time_words(problem.task) if problem.heeds_time else "",
         "workspace": [region.words() for region in problem.task.workspace] if problem.heeds_workspace else [],
         "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.counts(quantity)],
         "updates_of_step": UPDATES_OF_STEP,
@@ -342,6 +344,18 @@ def _move_words(task: Task) -> str:
     listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in shown)
     more = "" if len(shown) == len(pairs) else f" (some of {len(pairs)})"
     return f"between the targets of these numbers, counted from 1: {listed}{more}" if pairs else ""
+
+
+def _time_words(task: Task) -> str:
+    """How long the moves take; empty where that is not said."""
+    times = task.lines.times
+    if not times:
+        return ""
+    if len(set(times)) == 1:
+        return f"{times[0]:g} s"
+    shown = spread(len(times), MOST_TARGETS)
+    more = "" if len(shown) == len(times) else f" (some of {len(times)})"
+    return f"{', '.join(f'{times[i]:g}' for i in shown)} s, in the order of the moves{more}"
 
 
 def _shown(
