@@ -19,7 +19,7 @@ from armwright.space import paper_space
 from armwright.task import load_task
 
 N, ROUNDS = 1000, 5
-TASK = load_task("target-1").model_copy(update={"moves": "in_order", "reference_point": None})
+TASK = load_task("target-1").model_copy(update={"moves": "in_order", "move_time": 1.5, "reference_point": None})
 SPACE = paper_space(6)
 
 
@@ -37,6 +37,7 @@ def main() -> None:
         "position error and torque": ["position_error", "torque"],
         "and path error": ["position_error", "torque", "path_error"],
         "and collision": ["position_error", "torque", "path_error", "collision"],
+        "and dynamic torque": ["position_error", "torque", "path_error", "dynamic_torque"],
     }
     problems = {words: Problem(TASK, SPACE, objectives=named_objectives(some)) for words, some in names.items()}
     work: dict[str, Callable[[], object]] = {

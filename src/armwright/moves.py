@@ -125,13 +125,13 @@ def moments(share: Array) -> tuple[Array, Array]:
     return 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
-def check_times(times: float | Sequence[float], moves: int) -> None:
+def check_times(times: float | tuple[float, ...], moves: int) -> None:
     """ValueError where moves cannot take these times [s]; one is for every move."""
     if not moves:
         raise ValueError("move_time is of moves, and there are none; give some: moves: in_order")
-    if not isinstance(times, float) and len(times) != moves:
+    if isinstance(times, tuple) and len(times) != moves:
         raise ValueError(f"move_time has {len(times)} values for {moves} moves; give one or all")
-    for time in [times] if isinstance(times, float) else times:
+    for time in times if isinstance(times, tuple) else (times,):
         if not 0.0 < time <= LONGEST_TIME:
             raise ValueError(f"move_time = {time:g} s is outside 0 < move_time <= {LONGEST_TIME:g} s")
 

@@ -126,7 +126,7 @@ def _least(jacobian: Array, line: Array) -> tuple[Array, Array, Array]:
     square = jacobian @ jacobian.swapaxes(-1, -2)
     size = np.trace(square, axis1=-2, axis2=-1)
     damping = np.where(size > 0.0, DAMPING**2 * size, 1.0)  # an arm that cannot move at all does not
-    inverse = np.linalg.inv(square + damping[..., None, None] * np.eye(3))
+    inverse: Array = np.linalg.inv(square + damping[..., None, None] * np.eye(3))
     weight = _turned(inverse, line)
     return _turned(jacobian.swapaxes(-1, -2), weight), weight, inverse
 

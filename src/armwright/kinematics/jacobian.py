@@ -68,6 +68,6 @@ def jacobian_rate(arms: ArmArrays, frames: Frames, velocity: Array) -> Array:
     return np.where(slides, turned, np.cross(turned, arm) + np.cross(frames.axis, moving)).swapaxes(-1, -2)
 
 
-def _slides(arms: ArmArrays) -> Array:
+def _slides(arms: ArmArrays) -> NDArray[np.bool_]:
     """(N, 1, D, 1)"""
     return (arms.motion >= SLIDES)[:, None, :, None]
