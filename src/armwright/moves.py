@@ -91,23 +91,23 @@ def timing_of(moves: Moves, lines: Lines) -> Timing:
     """When the tip is where, if each line is run from rest to rest by the fifth-order profile of `moments`."""
     sample: list[NDArray[np.intp]] = []
     beyond: list[Array] = []
-    speed: list[Array] = []
-    acceleration: list[Array] = []
-    for first, end, time in zip(lines.first, lines.first[1:], moves.times, strict=False):
+    shares: list[Array] = []
+    for first, end in zip(lines.first, lines.first[1:], strict=False):
         steps = int(end - first) - 1
         parts = math.ceil(FEWEST_PARTS / steps)
         number = np.arange(steps * parts + 1)
-        rate, change = moments(number / (steps * parts))
+        shares.append(number / (steps * parts))
         sample.append(first + number // parts)
         beyond.append(number % parts / parts)
-        speed.append(rate / time)
-        acceleration.append(change / time**2)
+    counts = [len(share) for share in shares]
+    rate, change = moments(np.concatenate(shares))
+    time = np.repeat(np.array(moves.times), counts)
     return Timing(
-        first=np.concatenate([[0], np.cumsum([len(number) for number in sample])]),
+        first=np.concatenate([[0], np.cumsum(counts)]),
         sample=np.concatenate(sample),
         beyond=np.concatenate(beyond),
-        speed=np.concatenate(speed),
-        acceleration=np.concatenate(acceleration),
+        speed=rate / time,
+        acceleration=change / time**2,
     )
 
 

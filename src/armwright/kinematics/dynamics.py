@@ -8,6 +8,7 @@ where gravity, drag and push are of the samples, whatever the time that a move t
 """
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,8 @@ from armwright.moves import Moves, Timing, timing_of
 
 Array = NDArray[np.float64]
 
-DAMPING = 0.005  # of the norm of J, docs/method.md §17
+DAMPING = 0.005  # of an arm's size, docs/method.md §17
+AT_ONCE = 2**12  # postures, whose arrays stay in a core's cache
 
 
 def inverse_dynamics(
@@ -92,14 +94,28 @@ class Drives:
 def driven(arms: ArmArrays, paths: Paths) -> Drives:
     """The arms along their moves, each in its time."""
     timing = timing_of(paths.moves, paths.lines)
-    frames = frames_of(arms, paths.q)
     starts, ends = (paths.lines.points[places] for places in (paths.lines.first[:-1], paths.lines.first[1:] - 1))
-    way, bend = _course(arms, paths.q, frames, (ends - starts)[paths.lines.move])
+    line = (ends - starts)[paths.lines.move]
+    torques, speeds = np.empty((2, len(arms), len(timing.sample), arms.dof))
+    size = max(1, AT_ONCE // len(paths.lines))
+    for first in range(0, len(arms), size):
+        some = slice(first, first + size)
+        torques[some], speeds[some] = _driven(arms[some], paths, some, line, timing)
+    return Drives(paths.moves, timing, torques, speeds)
+
+
+def _driven(arms: ArmArrays, paths: Paths, rows: slice, line: Array, timing: Timing) -> tuple[Array, Array]:
+    """(N, F, D) torques and speeds of the arms in these rows of the paths; line: (S, 3) [m]."""
+    q = paths.q[rows]
+    frames = frames_of(arms, q)
+    way, bend = _course(arms, q, frames, line)
     push = _newton_euler(arms, frames, np.zeros(way.shape), way, paths.payload, 0.0)
     drag = _newton_euler(arms, frames, way, bend, paths.payload, 0.0)
     speed, faster = timing.speed[:, None], timing.acceleration[:, None]
-    torques = timing.between(paths.joint_torques) + timing.between(drag) * speed**2 + timing.between(push) * faster
-    return Drives(paths.moves, timing, torques, timing.between(way) * speed)
+    torques = (
+        timing.between(paths.joint_torques[rows]) + timing.between(drag) * speed**2 + timing.between(push) * faster
+    )
+    return torques, timing.between(way) * speed
 
 
 def _course(arms: ArmArrays, q: Array, frames: Frames, line: Array) -> tuple[Array, Array]:
@@ -107,26 +123,31 @@ def _course(arms: ArmArrays, q: Array, frames: Frames, line: Array) -> tuple[Arr
 
     line: (S, 3) from its start to its end [m].  A joint at a limit that it would be driven beyond stays there.
     """
-    jacobian = jacobian_of(arms, frames)
-    way = _least(jacobian, line)[0]
+    jacobian, damping = jacobian_of(arms, frames), _damping(arms)
+    way = _least(jacobian, line, damping)[0]
     stuck = ((q >= arms.upper[:, None]) & (way > 0.0)) | ((q <= arms.lower[:, None]) & (way < 0.0))
     free = np.where(stuck, 0.0, 1.0)[..., None, :]
     jacobian = jacobian * free
-    way, weight, inverse = _least(jacobian, line)
+    way, weight, inverse = _least(jacobian, line, damping)
     rate = jacobian_rate(arms, frames, way) * free
-    # q_s = Jᵀ y with A y = line, A = J Jᵀ + damping; so q_ss = J_sᵀ y + Jᵀ y_s with A y_s = -A_s y. The damping is
-    # taken as constant, so that where there is none to speak of this is exact.
+    # q_s = Jᵀ y with A y = line, A = J Jᵀ + damping; so q_ss = J_sᵀ y + Jᵀ y_s with A y_s = -A_s y
     pulled = _turned(rate.swapaxes(-1, -2), weight)  # J_sᵀ y
     change = _turned(rate, way) + _turned(jacobian, pulled)
     return way, pulled - _turned(jacobian.swapaxes(-1, -2), _turned(inverse, change))
 
 
-def _least(jacobian: Array, line: Array) -> tuple[Array, Array, Array]:
+def _damping(arms: ArmArrays) -> Array:
+    """(N,) what is added to the diagonal of J Jᵀ [m²], by an arm's size: it turns links, and slides by metres."""
+    long = arms.length + np.linalg.norm(arms.tool, axis=1)
+    slides = ((arms.motion >= SLIDES) & (arms.motion < FIXED)).any(axis=1)
+    size = np.hypot(long, slides)
+    return (DAMPING * np.where(size > 0.0, size, 1.0)) ** 2  # one without size does not move its tip at all
+
+
+def _least(jacobian: Array, line: Array, damping: Array) -> tuple[Array, Array, Array]:
     """Of the smallest change of joints that moves the tip so: itself (N, S, D), y (N, S, 3), A⁻¹ (N, S, 3, 3)."""
     square = jacobian @ jacobian.swapaxes(-1, -2)
-    size = np.trace(square, axis1=-2, axis2=-1)
-    damping = np.where(size > 0.0, DAMPING**2 * size, 1.0)  # an arm that cannot move at all does not
-    inverse: Array = np.linalg.inv(square + damping[..., None, None] * np.eye(3))
+    inverse = cast("Array", np.linalg.inv(square + damping[:, None, None, None] * np.eye(3)))
     weight = _turned(inverse, line)
     return _turned(jacobian.swapaxes(-1, -2), weight), weight, inverse
 
