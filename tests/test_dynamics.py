@@ -252,6 +252,24 @@ def test_a_slow_move_takes_what_gravity_takes_and_twice_the_speed_four_times_the
     assert np.all(dynamic(faster) > still), "of arms that move at all, some joint is driven at full weight"
 
 
+def test_one_arm_is_as_one_of_many() -> None:
+    space = paper_space(4)
+    arms = [space.arm(design) for design in space.sample(300, 0)]
+    many = timed(arms, 1.0, 0.4).drives
+    for i in (0, 137, 299):
+        one = timed(arms[i : i + 1], 1.0, 0.4).drives
+        assert np.array_equal(one.torques[0], many.torques[i])
+        assert np.array_equal(one.speeds[0], many.speeds[i])
+
+
+def test_arms_that_cannot_move_need_no_more_than_to_be_held() -> None:
+    stiff = Arm((0.1, 0.0, 0.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.0, 0.0), 1.0, 0.01),))
+    spinning = Arm((0.0, 0.0, 0.0), (Joint("revolute", "z", -2.0, 2.0),), (uniform_link((0.0, 0.0, 0.3), 1.0, 0.01),))
+    drives = timed([stiff, spinning], 1.0, 1.0).drives
+    assert not drives.torques.any()
+    assert not drives.speeds.any()
+
+
 def test_each_move_has_its_own_time() -> None:
     arms = any_arms(10, 10)
     one, two, mixed = timed(arms, 1.0, 1.0), timed(arms, 0.3, 0.3), timed(arms, 1.0, 0.3)
