@@ -297,8 +297,8 @@ DYNAMIC_TORQUE = Objective(
     label="Dynamic torque",
     unit="N m",
     symbol="E_dynamic",
-    words="the largest of the motors' torques' absolute values [N m] that move the arm, from rest to rest in the time "
-    "given, along the straight moves that end at the target, gravity and inertia included; 0 where none does",
+    words="the largest absolute torque of any motor along the timed moves that end at the target, gravity and inertia "
+    "included",
     each=_dynamic_torque,
     over="max",
 )
@@ -307,8 +307,7 @@ DYNAMIC_USE = Objective(
     label="Dynamic use",
     unit="of allowed",
     symbol="E_dynuse",
-    words="the largest share of its actuator's torque that any joint needs to move the arm, from rest to rest in the "
-    "time given, along the straight moves that end at the target; above 1 it cannot; 0 where none does",
+    words="the largest share of any actuator's torque along the timed moves that end at the target; above 1 it cannot",
     each=_dynamic_use,
     over="max",
 )
@@ -317,8 +316,8 @@ SPEED_USE = Objective(
     label="Speed use",
     unit="of allowed",
     symbol="E_speed",
-    words="the largest share of its actuator's no-load speed that any joint needs along the straight moves that end at "
-    "the target, from rest to rest in the time given; above 1 it cannot; 0 where none does",
+    words="the largest share of any actuator's no-load speed along the timed moves that end at the target; above 1 it "
+    "cannot",
     each=_speed_use,
     over="max",
 )

@@ -49,7 +49,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
     moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
     move_step: from one sample of such a line to the next, at most [m].
-    move_time: of every move, or of each, from rest to rest [s]; without it they are not timed.
+    move_time: of every move, or of each, from rest to rest [s].
     workspace: boxes that the tip should cover; where targets are left out, these are the boxes' corners.
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two, and where a target
         says which way the tool points, orientation_error.
@@ -328,7 +328,7 @@ targets:
 # in path_error, joint_jump, peak_torque, torque_use, collision and closeness.
 # moves: in_order    # or [[1, 2], [2, 1]]
 # move_step: 0.02    # m between two samples of a line
-# move_time: 1.5     # s from rest to rest, for each move or a list; counts in dynamic_torque, dynamic_use, speed_use
+# move_time: 1.5     # s, or a list with a value for each; for dynamic_torque, dynamic_use and speed_use
 
 # A box that the tip should cover, in metres, or a list of boxes; it counts with the objective unreached. Where targets
 # are left out, they are its corners.
