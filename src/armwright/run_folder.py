@@ -46,7 +46,7 @@ BEFORE_TRIALS = {
 }  # fmt: skip
 # Of a task; its words may change.
 IDENTITY = (
-    "name", "targets", "payload", "restarts", "obstacles", "moves", "move_step", "workspace", "constraints",
+    "name", "targets", "payload", "payload_factors", "jitter", "restarts", "obstacles", "moves", "move_step", "workspace", "constraints",
     "reference_point",
 )  # fmt: skip
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")

@@ -33,7 +33,17 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
     if any(record.name not in OBJECTIVES for record in config.objectives) or config.tolerance not in (0.0, TOLERANCE):
         return ""
     builtin = load_task(name) if name in builtin_names() or name.startswith("random-") else None
-    as_told = ("entries", "payload", "restarts", "obstacles", "moves", "move_step", "workspace")
+    as_told = (
+        "entries",
+        "payload",
+        "payload_factors",
+        "jitter",
+        "restarts",
+        "obstacles",
+        "moves",
+        "move_step",
+        "workspace",
+    )
     as_told += ("constraints", "objectives", "reference_point")
     alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in as_told)
     words = [name if alike else OWN_TASK]
