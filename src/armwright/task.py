@@ -190,8 +190,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @property
     def is_plain(self) -> bool:
-        """Whether the targets are points and nothing else, from one start."""
-        return not self._records and self.restarts == 0
+        """Whether the targets are points and nothing else, from one start, in one case."""
+        return not self._records and self.restarts == 0 and len(self.cases) == 1
 
     @property
     def cases(self) -> list[tuple[np.ndarray, np.ndarray]]:
