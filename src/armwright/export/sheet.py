@@ -97,7 +97,7 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         lines += ["", f"The tool reaches ({shift}) mm from the end of the last link to the tip."]
     if arm.tool_axis != (0.0, 0.0, 1.0):
         up = ", ".join(f"{value:g}" for value in arm.tool_axis)
-        lines += ["", f"The arm is mounted so that what is said of z points along ({up}) in the world."]
+        lines += ["", f"Axes are the world's, with all joints at 0; the mounted arm's own z then points along ({up})."]
     motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
     if motors:
         prices = [motor.price for motor in motors]
