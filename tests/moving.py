@@ -32,7 +32,7 @@ def solve_postures(arrays: ArmArrays, targets: np.ndarray, *args: Any, start: An
     assert not np.delete(found.q, own, axis=-1).any()
     assert not np.delete(found.torque, own, axis=-1).any()
     q, torque = (np.ascontiguousarray(values[..., own]) for values in (found.q, found.torque))
-    return Postures(q, found.reached, torque)
+    return Postures(q, found.reached, torque, found.angle)
 
 
 def update_once(

@@ -26,7 +26,10 @@ def values(problem: Problem, designs: list[Design], updates: int = 3) -> np.ndar
     points = problem.task.points
     solved = solve_postures(arms, points, updates, precision="float64")
     error = np.linalg.norm(solved.reached - points, axis=-1)
-    evaluation = Evaluation(arms, points, problem.task.payloads, solved.q, solved.reached, error, solved.torque)
+    angle, goals = np.zeros_like(error), problem.task.goals
+    evaluation = Evaluation(
+        arms, points, problem.task.payloads, solved.q, solved.reached, error, angle, solved.torque, goals
+    )
     return problem.values(evaluation)
 
 

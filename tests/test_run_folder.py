@@ -61,6 +61,7 @@ def test_config_repeats_the_run(run: Run) -> None:
         "n_total": 8,
         "in_flight": None,
         "polish_every": None,
+        "start": [],
     }
     assert config["seed"] == 0
     assert {"armwright", "optuna", "warp-lang", "python"} <= set(config["versions"])
@@ -82,6 +83,7 @@ def test_summary(run: Run) -> None:
         "front_size",
         "verification",
         "evaluations",
+        "same_arms",
         "polish",
         "credit",
         "proposer",

@@ -132,9 +132,21 @@ class Problem:
 
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
+        return self._of_case(arms, *self.task.cases[0], start)
+
+    def _of_case(self, arms: ArmArrays, points: Array, payloads: Array, start: Array | None = None) -> Evaluation:
         task = self.task
-        known = (task.payloads, task.obstacles, task.goals, task.lines, task.workspace)
-        return evaluate_arrays(arms, task.points, self.device, start, *known)
+        known = (payloads, task.obstacles, task.goals, task.lines, task.workspace)
+        return evaluate_arrays(arms, points, self.device, start, *known)
+
+    def _judged_rows(self, rows: Array) -> Array:
+        """(n, M + C) of designs as rows: the worst, in each by itself, of the cases that the task may come to."""
+        worst, others = self.judged(self.evaluation_of_rows(rows)), self.task.cases[1:]
+        arms = arrays_of(self.space, rows) if others else None
+        for case in others:
+            assert arms is not None
+            worst = np.maximum(worst, self.judged(self._of_case(arms, *case)))
+        return worst
 
     def evaluate_matrix(self, matrix: Array) -> Array:
         """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""
@@ -150,10 +162,10 @@ class Problem:
         found = np.empty((len(matrix), len(self.objectives) + len(self.constraints)))
         for first in range(0, len(matrix), size):
             rows = slice(first, first + size)
-            found[rows] = self.judged(self.evaluation_of_rows(matrix[rows]))
+            found[rows] = self._judged_rows(matrix[rows])
             if self.tolerance > 0.0:
                 for copies in moved(self.space, matrix[rows], self.tolerance):
-                    found[rows] = np.maximum(found[rows], self.judged(self.evaluation_of_rows(copies)))
+                    found[rows] = np.maximum(found[rows], self._judged_rows(copies))
         return self.split(found)
 
     def ranked_matrix(self, matrix: Array) -> Array:
@@ -196,12 +208,13 @@ class Problem:
     def judge(self, designs: Sequence[Design]) -> tuple[Array, Array]:
         """(N, M) and (N, C): the objectives of N designs, and how far they break each constraint, <= 0: not at all.
 
-        With a tolerance, the worst of each by itself.
+        With a tolerance, or other cases of the task, the worst of each by itself.
         """
-        found = self.judged(self.evaluation(designs))
+        rows = self.space.matrix(designs)
+        found = self._judged_rows(rows)
         if self.tolerance > 0.0:
-            for copies in moved(self.space, self.space.matrix(designs), self.tolerance):
-                found = np.maximum(found, self.judged(self.evaluation_of_rows(copies)))
+            for copies in moved(self.space, rows, self.tolerance):
+                found = np.maximum(found, self._judged_rows(copies))
         return self.split(found)
 
     def evaluate(self, designs: Sequence[Design]) -> Array:

@@ -32,6 +32,8 @@ from armwright.targets import LARGEST_COORDINATE, Point, Target, goals_of, read_
 from armwright.workspace import MOST_POINTS, MOST_REGIONS, Region
 
 LARGEST_PAYLOAD = 1e4  # [kg]
+MOST_TIMES_PAYLOAD = 100.0
+LARGEST_JITTER = 1.0  # [m]
 MOST_TARGETS = 10_000
 MOST_RESTARTS = 100
 IN_ORDER = "in_order"  # of moves: from each target to the next
@@ -45,6 +47,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     targets: points; where records are given that say more (`Target`), that is in `goals` and `entries`.
     payload: what the tip carries at all targets, or at each [kg].
+    payload_factors: the payload may also be so many times as heavy; the worst case counts, in each objective.
+    jitter: the targets may also be off by so much along x, y or z, all together; likewise [m].
     restarts: further starts of the inverse kinematics at each target, of which the best posture counts.
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
     moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
@@ -59,6 +63,10 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
+    payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MOST_TIMES_PAYLOAD)], ...] = Field(
+        default=(), max_length=10
+    )
+    jitter: float = Field(default=0.0, ge=0.0, le=LARGEST_JITTER)
     obstacles: tuple[Obstacle, ...] = ()
     restarts: int = Field(default=0, ge=0, le=MOST_RESTARTS)
     moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
@@ -186,8 +194,15 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @property
     def is_plain(self) -> bool:
-        """Whether the targets are points and nothing else, from one start."""
-        return not self._records and self.restarts == 0
+        """Whether the targets are points and nothing else, from one start, in one case."""
+        return not self._records and self.restarts == 0 and len(self.cases) == 1
+
+    @property
+    def cases(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """(T, 3) points [m] and (T,) payloads [kg]: as the task stands, then each by itself that it may come to."""
+        shifts = [sign * self.jitter * axis for axis in np.eye(3) for sign in (-1.0, 1.0)] if self.jitter > 0.0 else []
+        heavier = [(self.points, factor * self.payloads) for factor in self.payload_factors]
+        return [(self.points, self.payloads), *heavier, *((self.points + shift, self.payloads) for shift in shifts)]
 
     @property
     def payloads(self) -> np.ndarray:
@@ -316,6 +331,11 @@ targets:
 
 # What the tip carries: at every target, or a list with a value for each [kg].
 # payload: 0.5
+
+# The worst case counts, in each objective, of these payloads (0: empty-handed; 1.2: a fifth more), and of targets that
+# are all off by so many metres along x, y or z.
+# payload_factors: [0.0, 1.2]
+# jitter: 0.005
 
 # What the arm should keep away from, in metres; it counts with the objective collision or closeness.
 # obstacles:

@@ -84,6 +84,6 @@ def _judged(problem: Problem, rows: Array, start: Array | None = None) -> Array:
     """(N, M + C) in float64.  start: (T, D) angles [rad]; None for the straight start."""
     arrays = arrays_of(problem.space, rows, "float64")
     task = problem.task
-    known = (task.payloads, task.obstacles, task.goals, task.lines, task.workspace)
-    found = evaluate_arrays(arrays, task.points, "cpu", start, *known)
-    return problem.judged(found)
+    known = (task.obstacles, task.goals, task.lines, task.workspace)
+    found = [evaluate_arrays(arrays, points, "cpu", start, loads, *known) for points, loads in task.cases]
+    return np.max([problem.judged(case) for case in found], axis=0)

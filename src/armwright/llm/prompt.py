@@ -78,6 +78,7 @@ VARIABLES = {
     "objectives": "what is minimised, each with symbol, label, unit, words, over (sum, max, mean square or arm)",
     "constraints": "what a design has to keep, each with quantity (as an objective), relation, bound",
     "n_feasible": "how many of the evaluated designs keep all of these",
+    "cases": "what the task may come to beside what it says, as text; empty for nothing",
     "tolerance": "[m] by which base and links may be off, the worst case of which counts; 0: designs as they stand",
     "reference_point": "of the hypervolume; none as long as there is none",
     "n_finished": "how many designs have been evaluated",
@@ -296,6 +297,7 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "objectives": [_spoken(objective, problem.task) for objective in problem.objectives],
         "constraints": problem.constraints,
         "n_feasible": int(history.feasible.sum()),
+        "cases": case_words(problem.task),
         "tolerance": problem.tolerance,
         "reference_point": history.reference_point,
         "n_finished": len(history),
@@ -320,6 +322,14 @@ def _spoken(objective: Objective, task: Task) -> Objective:
     if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(goals.weight != 1.0):
         return replace(objective, words=f"{objective.words}, times the target's weight")
     return objective
+
+
+def case_words(task: Task) -> str:
+    """What the task may come to beside what it says; empty for nothing."""
+    factors = ", ".join(f"{factor:g}" for factor in task.payload_factors)
+    found = [f"of payloads {factors} times as heavy"] if factors else []
+    found += [f"of targets that are all {1e3 * task.jitter:g} mm off along x, y or z"] if task.jitter > 0.0 else []
+    return ", and ".join(found)
 
 
 def _payload_words(task: Task) -> str:

@@ -19,6 +19,10 @@ USUAL = {
     "sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200, "prompt": "plus", "memory": "none",
     "answer": "two-step", "proposals": 1, "output": "auto",
 }  # fmt: skip
+AS_TOLD = (  # of a task: what makes it another
+    "entries", "payload", "payload_factors", "jitter", "restarts", "obstacles", "moves", "move_step", "move_time", "workspace",
+    "constraints", "objectives", "reference_point",
+)  # fmt: skip
 
 
 def repeat_command(config: RunConfig, polished: bool = False, spent: int | None = None) -> str:
@@ -33,9 +37,7 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
     if any(record.name not in OBJECTIVES for record in config.objectives) or config.tolerance not in (0.0, TOLERANCE):
         return ""
     builtin = load_task(name) if name in builtin_names() or name.startswith("random-") else None
-    as_told = ("entries", "payload", "restarts", "obstacles", "moves", "move_step", "move_time", "workspace")
-    as_told += ("constraints", "objectives", "reference_point")
-    alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in as_told)
+    alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in AS_TOLD)
     words = [name if alike else OWN_TASK]
     said: dict[str, Any] = {}
     n_starts = 0
