@@ -20,8 +20,8 @@ USUAL = {
     "answer": "two-step", "proposals": 1, "output": "auto",
 }  # fmt: skip
 AS_TOLD = (  # of a task: what makes it another
-    "entries", "payload", "payload_factors", "jitter", "restarts", "obstacles", "moves", "move_step", "move_time", "workspace",
-    "constraints", "objectives", "reference_point",
+    "entries", "payload", "payload_factors", "jitter", "restarts", "obstacles", "moves", "move_step", "move_time",
+    "workspace", "constraints", "objectives", "reference_point",
 )  # fmt: skip
 
 
