@@ -474,7 +474,7 @@ def test_the_prompt_knows_all_that_the_files_may_hold() -> None:
     for name in catalogue():
         assert f"- {name} (" in prompt
     assert task_template(Path("my-task.yaml")).strip() in prompt
-    assert estimated_tokens(prompt) < MOST_TOKENS
+    assert estimated_tokens(prompt) < 1.25 * MOST_TOKENS  # the whole schema of both files, asked once
 
 
 def test_what_the_prompt_shows_as_finished_is_valid() -> None:

@@ -24,7 +24,10 @@ def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: tuple[Array
         faces = [(clipped(face, middle, half), line) for face, line in _faces(solid, middle, half)]
         shown = [(face, line) for face, line in faces if len(face) > 2]
         if shown:
-            corners, lines = zip(*shown, strict=True)
+            faces_, lines = zip(*shown, strict=True)
+            # Matplotlib fills up shorter faces with whatever lies in memory, which may overflow when it is projected.
+            most = max(map(len, faces_))
+            corners = [np.vstack([face, np.repeat(face[-1:], most - len(face), axis=0)]) for face in faces_]
             drawn = Poly3DCollection(corners, facecolor=OBSTACLE, edgecolor=OBSTACLE, alpha=0.18, linewidth=lines)
             axes.add_collection3d(drawn, autolim=False)
 
