@@ -230,6 +230,8 @@ def _postures(
 
 def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
     """n times (N, 1, D) postures to start from, each the same share of every joint's range for all arms."""
+    if n == 0:
+        return
     shares = np.random.default_rng(0).uniform(size=(n, MOST_JOINTS))[:, : arrays.dof]
     lower, upper = arrays.lower.astype(np.float64), arrays.upper.astype(np.float64)
     for share in shares:

@@ -173,7 +173,7 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters in their fixed order: origin, joint types, link lengths; tied ones, too."""
-        return tuple(column.parameter for column in _columns(self))
+        return _parameters(self)
 
     @property
     def is_settled(self) -> bool:
@@ -470,6 +470,11 @@ def _column(space: DesignSpace, name: str) -> _Column:
 @cache
 def _by_name(space: DesignSpace) -> dict[str, _Column]:
     return {column.parameter.name: column for column in _columns(space)}
+
+
+@cache
+def _parameters(space: DesignSpace) -> tuple[Parameter, ...]:
+    return tuple(column.parameter for column in _columns(space))
 
 
 @cache

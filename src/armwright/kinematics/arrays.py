@@ -391,6 +391,8 @@ def _single(value: Any) -> float:
 def _mounted(read: _Reader, plan: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
     """(N, M, K) the world's axis of each joint, and 1 where it points the same way as the module's own, else -1."""
     own = plan % SLIDES
+    if not read.mount.any():
+        return own, np.ones(own.shape)
     return _MOUNTED[read.mount[:, None, None], own], _SIGNS[read.mount[:, None, None], own]
 
 
@@ -420,6 +422,8 @@ def _tool(space: DesignSpace, read: _Reader) -> Array:
 
 def _turned(vectors: Array, mount: NDArray[np.intp]) -> Array:
     """(N, M, 3) vectors in the base's own axes, in the world's."""
+    if not mount.any():  # all stand on a floor
+        return np.array(vectors)
     turned = np.zeros(vectors.shape)
     for axis in range(3):
         world, sign = _MOUNTED[mount, axis], _SIGNS[mount, axis]
