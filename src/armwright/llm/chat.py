@@ -341,6 +341,9 @@ def _text(response: ModelResponse) -> str:
 
 def _cost(response: ModelResponse, place: _Place | None) -> float | None:
     """[USD], where the price of the model is known."""
+    name: Any = response.model_name  # as the server says it, which may be anything
+    if name is not None and not isinstance(name, str):
+        return None
     try:
         if place is not None:  # else a model would have its price by its name alone, wherever it runs
             calc_price(Usage(), model_ref=response.model_name or place.name, provider_api_url=place.address)
