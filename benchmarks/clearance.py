@@ -6,12 +6,10 @@ are measured in turn, as the speed of a shared machine drifts.
     python benchmarks/clearance.py
 """
 
-import os
 import statistics
-import subprocess
-import sys
-import time
 from collections.abc import Callable
+
+from one_core import on_one_core, print_rates, rates_in_turn, seconds
 
 from armwright.evaluation import evaluate_arrays
 from armwright.kinematics.arrays import arrays_of
@@ -33,14 +31,6 @@ SPACE = paper_space(6)
 
 
 def main() -> None:
-    if "--one-core" not in sys.argv:
-        # In a process of its own, which never had more threads than that.
-        subprocess.run(
-            [sys.executable, __file__, "--one-core"],
-            check=True,
-            preexec_fn=lambda: os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1]),
-        )
-        return
     matrix = SPACE.matrix(SPACE.sample(N, seed=0))
     arms = arrays_of(SPACE, matrix)
     q = evaluate_arrays(arms, TASK.points).q
@@ -52,24 +42,14 @@ def main() -> None:
         "clearance alone": lambda: clearances(arms, q, OBSTACLES),
         "of itself alone": lambda: clearances(arms, q),
     }
-    for do in work.values():
-        do()  # compiles and loads
-    rounds = [{name: N / seconds(do) for name, do in work.items()} for _ in range(ROUNDS)]
+    rates = rates_in_turn(work, N, ROUNDS)
     print(f"Clearance: designs/s on one core, D = 6, 8 targets, 3 obstacles; median of {ROUNDS} (least, most)")
-    for name in work:
-        found = [one[name] for one in rounds]
-        print(f"  {name:26s} {statistics.median(found):10.0f}   ({min(found):.0f}, {max(found):.0f})")
-    share = [one["and collision"] / one["position error and torque"] for one in rounds]
+    print_rates(rates)
+    share = [a / b for a, b in zip(rates["and collision"], rates["position error and torque"], strict=True)]
     print(f"  with collision, of without {statistics.median(share):10.2f}   ({min(share):.2f}, {max(share):.2f})")
     alone = min(seconds(lambda: clearances(arms[:1], q[:1], OBSTACLES)) for _ in range(50))
     print(f"  clearance of one design    {1e3 * alone:10.2f} ms")
 
 
-def seconds(do: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    do()
-    return time.perf_counter() - started
-
-
 if __name__ == "__main__":
-    main()
+    on_one_core(__file__, main)

@@ -6,12 +6,9 @@ sides are measured in turn, as the speed of a shared machine drifts.
     python benchmarks/moves.py
 """
 
-import os
-import statistics
-import subprocess
-import sys
-import time
 from collections.abc import Callable
+
+from one_core import on_one_core, print_rates, rates_in_turn, seconds
 
 from armwright.objectives import named_objectives
 from armwright.problem import Problem
@@ -24,14 +21,6 @@ SPACE = paper_space(6)
 
 
 def main() -> None:
-    if "--one-core" not in sys.argv:
-        # In a process of its own, which never had more threads than that.
-        subprocess.run(
-            [sys.executable, __file__, "--one-core"],
-            check=True,
-            preexec_fn=lambda: os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1]),
-        )
-        return
     matrix = SPACE.matrix(SPACE.sample(N, seed=0))
     names = {
         "position error and torque": ["position_error", "torque"],
@@ -43,26 +32,16 @@ def main() -> None:
     work: dict[str, Callable[[], object]] = {
         words: lambda problem=problem: problem.evaluate_matrix(matrix) for words, problem in problems.items()
     }
-    for do in work.values():
-        do()  # compiles and loads
-    rounds = [{name: N / seconds(do) for name, do in work.items()} for _ in range(ROUNDS)]
+    rates = rates_in_turn(work, N, ROUNDS)
     samples = sum(n + 1 for n in TASK.lines.steps(TASK.points))
     print(
         f"Moves: designs/s on one core, D = 6, 8 targets, 7 moves, {samples} samples; median of {ROUNDS} (least, most)"
     )
-    for name in work:
-        found = [one[name] for one in rounds]
-        print(f"  {name:26s} {statistics.median(found):10.0f}   ({min(found):.0f}, {max(found):.0f})")
+    print_rates(rates)
     design = matrix[:1]
     alone = min(seconds(lambda: problems["and path error"].evaluate_matrix(design)) for _ in range(20))
     print(f"  a single design, with path error {1e3 * alone:10.2f} ms")
 
 
-def seconds(do: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    do()
-    return time.perf_counter() - started
-
-
 if __name__ == "__main__":
-    main()
+    on_one_core(__file__, main)

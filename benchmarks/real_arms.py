@@ -6,11 +6,7 @@ each joint; position, orientation, collision and torque use are asked. Beside it
     python benchmarks/real_arms.py
 """
 
-import os
-import statistics
-import subprocess
-import sys
-import time
+from one_core import on_one_core, print_rates, rates_in_turn
 
 from armwright.problem import Problem
 from armwright.space import DesignSpace
@@ -41,33 +37,16 @@ SPACE = DesignSpace.model_validate(
 
 
 def main() -> None:
-    if "--one-core" not in sys.argv:
-        # In a process of its own, which never had more threads than that.
-        subprocess.run(
-            [sys.executable, __file__, "--one-core"],
-            check=True,
-            preexec_fn=lambda: os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1]),
-        )
-        return
     matrix = SPACE.matrix(SPACE.sample(N, seed=0))
     problems = {
         "the paper's objectives, points alone": Problem(load_task("target-1"), SPACE),
         "axes, capsules, obstacles and motors": Problem(REAL, SPACE),
     }
-    for problem in problems.values():
-        problem.evaluate_matrix(matrix)  # compiles and loads
-    rounds = [{name: N / seconds(problem, matrix) for name, problem in problems.items()} for _ in range(ROUNDS)]
+    work = {name: lambda problem=problem: problem.evaluate_matrix(matrix) for name, problem in problems.items()}
+    rates = rates_in_turn(work, N, ROUNDS)
     print(f"Designs/s on one core, D = 6, 8 targets; median of {ROUNDS} (least, most)")
-    for name in problems:
-        found = [one[name] for one in rounds]
-        print(f"  {name:40} {statistics.median(found):8,.0f}  ({min(found):,.0f}, {max(found):,.0f})")
-
-
-def seconds(problem: Problem, matrix: object) -> float:
-    start = time.perf_counter()
-    problem.evaluate_matrix(matrix)  # type: ignore[arg-type]
-    return time.perf_counter() - start
+    print_rates(rates)
 
 
 if __name__ == "__main__":
-    main()
+    on_one_core(__file__, main)

@@ -6,8 +6,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from armwright.symmetry import centre, distance_to_planes, symmetry_planes
-from armwright.task import load_task, random_task
+from armwright.symmetry import centre, distance_to_planes, is_mirrored, symmetry_planes
+from armwright.task import builtin_names, load_task, random_task
 
 EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 MILLIMETRES = st.integers(-1000, 1000).map(lambda mm: mm / 1000)
@@ -134,3 +134,12 @@ def test_many_points() -> None:
     steps = np.arange(9) * 0.05
     grid = np.stack(np.meshgrid(steps, steps, 2 * steps), axis=-1).reshape(-1, 3)
     assert len(symmetry_planes(grid)) == 5
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_a_plane_that_is_asked_for_is_one_that_is_found(name: str) -> None:
+    points = load_task(name).points
+    planes = symmetry_planes(points)
+    for normal in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.5**0.5, -(0.5**0.5), 0.0)):
+        found = any(abs(abs(plane @ np.array(normal)) - 1.0) < 1e-9 for plane in planes)
+        assert is_mirrored(points, np.array(normal)) == found

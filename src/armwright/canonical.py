@@ -19,7 +19,7 @@ import numpy as np
 from armwright.masses import MassPerLink
 from armwright.parameters import Design
 from armwright.problem import Problem
-from armwright.symmetry import centre, symmetry_planes
+from armwright.symmetry import centre, is_mirrored
 from armwright.task import Task
 
 DIGITS = 9  # decimals [m], [rad] to which designs are compared
@@ -65,7 +65,7 @@ class SameArms:
             and low == -high
             and space.mount == ("floor",)
             and not any(space.tool[:2])
-            and is_plain(problem.task)
+            and _has_points_alone(problem.task)
         )
 
     def _parts(self, design: Design) -> list[Part]:
@@ -93,19 +93,18 @@ class SameArms:
     def _mirrors(self) -> list[Callable[[Place, Sequence[Part]], tuple[Place, list[Part]]]]:
         """What leaves the task as it is: nothing, mirrors, and one after the other."""
         points, payloads = self._problem.task.points, self._problem.task.payloads
-        # A fourth coordinate would do for payloads; unequal ones are rare, and then only the design itself counts.
-        planes = symmetry_planes(points) if np.ptp(payloads) == 0.0 else np.empty((0, 3))
         middle = centre(points)
         found = [_mirror("", middle)]
+        if np.ptp(payloads) > 0.0:  # rare, and a mirror may exchange them
+            return found
         for swaps, normal in UPRIGHT.items():
-            unit = np.array(normal) / np.linalg.norm(normal)
-            if any(np.allclose(np.abs(plane @ unit), 1.0, atol=1e-9) for plane in planes):
+            if is_mirrored(points, np.array(normal) / np.linalg.norm(normal)):
                 mirror = _mirror(swaps, middle)
                 found += [_then(other, mirror) for other in found]
         return found
 
 
-def is_plain(task: Task) -> bool:
+def _has_points_alone(task: Task) -> bool:
     """Whether a task has points to reach and nothing else: no obstacles, and whatever else may tell arms apart."""
     plain = Task(name=task.name, targets=tuple(map(tuple, task.points.tolist())))
     usual, own = (value.model_dump(exclude=TOLD) for value in (plain, task))

@@ -177,6 +177,7 @@ def optimize(
 
     words = view.stderr_console() if json_ else view.stdout_console()
     problem = _problem(task, space, robust, device, objectives=objectives)
+    starts = [read_design(file, problem.space) for file in start or ()]
     wishes = Wishes(
         proposer, model, base_url, prompt, memory, answer, proposals, temperature, model_seed, output, origin,
         max_calls, max_cost, replay_strict, once,
@@ -201,7 +202,7 @@ def optimize(
                 n_total=n_total,
                 in_flight=(1 if in_flight is None else in_flight) if overlap else None,
                 polish_every=polish_every,
-                start=[read_design(file, problem.space) for file in start or ()],
+                start=starts,
                 on_model_failure=on_model_failure,
                 verify=verify,
                 seed=seed,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
 
-from armwright.arm import Actuator, Arm, Joint, Vector, uniform_link
+from armwright.arm import Actuator, Arm, Joint, Link, Vector, uniform_link
 from armwright.catalogue import ActuatorRecord, TorqueKind, resolved
 from armwright.documents import check_document, parse_document, read_document
 from armwright.exceptions import DesignError, SpaceError, did_you_mean
@@ -169,6 +169,11 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         slides = any(MODULES[letter].slides for letter in self.joint_types)
         stroke = self.stroke if isinstance(self.stroke, (int, float)) else self.stroke[1]
         return self.most_joints * (self.link[1] + (stroke if slides else 0.0)) + math.hypot(*self.tool)
+
+    @property
+    def least_stroke(self) -> float:
+        """Of sliding joints; where it is not searched, of them all [m]."""
+        return self.stroke if isinstance(self.stroke, (int, float)) else self.stroke[0]
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -377,7 +382,7 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     def stroke_of(self, design: Design, number: int) -> float:
         """How far the sliding joint of module `number` (counted from 1) goes [m]."""
-        return float(design.params.get(f"stroke_{number}", _single(self.stroke)))
+        return float(design.params.get(f"stroke_{number}", self.least_stroke))
 
     def _joint(self, design: Design, number: int, place: int, mount: Mount) -> Joint:
         """One of a module's joints."""
@@ -396,7 +401,7 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             lower, upper = 0.0 - upper, 0.0 - lower  # no -0.0
         return Joint(kind, axis, lower, upper, self._motor(design, number), self.travel if kind == "prismatic" else 1.0)
 
-    def _link(self, design: Design, number: int, mount: Mount) -> Any:
+    def _link(self, design: Design, number: int, mount: Mount) -> Link:
         length = float(design.params[f"link_{number}"])
         direction = cast("Direction", design.params.get(f"direction_{number}", self.link_directions[0]))
         x, y, z = mounted_vector(DIRECTIONS[direction], mount)
@@ -457,10 +462,6 @@ def load_space(name_or_path: str | Path) -> DesignSpace:
             "spaces, too"
         )
     return read_document(path, DesignSpace, SpaceError)
-
-
-def _single(value: float | Range) -> float:
-    return value if isinstance(value, (int, float)) else value[0]
 
 
 def _column(space: DesignSpace, name: str) -> _Column:
@@ -554,7 +555,7 @@ def _check_ranges(space: DesignSpace) -> None:
             raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} goes beyond ±{LARGEST_LENGTH:g}")
     if space.link[0] <= 0.0:
         raise ValueError(f"link = [{space.link[0]:g}, {space.link[1]:g}] m: a link must be longer than 0 m")
-    shortest = _single(space.stroke)
+    shortest = space.least_stroke
     if not LEAST_STROKE <= shortest <= LARGEST_LENGTH:
         raise ValueError(f"stroke = {shortest:g} m is outside {LEAST_STROKE:g} <= stroke <= {LARGEST_LENGTH:g} m")
     if max(abs(value) for value in space.tool) > LARGEST_LENGTH:

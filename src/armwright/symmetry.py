@@ -26,6 +26,12 @@ def symmetry_planes(points: Array) -> Array:
     return found
 
 
+def is_mirrored(points: Array, normal: Array) -> bool:
+    """Whether the plane with this unit normal (3,) through the centre mirrors `points` (T, 3) [m] onto themselves."""
+    offsets = _offsets(points)
+    return _partners(offsets, _mirrored(offsets, normal), TOLERANCE) is not None
+
+
 def centre(points: Array) -> Array:
     """(3,) the mean of the different points of `points` (T, 3) [m]."""
     return np.unique(points, axis=0).mean(axis=0)

@@ -254,7 +254,7 @@ def arrays_of(space: DesignSpace, matrix: Array, precision: Precision = "float32
     mass = np.where(read.there, space.mass.masses(links), 0.0)
     middle = links / 2
     moving = (plan < FIXED).sum(axis=2)  # (N, M) joints of a module that need an actuator
-    rails = np.where(slides[..., -1], space.mass.masses(read.reals("stroke", _single(space.stroke))), 0.0)
+    rails = np.where(slides[..., -1], space.mass.masses(read.reals("stroke", space.least_stroke)), 0.0)
     carried, actuation = rails, None
     if space.actuators:
         chosen = read.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
@@ -378,14 +378,10 @@ def _ranges(space: DesignSpace, read: _Reader, plan: NDArray[np.intp]) -> tuple[
         lower = -upper
     else:
         lower, upper = np.full((1, 1, 1), low), np.full((1, 1, 1), high)
-    stroke = read.reals("stroke", _single(space.stroke))[..., None]
+    stroke = read.reals("stroke", space.least_stroke)[..., None]
     lower = np.where(plan < SLIDES, lower, np.where(plan < FIXED, 0.0, -1.0))
     upper = np.where(plan < SLIDES, upper, np.where(plan < FIXED, stroke, 1.0))
     return lower, upper
-
-
-def _single(value: Any) -> float:
-    return value if isinstance(value, (int, float)) else value[0]
 
 
 def _mounted(read: _Reader, plan: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
@@ -407,7 +403,7 @@ def _shift(space: DesignSpace, read: _Reader, plan: NDArray[np.intp], rails: Arr
     if not rails.any():
         return 0.0
     ways = np.where(rails > 0.0, rails / np.where(carried > 0.0, carried, 1.0), 0.0) * (
-        read.reals("stroke", _single(space.stroke)) / 2
+        read.reals("stroke", space.least_stroke) / 2
     )
     local = np.eye(3)[plan[..., -1] % SLIDES] * ways[..., None]
     shifts = np.zeros_like(local)
