@@ -298,10 +298,8 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
         console.print(f"  constraints: {', '.join(task.constraints)}")
     if task.payloads.any():
         console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
-    if task.payload_factors:
-        console.print(f"  worst of payloads times {', '.join(f'{factor:g}' for factor in task.payload_factors)}, too")
-    if task.jitter > 0.0:
-        console.print(f"  worst of targets off by {1e3 * task.jitter:g} mm, too")
+    if task.case_words:
+        console.print(f"  the worst counts of this, {task.case_words}")
     for obstacle in task.obstacles:
         console.print(f"  obstacle: {obstacle.words()}")
     if task.lines:

@@ -205,6 +205,14 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return [(self.points, self.payloads), *heavier, *((self.points + shift, self.payloads) for shift in shifts)]
 
     @property
+    def case_words(self) -> str:
+        """What the task may come to beside what it says; empty for nothing."""
+        factors = ", ".join(f"{factor:g}" for factor in self.payload_factors)
+        found = [f"of payloads {factors} times as heavy"] if factors else []
+        found += [f"of targets that are all {1e3 * self.jitter:g} mm off along x, y or z"] if self.jitter > 0.0 else []
+        return ", and ".join(found)
+
+    @property
     def payloads(self) -> np.ndarray:
         """What the tip carries at each target, (T,) [kg]."""
         return np.broadcast_to(np.array(self.payload, dtype=np.float64), (len(self.targets),)).copy()

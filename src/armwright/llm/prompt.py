@@ -297,7 +297,7 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "objectives": [_spoken(objective, problem.task) for objective in problem.objectives],
         "constraints": problem.constraints,
         "n_feasible": int(history.feasible.sum()),
-        "cases": case_words(problem.task),
+        "cases": problem.task.case_words,
         "tolerance": problem.tolerance,
         "reference_point": history.reference_point,
         "n_finished": len(history),
@@ -322,14 +322,6 @@ def _spoken(objective: Objective, task: Task) -> Objective:
     if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(goals.weight != 1.0):
         return replace(objective, words=f"{objective.words}, times the target's weight")
     return objective
-
-
-def case_words(task: Task) -> str:
-    """What the task may come to beside what it says; empty for nothing."""
-    factors = ", ".join(f"{factor:g}" for factor in task.payload_factors)
-    found = [f"of payloads {factors} times as heavy"] if factors else []
-    found += [f"of targets that are all {1e3 * task.jitter:g} mm off along x, y or z"] if task.jitter > 0.0 else []
-    return ", and ".join(found)
 
 
 def _payload_words(task: Task) -> str:

@@ -214,6 +214,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
+        "cases": task.case_words,
         "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
         "goals": _goals(task.goals),
         "workspace": [{"low": list(r.low), "high": list(r.high), "words": r.words()} for r in task.workspace],

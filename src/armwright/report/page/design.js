@@ -91,7 +91,8 @@ export function drawDesign() {
   const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.words).join("; ")}.` : "";
   const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.words).join("; ")}.` : "";
   const lines = head.moves.length ? ` Straight moves between targets: ${head.moves.map(([a, b]) => `${a + 1} to ${b + 1}`).join(", ")}.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${loads} ${head.masses}.${solids}${lines}${boxes}`;
+  const cases = head.cases ? ` Objectives are the worst of the task as it stands, ${head.cases}; all else is of the task as it stands.` : "";
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${solids}${lines}${boxes}`;
 }
 
 // What the design has where it is bounded.
