@@ -210,6 +210,8 @@ class Study:
             meant = isinstance(end, (KeyboardInterrupt, StoppedError))
             self._channel.say("stopped", len(self.trials), None if meant else str(end) or type(end).__name__)
             raise
+        finally:
+            self._judging.close()
         self._channel.finish(len(self.trials))
         return run
 
@@ -223,12 +225,13 @@ class Study:
             self._judging = self._with_workers(self.workers, self.config.workers)
         with closing(self._turns()) as turns:
             for number in range(first, self.n_trials):
+                if number < len(self.trials) or number in self._under_way:
+                    continue  # it was begun in an earlier session
                 while not self._may_begin(number):
                     self._hear()
                     self._record_ready(turns)
-                if number not in self._under_way:
-                    self._obey(number)
-                    self._begin_trial(number, turns)
+                self._obey(number)
+                self._begin_trial(number, turns)
             while self._n_waited_for:
                 self._hear()
                 if self._n_waited_for:
