@@ -160,6 +160,8 @@ class Study:
         self._first_of: dict[Hashable, int] = {}  # the first trial of each arm
         for trial in self.trials:
             self._first_of.setdefault(self._same_arms.key(trial.design), trial.number)
+        self._faults = Counter(trial.fault for trial in self.trials if trial.fault)
+        self._refined = sum(trial.refines is not None for trial in self.trials)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
         for row in self._history().counted:
             self._tracker.add(row)
@@ -286,11 +288,18 @@ class Study:
             )
         if self.folder is not None:
             self.folder.append(finished)
-        self.trials.append(finished)
-        if finished.is_feasible:
-            self._tracker.add(values)
+        self._count(finished)
         self._freeze_reference_point()
         self._report("finished", number, source, turns, finished.fault, "" if turn is None else turn.note)
+
+    def _count(self, trial: FinishedTrial) -> None:
+        """Takes a new trial into all that is kept of them, so that the next one costs no more after many."""
+        self.trials.append(trial)
+        if trial.is_feasible:
+            self._tracker.add(trial.values)
+        if trial.fault:
+            self._faults[trial.fault] += 1
+        self._refined += trial.refines is not None
 
     def _judged(self, design: Design) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Values and constraints of a design."""
@@ -307,7 +316,7 @@ class Study:
         if every is None:
             return None
         due = (number - self.method.n_init) // every
-        if sum(trial.refines is not None for trial in self.trials) >= due:
+        if self._refined >= due:
             return None
         history = self._history()
         return refine_one(history, self.config.seed) if history.front else None  # else nothing is feasible yet
@@ -360,7 +369,7 @@ class Study:
                 source=source,
                 under_way=0 if turns is None else turns.under_way,
                 fault=fault,
-                faults=Counter(trial.fault for trial in self.trials if trial.fault),
+                faults=self._faults.copy(),
                 note=note,
             )
         )
