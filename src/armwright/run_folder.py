@@ -250,7 +250,8 @@ class RunFolder:
         trials, intact = _read_trials(path, space, n_objectives, n_constraints)
         try:
             self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
-            self._trials.truncate(intact)
+            if intact < self._trials.tell():  # else the file keeps its time
+                self._trials.truncate(intact)
         except OSError as fault:
             raise _write_error(path, fault) from fault
         return trials

@@ -162,6 +162,7 @@ class Study:
             self._first_of.setdefault(self._same_arms.key(trial.design), trial.number)
         self._faults = Counter(trial.fault for trial in self.trials if trial.fault)
         self._refined = sum(trial.refines is not None for trial in self.trials)
+        self._latest = History(problem, (), self.method.n_init, config.reference_point)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
         for row in self._history().counted:
             self._tracker.add(row)
@@ -336,7 +337,9 @@ class Study:
         return *self.black_box.draw(number, source), source
 
     def _history(self) -> History:
-        return History(self.problem, tuple(self.trials), self.method.n_init, self.config.reference_point)
+        """Grown from the one before, so that a proposer's question costs no more after many trials."""
+        self._latest = self._latest.grown(tuple(self.trials), self.config.reference_point)
+        return self._latest
 
     def _freeze_reference_point(self) -> None:
         """Writes a reference point that the task left open into config.yaml as soon as it is known."""
