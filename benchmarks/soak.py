@@ -143,7 +143,8 @@ def main() -> None:
     parser.add_argument("--part", nargs=3, metavar=("PART", "N", "FOLDER"), help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.part:
-        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[os.getpid() % len(cores)]})
         (name, kind), n, folder = given.part[0].split("-"), int(given.part[1]), Path(given.part[2])
         parts: dict[str, Callable[[], list[Look]]] = {
             "study": lambda: study(kind, n, folder),
