@@ -13,8 +13,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
 
-from armwright.exceptions import ArmwrightError, FailureError, MissingExtraError
+from armwright.exceptions import ArmwrightError, FailureError
 from armwright.experiment.plan import Cell
+from armwright.extras import needed
 from armwright.front import find_front
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem import Problem
@@ -193,12 +194,8 @@ def run_on_dask(cells: Sequence[Cell], address: str) -> Iterator[Outcome]:
 
     Dask gives the cells of a worker that died to another one, which goes on from the last finished trial.
     """
-    try:
+    with needed("distributed", "--scheduler"):
         from distributed import Client, as_completed
-    except ImportError as fault:
-        raise MissingExtraError(
-            '--scheduler needs the extra armwright[distributed]: pip install "armwright[distributed]"'
-        ) from fault
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as fault:
