@@ -54,7 +54,6 @@ NEEDS = (
     ("live", "optimize", "target-1", "--live", "--out", "other"),
     ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
     ("llm", "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--out", "other"),
-    ("llm", "front", "target-1", "--proposer", "llm", "--out", "other"),
     ("llm", "experiment", "paper", "--model", "openai-chat:gpt-4o", "--out", "other"),
     ("llm", "draft", "reach a shelf", "--model", "openai-chat:gpt-4o"),
     ("llm", "doctor", "--model", "openai-chat:gpt-4o", "--call"),

@@ -38,7 +38,7 @@ def check_extra(extra: str, subject: str) -> None:
     """MissingExtraError where a package of the extra is not installed; `subject` needs them all."""
     missing = missing_packages(extra)
     if missing:
-        raise MissingExtraError(f"{subject} needs {' and '.join(missing)}: {command(extra)}")
+        raise _missing(extra, subject, missing)
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def needed(extra: str, subject: str) -> Generator[None]:
     try:
         yield
     except ModuleNotFoundError as fault:
-        raise MissingExtraError(f"{subject} needs {fault.name}: {command(extra)}") from fault
+        raise _missing(extra, subject, missing_packages(extra) or [str(fault.name)]) from fault
     except ImportError as fault:  # another version
         words = " ".join(str(fault).split())
         raise MissingExtraError(f"{subject} needs another {fault.name} ({words}): {command(extra)}") from fault
@@ -56,3 +56,7 @@ def needed(extra: str, subject: str) -> Generator[None]:
 def command(extra: str) -> str:
     """What installs an extra."""
     return f'pip install "armwright[{extra}]"'
+
+
+def _missing(extra: str, subject: str, packages: list[str]) -> MissingExtraError:
+    return MissingExtraError(f"{subject} needs {' and '.join(packages)}: {command(extra)}")

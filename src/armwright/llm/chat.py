@@ -22,7 +22,7 @@ from armwright.llm.answer import without_words_around
 from armwright.llm.secrets import WithoutKeys, redacted, without_keys
 from armwright.llm.speaker import CHECK, MOST_REQUESTS, CallError, Interrupted, Question, Reader, Reply, Speaker
 
-with needed("llm", "language models"):
+with needed("llm", "a language model"):
     from genai_prices import Usage, calc_price
     from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
