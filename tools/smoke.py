@@ -39,7 +39,7 @@ if __name__ == "__main__":
         lambda: aw.LlmProposer("openai-chat:gpt-4o"),
         lambda: aw.draft("reach a shelf", model="openai-chat:gpt-4o"),
         lambda: aw.optimize(problem, sampler="gp"),
-        lambda: aw.read_urdf("ur5e"),
+        lambda: aw.compare_arms("target-1", ["ur5e"]),
     ):
         try:
             ask()
@@ -56,7 +56,6 @@ NEEDS = (
     ("llm", "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--out", "other"),
     ("llm", "experiment", "paper", "--model", "openai-chat:gpt-4o", "--out", "other"),
     ("llm", "draft", "reach a shelf", "--model", "openai-chat:gpt-4o"),
-    ("llm", "doctor", "--model", "openai-chat:gpt-4o", "--call"),
     ("distributed", "experiment", "two-methods.yaml", "--seeds", "3", "--scheduler", "tcp://127.0.0.1:9"),
     ("gp", "optimize", "target-1", "--sampler", "gp", "--out", "other"),
     ("gp", "experiment", "gp.yaml"),
@@ -124,6 +123,7 @@ def main(folder: Path) -> None:
     armwright("compare-arms", "target-1", "arm.urdf", "--run", "run")
     health = armwright("doctor").stdout
     assert health.count("-- extra") == 5, health
+    assert 'pip install "armwright[llm]"' in armwright("doctor", "--model", "openai-chat:gpt-4o", code=1).stdout
 
     Path("gp.yaml").write_text(EXPERIMENT.replace("proposer: none", "proposer: none, sampler: gp"))
     for extra, *asked in NEEDS:

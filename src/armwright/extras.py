@@ -59,4 +59,6 @@ def command(extra: str) -> str:
 
 
 def _missing(extra: str, subject: str, packages: list[str]) -> MissingExtraError:
-    return MissingExtraError(f"{subject} needs {' and '.join(packages)}: {command(extra)}")
+    *others, last = packages
+    named = f"{', '.join(others)} and {last}" if others else last
+    return MissingExtraError(f"{subject} needs {named}: {command(extra)}")
