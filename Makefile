@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test check gp format bench clean
+.PHONY: demo test check gp format bench package clean
 
 demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
 	$(BIN)/armwright optimize target-1 --seed 0
@@ -26,6 +26,9 @@ format: .venv/.check
 
 bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes on two cores
 	$(BIN)/python benchmarks/bench.py
+
+package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare environments of PYTHON
+	$(BIN)/python tools/package.py $(PYTHON)
 
 .venv/.python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -50,6 +53,10 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 
 .venv/.gp: .venv/.run
 	$(PIP) --editable '.[gp,live,llm]'
+	@touch $@
+
+.venv/.package: .venv/.python
+	$(PIP) --group package
 	@touch $@
 
 clean:

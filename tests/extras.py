@@ -1,12 +1,10 @@
 """Marks for tests of what an extra brings: skipped, with the way out, where it is not installed."""
 
-from importlib.util import find_spec
-
 import pytest
 
-from armwright.sampling import GP_PACKAGES
+from armwright.extras import missing_packages
 
 NEEDS_GP = pytest.mark.skipif(
-    any(find_spec(package) is None for package in GP_PACKAGES),
+    bool(missing_packages("gp")),
     reason='the sampler gp is not tested without its packages: pip install "armwright[gp]", here `make gp`',
 )

@@ -7,7 +7,7 @@ import pytest
 from optuna.samplers import BaseSampler, NSGAIISampler, RandomSampler, TPESampler
 from optuna.trial import TrialState
 
-from armwright import sampling
+from armwright import extras
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError
 from armwright.history import BBO, RANDOM, FinishedTrial, History
 from armwright.parameters import Design
@@ -142,7 +142,7 @@ def test_each_factory_has_a_name_of_its_own_and_the_same_one_keeps_it() -> None:
 
 
 def test_gp_without_its_packages_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sampling, "find_spec", lambda package: None if package == "torch" else object())
+    monkeypatch.setattr(extras, "is_installed", lambda package: package != "torch")
     with pytest.raises(MissingExtraError, match=r'gp needs torch: pip install "armwright\[gp\]"'):
         optimize(PROBLEM, proposer="none", sampler="gp")
     optimize(PROBLEM, proposer="none", sampler="nsga2", n_init=1, n_total=1)

@@ -17,7 +17,7 @@ import optuna
 import pytest
 
 import armwright as aw
-from armwright.exceptions import EvaluatorError, RunConflictError, SettingsError, StorageError
+from armwright.exceptions import EvaluatorError, MissingExtraError, RunConflictError, SettingsError, StorageError
 from armwright.history import History
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.run_folder import read_config, read_run
@@ -232,6 +232,25 @@ def test_an_evaluator_that_fails_stops_the_search_and_its_trial_is_evaluated_aga
 def test_what_cannot_be_is_said(tmp_path: Path, ask: Callable[[Path], object], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         ask(tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("url", "fault", "words"),
+    [
+        (
+            "postgresql://nobody:secret@127.0.0.1:1/db",
+            StorageError,
+            "cannot use .*nobody@127.0.0.1:1/db: connection failed",
+        ),
+        ("oddbase://host/db", SettingsError, "oddbase"),
+        ("postgresql+asyncpg://host/db", MissingExtraError, r'pip install "armwright\[distributed\]"'),
+    ],
+)
+def test_a_database_that_cannot_be_used_is_said(tmp_path: Path, url: str, fault: type[Exception], words: str) -> None:
+    with pytest.raises(fault, match=words) as raised:
+        aw.optimize(PROBLEM, workers=aw.Workers(1, url), out=tmp_path / "run")
+    assert "secret" not in str(raised.value)
+    assert "\n" not in str(raised.value)
 
 
 def test_a_worker_says_what_is_wrong(tmp_path: Path) -> None:

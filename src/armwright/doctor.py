@@ -3,9 +3,10 @@
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.util import find_spec
+from importlib import metadata
 
 from armwright.exceptions import ArmwrightError, ModelError
+from armwright.extras import EXTRAS, command, is_installed, missing_packages
 from armwright.llm.configuration import configuration_path, configured_model
 from armwright.llm.speaker import CallError
 from armwright.run_folder import versions
@@ -38,6 +39,7 @@ def examine(model: str | None = None, base_url: str | None = None) -> Iterator[F
     """What is there, without sending anything anywhere. Values of keys are never shown."""
     yield Finding(OK, "versions", ", ".join(f"{name} {number}" for name, number in versions().items()))
     yield _kernels()
+    yield from map(_extra, EXTRAS)
     yield from _vendors()
     yield _configured(model, base_url)
 
@@ -72,10 +74,18 @@ def _kernels() -> Finding:
     return Finding(OK, "kernels", "compiled, and they run on the CPU")
 
 
+def _extra(extra: str) -> Finding:
+    missing = missing_packages(extra)
+    if missing:
+        return Finding(MISSING, f"extra {extra}", f"{', '.join(missing)} not installed: {command(extra)}")
+    found = (f"{name} {metadata.version(name)}" for name in EXTRAS[extra].values())
+    return Finding(OK, f"extra {extra}", ", ".join(found))
+
+
 def _vendors() -> Iterator[Finding]:
     for vendor, package, variables in VENDORS:
-        if not _installed(package):
-            yield Finding(MISSING, vendor, 'not installed: pip install "armwright[llm]"')
+        if not (is_installed(package) and is_installed("pydantic_ai")):
+            yield Finding(MISSING, vendor, f"not installed: {command('llm')}")
             continue
         found = {names: next(filter(os.environ.get, names.split(" or ")), None) for names in variables}
         unset = [names for names, name in found.items() if name is None]
@@ -107,10 +117,3 @@ def _configured(model: str | None, base_url: str | None) -> Finding:
     except ArmwrightError as fault:
         return Finding(WRONG, "model", f"{named}: {fault}")
     return Finding(OK, "model", f"{named}; --call tries it")
-
-
-def _installed(package: str) -> bool:
-    try:
-        return find_spec(package) is not None and find_spec("pydantic_ai") is not None
-    except ModuleNotFoundError:
-        return False

@@ -7,7 +7,8 @@
     │   ├── DesignError         parameter values that are not in their design space
     │   ├── ArmError            a chain that cannot exist, or that the kernels cannot compute yet
     │   ├── SettingsError       the settings of a run
-    │   └── RunConflictError    the run folder holds a run with other settings
+    │   ├── RunConflictError    the run folder holds a run with other settings
+    │   └── MissingExtraError   an optional dependency that is not installed
     ├── AnswerPendingError      a question waits for people (--proposer manual:DIR --once)   (exit code 0)
     ├── StoppedError            a study ended because its watcher asked for it      (exit code 130, as after Ctrl-C)
     └── FailureError            something broke on the way                  (exit code 1)
@@ -16,8 +17,7 @@
         ├── ReplayError         a recorded run that cannot be played again, or not to the letter
         ├── ProposalError       a proposer gave no design; the trial becomes a black-box one
         ├── EvaluatorError      an evaluator of one's own failed, or the workers that run it
-        ├── StorageError        the database that workers share does not answer, or holds no such study
-        └── MissingExtraError   an optional dependency that is not installed
+        └── StorageError        the database that workers share does not answer, or holds no such study
 
 A message is one line in the user's words: it names the value with its unit, what is allowed, and the
 way out.
@@ -62,6 +62,10 @@ class SettingsError(UsageError):
 
 class RunConflictError(UsageError):
     """The run folder holds a run with other settings."""
+
+
+class MissingExtraError(UsageError):
+    """An optional dependency that is not installed."""
 
 
 class FailureError(ArmwrightError):
@@ -134,10 +138,6 @@ class StoppedError(ArmwrightError):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(f"stopped as asked; every finished trial is in {folder}/, and the same command goes on")
-
-
-class MissingExtraError(FailureError):
-    """An optional dependency that is not installed."""
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

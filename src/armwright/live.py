@@ -38,7 +38,8 @@ from armwright.control import (
     resume_study,
     stop_study,
 )
-from armwright.exceptions import ArmwrightError, FailureError, MissingExtraError, SettingsError
+from armwright.exceptions import ArmwrightError, FailureError, SettingsError
+from armwright.extras import check_extra
 from armwright.files import writable
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
 from armwright.report.content import RunContent, design_files
@@ -373,15 +374,9 @@ def serve(
     tell: called with the page's address when it can be opened. port: 0 for any that is free.
     study: a pipe that ends with the process of the study; then the server ends, too, as soon as no page looks on.
     """
-    try:
-        import starlette
-        import uvicorn
+    check_extra("live", "the live page")
+    import uvicorn
 
-        assert starlette
-    except ImportError as fault:
-        raise MissingExtraError(
-            'the live page needs the extra armwright[live]: pip install "armwright[live]"'
-        ) from fault
     listener = _listen(host, port)
     port = listener.getsockname()[1]
     pages = Pages()
@@ -451,6 +446,7 @@ def begin_server(folder: Path) -> str:
 
     It outlives the study as long as a page looks on, and its crash is no matter to the study.
     """
+    check_extra("live", "the live page")
     # Nothing of the folder that the user stands in is taken for a module (-P).
     command = [sys.executable, "-P", "-m", "armwright", "live", str(folder.absolute()), "--follow"]
     # A session of its own: Ctrl-C ends the study, and the page still shows what it came to.

@@ -9,7 +9,6 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from importlib.util import find_spec
 from types import CodeType, FunctionType, MethodType
 from typing import Any
 from zlib import crc32
@@ -22,7 +21,8 @@ from optuna.storages import InMemoryStorage
 from optuna.study import StudyDirection
 from optuna.trial import Trial, create_trial
 
-from armwright.exceptions import MissingExtraError, SettingsError, did_you_mean
+from armwright.exceptions import SettingsError, did_you_mean
+from armwright.extras import check_extra
 from armwright.history import RANDOM, FinishedTrial
 from armwright.parameters import Design, FloatParameter, Parameter, ParameterValue
 from armwright.seeding import derived_seed
@@ -35,7 +35,6 @@ SAMPLING = 1  # the place of its seeds under the run's seed
 # iterations, target-1 to -3, three seeds each, populations of 5, 10, 20, 30, 50: black box alone 10.3, 10.4, 8.8, 9.8,
 # 8.7 (TPE 12.0); with the rules 14.7, 14.7, 14.7, 14.5, 14.5 (TPE 14.7). So few seeds tell 10 from 50, not from 5.
 POPULATION = 10
-GP_PACKAGES = ("torch", "scipy", "greenlet")  # the extra armwright[gp]
 
 _verbosity = threading.Lock()  # of the process; else two threads would put back each other's
 
@@ -89,7 +88,7 @@ def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
             f'unknown sampler "{sampler}".{did_you_mean(sampler, SAMPLERS)} Samplers: {", ".join(SAMPLERS)}'
         )
     if sampler == "gp":
-        _check_gp()
+        check_extra("gp", "the sampler gp")
     return SAMPLERS[sampler]
 
 
@@ -131,14 +130,6 @@ def _constants(code: CodeType) -> Iterator[str]:
             yield from _constants(value)
         else:
             yield repr(value)
-
-
-def _check_gp() -> None:
-    missing = [package for package in GP_PACKAGES if find_spec(package) is None]
-    if missing:
-        raise MissingExtraError(
-            f'the sampler gp needs {" and ".join(missing)}: pip install "armwright[gp]", or take another sampler'
-        )
 
 
 def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:

@@ -11,16 +11,19 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, cast
 
-from armwright.exceptions import ArmwrightError, FailureError, MissingExtraError
+from armwright.exceptions import ArmwrightError, FailureError
 from armwright.experiment.plan import Cell
+from armwright.extras import needed
 from armwright.front import find_front
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.results import read_summary
 from armwright.run_folder import check_same_run, read_config
+from armwright.sampling import sampler_factory
 from armwright.space import load_space, paper_space
 from armwright.study import optimize, study_config, study_method
 from armwright.task import load_task
@@ -104,11 +107,20 @@ def finished_before(cell: Cell) -> Outcome | None:
     return Outcome(cell, 0.0, summary["hypervolume"]["final"], resumed=True)
 
 
+def _check_extras(cells: Sequence[Cell]) -> None:
+    """MissingExtraError before any cell is run, rather than in each."""
+    for cell in cells:
+        sampler_factory(cell.plan.sampler)
+        if cell.plan.asks_a_model and cell.replay is None:
+            import_module("armwright.llm.chat")
+
+
 def run_here(cells: Sequence[Cell], jobs: int) -> Iterator[Outcome]:
     """Runs cells in `jobs` processes with one thread each, and tells of each as it ends.
 
     A cell whose worker is killed is run again, and goes on from its last finished trial.
     """
+    _check_extras(cells)
     deaths: Counter[Cell] = Counter()
     waiting = list(cells)
     while waiting:
@@ -193,12 +205,8 @@ def run_on_dask(cells: Sequence[Cell], address: str) -> Iterator[Outcome]:
 
     Dask gives the cells of a worker that died to another one, which goes on from the last finished trial.
     """
-    try:
+    with needed("distributed", "--scheduler"):
         from distributed import Client, as_completed
-    except ImportError as fault:
-        raise MissingExtraError(
-            '--scheduler needs the extra armwright[distributed]: pip install "armwright[distributed]"'
-        ) from fault
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as fault:

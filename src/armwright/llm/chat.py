@@ -17,11 +17,12 @@ from typing import Any, Literal, TypeVar, get_args
 from urllib.parse import urlsplit
 
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
+from armwright.extras import needed
 from armwright.llm.answer import without_words_around
 from armwright.llm.secrets import WithoutKeys, redacted, without_keys
 from armwright.llm.speaker import CHECK, MOST_REQUESTS, CallError, Interrupted, Question, Reader, Reply, Speaker
 
-try:
+with needed("llm", "a language model"):
     from genai_prices import Usage, calc_price
     from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
@@ -36,8 +37,6 @@ try:
     from pydantic_ai.usage import UsageLimits
 
     from armwright.llm.faults import CALL_FAULTS, PASSING, kind_of, words_of
-except ImportError as fault:
-    raise MissingExtraError('language models need an extra: pip install "armwright[llm]"') from fault
 
 # A price that cannot be known is no news to the user, who is told of costs by `cost_words` and the budget.
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)

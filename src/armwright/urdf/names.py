@@ -5,7 +5,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import ArmError, FailureError, MissingExtraError, did_you_mean
+from armwright.exceptions import ArmError, FailureError, did_you_mean
+from armwright.extras import needed
 
 ALIASES = {"so100": "soarm100", "so101": "soarm101"}
 _SUFFIX = "_description"
@@ -27,12 +28,8 @@ def find_urdf(name_or_path: str | Path) -> Path:
 
 
 def _fetched(name: str) -> Path:
-    try:
-        robots = import_module("robot_descriptions")
-    except ImportError as fault:
-        raise MissingExtraError(
-            f'there is no file {name}; arms by name need: pip install "armwright[arms]" (robot_descriptions)'
-        ) from fault
+    with needed("arms", f"there is no file {name}, and an arm by its name"):
+        robots: Any = import_module("robot_descriptions")
     known: dict[str, str] = {}
     for module, description in robots.DESCRIPTIONS.items():
         if description.has_urdf:

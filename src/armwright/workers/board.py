@@ -24,6 +24,7 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from armwright.exceptions import MissingExtraError, SettingsError, StorageError
+from armwright.extras import command
 from armwright.files import writable
 from armwright.problem import Judgement
 from armwright.sampling import quietly
@@ -329,7 +330,7 @@ def _sqlite_file(url: str) -> Path | None:
     from sqlalchemy import make_url
 
     parsed = make_url(url)
-    if parsed.get_backend_name() != "sqlite":
+    if not parsed.drivername.startswith("sqlite"):
         return None
     if not parsed.database or parsed.database == ":memory:":
         raise SettingsError("--storage: workers in other processes cannot see a database in memory")
@@ -337,6 +338,8 @@ def _sqlite_file(url: str) -> Path | None:
 
 
 def _storage(url: str, heartbeat: int) -> RDBStorage:
+    from sqlalchemy.exc import ArgumentError, SQLAlchemyError
+
     file = _sqlite_file(url)
     if file is not None and not file.parent.is_dir():
         raise SettingsError(f"--storage: there is no folder {file.parent}")
@@ -345,17 +348,26 @@ def _storage(url: str, heartbeat: int) -> RDBStorage:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ExperimentalWarning)  # heartbeats
             return RDBStorage(
-                url,
+                _with_driver(url),
                 engine_kwargs={"pool_pre_ping": True, "connect_args": connecting},
                 heartbeat_interval=heartbeat,
                 grace_period=SIGNS_MISSED * heartbeat,
             )
     except ImportError as fault:
         raise MissingExtraError(
-            f'{shown_url(url)} needs a driver ({fault}): pip install "armwright[distributed]" brings PostgreSQL\'s'
+            f"{shown_url(url)} needs a driver ({fault.__cause__ or fault}): {command('distributed')} brings that of "
+            "PostgreSQL"
         ) from fault
-    except StorageInternalError as fault:
+    except ArgumentError as fault:  # a kind of database that SQLAlchemy does not know
+        raise SettingsError(f"--storage {shown_url(url)}: {_cause(fault)}") from fault
+    except (SQLAlchemyError, StorageInternalError) as fault:
         raise StorageError(f"cannot use {shown_url(url)}: {_cause(fault)}") from fault
+
+
+def _with_driver(url: str) -> str:
+    """The URL with the driver of PostgreSQL that the extra brings, where it names none; SQLAlchemy 2.0 has another."""
+    name, separator, rest = url.partition("://")
+    return f"postgresql+psycopg{separator}{rest}" if name in ("postgresql", "postgres") else url
 
 
 def _without_marks(trial: FrozenTrial) -> FrozenTrial:
@@ -375,5 +387,5 @@ def _rank(posted: Posted) -> int:
 
 def _cause(fault: BaseException) -> str:
     """What the database said, on one line."""
-    words = " ".join(str(fault.__cause__ or fault).split())
+    words = " ".join(str(getattr(fault.__cause__ or fault, "orig", None) or fault.__cause__ or fault).split())
     return words[:200]

@@ -1,0 +1,83 @@
+"""What is asked for without what it needs: one line, and the command that installs it."""
+
+import re
+import sys
+import tomllib
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+import armwright as aw
+from armwright import extras
+from armwright.exceptions import MissingExtraError, UsageError
+from armwright.experiment.running import run_on_dask
+from armwright.extras import EXTRAS, missing_packages, needed
+from armwright.live import begin_server, serve
+from armwright.urdf.names import find_urdf
+
+ROOT = Path(__file__).parents[1]
+STATED: dict[str, list[str]] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+
+
+def plain(name: str) -> str:
+    """A requirement's distribution, as PyPI writes it."""
+    return re.sub("[-_.]+", "-", re.split(r"[\[<>=!~ ]", name)[0]).lower()
+
+
+def test_extras_are_those_of_the_project() -> None:
+    stated = {extra: requirements for extra, requirements in STATED.items() if extra != "all"}
+    assert set(EXTRAS) == set(stated)
+    assert STATED["all"] == [f"armwright[{','.join(sorted(stated))}]"]
+    assert re.match(r"pydantic-ai-slim\[anthropic,google,openai\]", *stated["llm"])  # which brings their packages
+    assert [*EXTRAS["llm"].values()] == ["anthropic", "google-genai", "openai", "pydantic-ai-slim"]
+    for extra in set(EXTRAS) - {"llm"}:
+        assert {plain(name) for name in EXTRAS[extra].values()} == {plain(name) for name in stated[extra]}
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_packages_lie_in_their_distributions(extra: str) -> None:
+    """As pip says of those that are installed here."""
+    holders = metadata.packages_distributions()
+    for package, distribution in EXTRAS[extra].items():
+        if package not in missing_packages(extra):
+            assert plain(distribution) in map(plain, holders[package.partition(".")[0]])
+
+
+ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
+    "arms": ("arms", "robot_descriptions", lambda: find_urdf("ur5e")),
+    "distributed": ("distributed", "distributed", lambda: list(run_on_dask([], "tcp://127.0.0.1:9"))),
+    "gp": ("gp", "torch", lambda: aw.optimize(aw.Problem(aw.load_task("target-1")), sampler="gp")),
+    "page": ("live", "uvicorn", lambda: serve(Path("run"), print)),
+    "page of a run": ("live", "starlette", lambda: begin_server(Path("run"))),
+    "model": ("llm", "pydantic_ai", lambda: aw.LlmProposer("openai-chat:gpt-4o")),
+    "model of a study": ("llm", "openai", lambda: aw.StudyLlmProposer("openai-chat:gpt-4o", "two numbers")),
+    "draft": ("llm", "openai", lambda: aw.draft("reach a shelf", model="openai-chat:gpt-4o")),
+}
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_a_missing_package_is_named_with_its_command(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    extra, package, ask = ASKED[asked]
+    monkeypatch.setitem(sys.modules, package, None)
+    for module in ("armwright.llm.chat", "armwright.llm.faults"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    if extra == "gp":  # which CI has, and others need not
+        monkeypatch.setattr(extras, "missing_packages", lambda _: [package])
+    with pytest.raises(MissingExtraError) as fault:
+        ask()
+    words = str(fault.value)
+    assert words.endswith(f'needs {package}: pip install "armwright[{extra}]"')
+    assert "\n" not in words
+    assert isinstance(fault.value, UsageError)
+    assert fault.value.exit_code == 2
+
+
+def test_another_version_is_named_as_one() -> None:
+    with pytest.raises(MissingExtraError) as fault, needed("live", "the page"):
+        from json import no_such_name  # type: ignore[attr-defined] # noqa: F401
+    words = str(fault.value)
+    assert words.startswith("the page needs another json (cannot import name 'no_such_name'")
+    assert words.endswith(': pip install "armwright[live]"')
+    assert "\n" not in words

@@ -1,0 +1,34 @@
+"""What is said of the package in several places is the same."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+CITATION: dict[str, Any] = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+
+
+def test_one_version_and_one_licence() -> None:
+    versions = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert PROJECT["version"] == CITATION["version"] == versions[0]
+    assert PROJECT["license"] == CITATION["license"] == "MIT"
+
+
+def test_the_paper_is_cited_as_in_the_method() -> None:
+    (paper,) = CITATION["references"]
+    method = " ".join((ROOT / "docs" / "method.md").read_text().replace("\n>", "\n").split())
+    authors = ", ".join(f"{author['given-names'][0]}. {author['family-names']}" for author in paper["authors"])
+    where = f"{paper['journal']} {paper['volume']}:{paper['start']}-{paper['end']}, {paper['year']}"
+    assert f"{authors}: *{paper['title']}*, {where}, doi {paper['doi']}" in method
+
+
+@pytest.mark.parametrize("document", ["CONTRIBUTING.md", "README.md"])
+def test_the_files_that_are_linked_are_there(document: str) -> None:
+    links = re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / document).read_text())
+    assert links
+    assert not [link for link in links if not (ROOT / link).exists()]

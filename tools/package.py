@@ -1,0 +1,132 @@
+"""Builds sdist and wheel into dist/, looks into them, and tries the wheel in bare environments; checks CITATION.cff.
+
+    python tools/package.py [PYTHON]        # a Python to install into, such as python3.13; without it, this one
+
+The wheel is installed twice: with the newest versions of all that it needs, as pip does it, and with the lowest that
+pyproject.toml allows. Both must pass tools/smoke.py; what the first one wrote must load in MuJoCo.
+"""
+
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+from zipfile import ZipFile
+
+ROOT = Path(__file__).resolve().parents[1]
+DIST = ROOT / "dist"
+CITED = ("--from", "cffconvert==2.0.0", "cffconvert", "--validate", "--infile", "CITATION.cff")
+NOT_PACKED = (".ci/",)  # of what git holds
+LOAD = """
+import sys
+import mujoco
+
+for file in sys.argv[1:]:
+    model = mujoco.MjModel.from_xml_path(file)
+    assert model.njnt > 0, file
+    mujoco.mj_forward(model, mujoco.MjData(model))
+print(len(sys.argv) - 1, "files load in MuJoCo", mujoco.__version__)
+"""
+
+
+def run(*command: str | Path, folder: Path = ROOT) -> None:
+    """A command, told; CalledProcessError where it fails."""
+    print("$", *command, flush=True)
+    subprocess.run([str(part) for part in command], cwd=folder, check=True)
+
+
+def build() -> tuple[Path, Path]:
+    """The sdist, and the wheel that was built from it."""
+    shutil.rmtree(DIST, ignore_errors=True)
+    run(sys.executable, "-m", "build", "--outdir", DIST)
+    (sdist,), (wheel,) = DIST.glob("*.tar.gz"), DIST.glob("*.whl")
+    return sdist, wheel
+
+
+def check_sdist(sdist: Path) -> None:
+    """It holds what git holds, and nothing else."""
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    tracked = {name for name in listed.splitlines() if not name.startswith(NOT_PACKED)}
+    with tarfile.open(sdist) as archive:
+        packed = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
+    check("sdist", packed, tracked | {"PKG-INFO"})
+
+
+def check_wheel(wheel: Path) -> None:
+    """It holds src/armwright whole, its metadata and the licences, and nothing else."""
+    listed = subprocess.run(["git", "ls-files", "src"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    tracked = {name.removeprefix("src/") for name in listed.splitlines()}
+    info = "-".join(wheel.name.split("-")[:2]) + ".dist-info/"
+    licences = {f"{info}licenses/{name}" for name in listed.splitlines() if name.endswith("LICENSE")}
+    own = {info + name for name in ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")}
+    with ZipFile(wheel) as archive:
+        check("wheel", set(archive.namelist()), tracked | licences | own)
+
+
+def check(where: str, packed: set[str], wanted: set[str]) -> None:
+    """SystemExit where what is packed is not what is wanted."""
+    wrong = [f"- {name}" for name in sorted(wanted - packed)] + [f"+ {name}" for name in sorted(packed - wanted)]
+    if wrong:
+        sys.exit("\n".join([f"the {where} lacks (-), or holds though git does not (+):", *wrong]))
+    print(f"{where}: {len(packed)} files, as git holds them")
+
+
+def try_tests(sdist: Path, folder: Path) -> None:
+    """All tests of the sdist are found, and those of its public face pass, without the checkout."""
+    with tarfile.open(sdist) as archive:
+        archive.extractall(folder, filter="data")
+    unpacked = folder / sdist.name.removesuffix(".tar.gz")
+    pytest = ("env", f"PYTHONPATH={unpacked / 'src'}", sys.executable, "-m", "pytest", "-n", "0")
+    run(*pytest, "--collect-only", "--quiet", "--quiet", folder=unpacked)
+    run(*pytest, "tests/test_public.py", "tests/test_task.py", folder=unpacked)
+
+
+def try_newest(wheel: Path, python: str, folder: Path) -> None:
+    """As a user installs it."""
+    own = environment(python, folder / "newest")
+    run(own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
+    smoke(own, folder / "with-newest")
+    run(own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "mujoco")
+    made = [*(folder / "with-newest").glob("run/designs/*/arm.urdf"), folder / "with-newest" / "out" / "mjcf"]
+    run(own, "-c", LOAD, *made)
+
+
+def try_lowest(wheel: Path, python: str, folder: Path) -> None:
+    """With the lowest versions that pyproject.toml allows."""
+    own = environment(python, folder / "lowest")
+    uv = (sys.executable, "-m", "uv", "pip", "install", "--quiet", "--system-certs", "--python", own)
+    # The oldest versions have no wheels for the newest Pythons, whose lowest are then those that have.
+    lowest = ("--resolution", "lowest-direct", "--only-binary", ":all:")
+    run(*uv, *lowest, "--requirements", ROOT / "pyproject.toml")
+    run(*uv, "--no-deps", wheel)
+    smoke(own, folder / "with-lowest")
+
+
+def environment(python: str, folder: Path) -> Path:
+    """The Python of a bare environment."""
+    run(python, "-m", "venv", folder)
+    return folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+
+
+def smoke(python: Path, folder: Path) -> None:
+    """tools/smoke.py by that Python, away from the checkout."""
+    folder.mkdir()
+    run(python, "-P", ROOT / "tools" / "smoke.py", folder, folder=folder)
+
+
+def main(python: str) -> None:
+    """All of it."""
+    run(sys.executable, "-m", "uv", "tool", "run", "--quiet", "--system-certs", *CITED)
+    sdist, wheel = build()
+    check_sdist(sdist)
+    check_wheel(wheel)
+    with tempfile.TemporaryDirectory() as folder:
+        try_tests(sdist, Path(folder))
+        try_newest(wheel, python, Path(folder))
+        try_lowest(wheel, python, Path(folder))
+    print(f"{sdist.name} and {wheel.name} are in {DIST}/")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:] or [sys.executable])

@@ -1,0 +1,141 @@
+"""What an armwright that was just installed must do, without extras and without anything of the repository.
+
+    python smoke.py FOLDER          # the Python that it is installed in, an empty folder
+
+Run folders stay in FOLDER. Every command must end with its code, without a traceback, and without a warning of ours.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from importlib import metadata
+from pathlib import Path
+
+EXPERIMENT = """
+name: two-methods
+tasks: [target-1, shelf]
+seeds: 2
+n_init: 4
+n_total: 10
+methods:
+  bbo: {label: BBO, proposer: none}
+  rules: {label: rules, proposer: rules, n_step: 5}
+baseline: bbo
+"""
+PYTHON = """
+import armwright as aw
+
+if __name__ == "__main__":
+    problem = aw.Problem(space=aw.paper_space(joints=4), task=aw.load_task("target-1"))
+    assert problem.evaluate(problem.space.sample(100, seed=0)).shape == (100, 2)
+    run = aw.optimize(problem, proposer="rules", n_total=20, seed=0, out="python")
+    assert run.hypervolume[-1] > 0
+    assert aw.to_urdf(run.front[0].arm).startswith("<?xml")
+    assert len(aw.find_front(problem, budget="20000").front) > 20
+    assert [path for path in aw.write_figures("python") if path.suffix == ".png"]
+    for ask in (
+        lambda: aw.LlmProposer("openai-chat:gpt-4o"),
+        lambda: aw.draft("reach a shelf", model="openai-chat:gpt-4o"),
+        lambda: aw.optimize(problem, sampler="gp"),
+        lambda: aw.compare_arms("target-1", ["ur5e"]),
+    ):
+        try:
+            ask()
+        except aw.UsageError as fault:
+            assert 'pip install "armwright[' in str(fault), fault
+        else:
+            raise AssertionError("an extra is here")
+"""
+# What needs an extra, and which; all of them are asked for where a run folder "run" is.
+NEEDS = (
+    ("live", "live", "run"),
+    ("live", "optimize", "target-1", "--live", "--out", "other"),
+    ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
+    ("llm", "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--out", "other"),
+    ("llm", "experiment", "paper", "--model", "openai-chat:gpt-4o", "--out", "other"),
+    ("llm", "draft", "reach a shelf", "--model", "openai-chat:gpt-4o"),
+    ("distributed", "experiment", "two-methods.yaml", "--seeds", "3", "--scheduler", "tcp://127.0.0.1:9"),
+    ("gp", "optimize", "target-1", "--sampler", "gp", "--out", "other"),
+    ("gp", "experiment", "gp.yaml"),
+    ("arms", "compare-arms", "target-1", "ur5e"),
+)
+FORMATS = ("urdf", "xacro", "srdf", "ros2_control", "sdf", "mjcf", "sheet", "sheet-csv")
+
+
+def python(*args: str, code: int = 0, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A process of this Python, whose end is as it must be."""
+    # Deprecations in libraries are theirs; those in our own lines are told by the file that the warning names.
+    env = {**os.environ, "PYTHONWARNINGS": "default", "ARMWRIGHT_MODEL": "", "NO_COLOR": "1", **environment}
+    done = subprocess.run([sys.executable, "-P", *args], capture_output=True, encoding="utf-8", env=env)
+    said = f"{' '.join(args)}\n{done.stdout}{done.stderr}"
+    assert done.returncode == code, f"code {done.returncode}, not {code}: {said}"
+    assert "Traceback" not in done.stderr, said
+    ours = [line for line in done.stderr.splitlines() if "Warning:" in line and f"{os.sep}armwright{os.sep}" in line]
+    assert not ours, said
+    return done
+
+
+def armwright(*args: str, code: int = 0, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The command line, told."""
+    print("armwright", *args, flush=True)
+    return python("-m", "armwright", *args, code=code, **environment)
+
+
+def main(folder: Path) -> None:
+    """Everything that needs no extra, and one line for each thing that does."""
+    installed = {str(distribution.metadata["Name"]).lower() for distribution in metadata.distributions()}
+    assert not installed & {"pydantic-ai-slim", "starlette", "torch", "distributed", "robot-descriptions", "pytest"}
+    os.chdir(folder)
+    assert armwright("--version").stdout.strip() == metadata.version("armwright")
+    assert "optimize" in armwright("--help").stdout
+
+    run = armwright("optimize", "target-1", "--seed", "0", "--out", "run")
+    assert "hypervolume" in run.stdout
+    for made in ("report.html", "summary.json", "front.csv", "figures/front.png", "figures/front.pdf"):
+        assert (folder / "run" / made).stat().st_size > 100, made
+    urdfs = list((folder / "run" / "designs").glob("*/arm.urdf"))
+    assert urdfs
+    assert all(ET.parse(urdf).getroot().tag == "robot" for urdf in urdfs)
+    assert "is finished" in armwright("optimize", "target-1", "--seed", "0", "--out", "run").stdout
+    armwright("report", "run")
+    armwright("verify", "run")
+    armwright("polish", "run", "--evaluations", "100")
+    armwright("pick", "run", "--by", "torque")
+    for kind in FORMATS:
+        armwright("export", "run", "--format", kind, "--out", f"out/{kind}")
+
+    armwright("front", "target-1", "--budget", "100000", "--out", "front")
+    Path("two-methods.yaml").write_text(EXPERIMENT)
+    told = json.loads(armwright("experiment", "two-methods.yaml", "--jobs", "2", "--out", "cells", "--json").stdout)
+    assert told
+    armwright("compare", "cells", "--out", "compared")
+    armwright("runs", ".")
+
+    assert len(json.loads(armwright("tasks", "--json").stdout)) > 30
+    armwright("actuators")
+    armwright("init", "mine.yaml")
+    armwright("optimize", "mine.yaml", "--n-total", "10", "--no-figures", "--robust", "--space", "slideopt")
+    armwright("prompt", "target-1")
+    armwright("optimize", "target-1", "--proposer", "manual:asked", "--once", "--out", "by-hand")
+    Path("out/urdf").rename("arm.urdf")
+    armwright("compare-arms", "target-1", "arm.urdf", "--run", "run")
+    health = armwright("doctor").stdout
+    assert health.count("-- extra") == 5, health
+    assert 'pip install "armwright[llm]"' in armwright("doctor", "--model", "openai-chat:gpt-4o", code=1).stdout
+
+    Path("gp.yaml").write_text(EXPERIMENT.replace("proposer: none", "proposer: none, sampler: gp"))
+    for extra, *asked in NEEDS:
+        done = armwright(*asked, code=2, OPENAI_API_KEY="sk-none")
+        (line,) = [line for line in done.stderr.splitlines() if line]
+        assert line.startswith("armwright: "), line
+        assert f'pip install "armwright[{extra}]"' in line, line
+
+    Path("script.py").write_text(PYTHON)
+    python("script.py")
+    print(f"all of it works on Python {sys.version.split()[0]}, in {folder}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve())
