@@ -233,7 +233,8 @@ def draw(drawn: dict[str, list[Look]], file: Path) -> None:
     axes = figure.subplots()
     for name, looks in drawn.items():
         axes.plot([look.at / looks[-1].at for look in looks], [look.memory for look in looks], label=name)
-    axes.set(xlabel="share of the trials or evaluations", ylabel="resident memory [MiB]", ylim=(0.0, None))
+    axes.set(xlabel="share of the trials or evaluations", ylabel="resident memory [MiB]")
+    axes.set_ylim(0.0, 1.1 * max(look.memory for looks in drawn.values() for look in looks))
     axes.legend(fontsize=8)
     figure.savefig(file, dpi=150)
 
