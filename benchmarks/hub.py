@@ -1,14 +1,14 @@
 """The rules for any study beside Optuna's and OptunaHub's samplers, on OptunaHub's multi-objective test problems.
 
     git clone --depth 1 https://github.com/optuna/optunahub-registry
-    pip install optunahub coco-experiment optproblems diversipy cmaes      # gp, auto_sampler: torch
+    pip install optunahub coco-experiment optproblems diversipy cmaes      # for GP and auto_sampler: torch
     python benchmarks/hub.py --registry optunahub-registry [--n-trials 200] [--seeds 5] [--jobs 2] [--keep FOLDER]
         [--problems NAME ...] [--methods NAME ...]
 
-No model is asked: `+ rules` is the sampler with StudyRulesProposer, one trial in ten. The figure is the hypervolume of a
-study's trials as a share of that of all studies on the problem together, values scaled to their common front, its worst
-values + 10 % being the reference point. `arms` is armwright's own task target-1, where `+ arm rules` are the rules for
-arms. With --keep, finished studies are kept as files, and the same command goes on.
+No model is asked: `+ rules` is the sampler with StudyRulesProposer, one trial in ten. The figure is the hypervolume of
+a study's trials as a share of that of all studies on the problem together, values scaled to their common front, its
+worst values + 10 % being the reference point. `arms` is armwright's own task target-1, where `+ arm rules` are the
+rules for arms. With --keep, finished studies are kept as files, and the same command goes on.
 """
 
 import argparse
@@ -218,9 +218,12 @@ def show(loaded: dict[Cell, dict[str, Matrix]], problems: Sequence[str], methods
         print(f"{method:<28}" + "".join(f"{share:10.3f}" for share in table[i]) + f"{rank}{seconds:10.1f}")
     for method in methods:
         base = method.partition(" + ")[0]
-        if base != method and base in methods:
-            both, alone = table[methods.index(method), tests], table[methods.index(base), tests]
-            print(f"{method} against {base}: better on {np.sum(both > alone)} of {len(tests)} test problems")
+        both, alone = (table[methods.index(name)] if name in methods else table[0] * np.nan for name in (method, base))
+        if base != method and not np.isnan(both - alone).all():
+            n = np.sum(~np.isnan(both - alone))
+            print(
+                f"{method} against {base}: better on {np.sum(both > alone)} of {n} problems, worse on {np.sum(both < alone)}"
+            )
 
 
 if __name__ == "__main__":

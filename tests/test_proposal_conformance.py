@@ -1,4 +1,4 @@
-"""What Optuna asks of its samplers, asked of a study with proposals: its own conformance suite, and the rest of its ways."""
+"""What Optuna asks of its samplers, asked of a study with proposals: its own suite, and what else a study may do."""
 
 import warnings
 from collections.abc import Callable, Iterator

@@ -60,6 +60,11 @@ class Standing:
         return self.values.argsort(axis=0, kind="stable").argsort(axis=0, kind="stable") / len(self.values)
 
     @property
+    def n_objectives(self) -> int:
+        """M."""
+        return int(np.size(self.values, 1))
+
+    @property
     def choices(self) -> list[str]:
         """The parameters that are choices, between two or more."""
         return [n for n, d in self.space.items() if isinstance(d, CategoricalDistribution) and not d.single()]
@@ -100,11 +105,17 @@ def standing_of(study: optuna.Study, space: Space, name: str) -> Standing:
     values = minimised(complete, study.directions)
     broken = np.array([[violation(trial)] for trial in complete]).reshape(len(complete), 1)
     chosen = {trial.number for trial in best_trials(complete, study.directions)}
-    rows = [i for i in np.argsort(values[:, 0], kind="stable").tolist() if complete[i].number in chosen]
+    rows = [i for i in by_rising(values[:, 0]) if complete[i].number in chosen]
     if len(rows) < 2:  # a lonely best one has no neighbour but the next best
-        rows = np.argsort(ranked(values, broken)[:, 0], kind="stable")[:2].tolist() if len(complete) > 1 else []
+        rows = by_rising(ranked(values, broken)[:, 0])[:2] if len(complete) > 1 else []
     tried = tuple({**t.system_attrs.get("fixed_params", {}), **t.params} for t in trials)
     return Standing(space, tuple(complete), ranked(values, broken), tuple(rows), tried, name)
+
+
+def by_rising(values: NDArray[np.float64]) -> list[int]:
+    """The rows of (N,) values, the least first."""
+    order: list[int] = np.argsort(values, kind="stable").tolist()
+    return order
 
 
 def held(params: Mapping[str, Any], space: Space) -> Params:
@@ -151,7 +162,7 @@ def fill(standing: Standing, rng: np.random.Generator) -> Made:
 
 def extend(standing: Standing, rng: np.random.Generator) -> Made:
     """Beyond an end of the front, away from its neighbour there."""
-    objective = int(rng.integers(standing.values.shape[1]))
+    objective = int(rng.integers(standing.n_objectives))
     order = sorted(standing.best, key=lambda row: standing.values[row, objective])
     end, neighbour = order[0], order[1 + int(rng.integers(min(3, len(order) - 1)))]
     beyond = 1.0 + float(rng.uniform(*BEYOND))
@@ -161,7 +172,7 @@ def extend(standing: Standing, rng: np.random.Generator) -> Made:
 
 def cross(standing: Standing, rng: np.random.Generator) -> Made:
     """Each parameter from one of two of the best."""
-    a, b = rng.choice(standing.best, size=2, replace=False).tolist()
+    a, b = (int(row) for row in rng.choice(standing.best, size=2, replace=False))
     params, other = dict(standing.params[a]), standing.params[b]
     params.update({name: other[name] for name in params if name in other and rng.random() < 0.5})
     return params, f"parameters of trials {number(standing, a)} and {number(standing, b)}"
@@ -181,14 +192,14 @@ def swap(standing: Standing, rng: np.random.Generator) -> Made:
     alike = [i for i, p in enumerate(standing.params) if name in p and p[name] == choice]
     if alike:
         nearest = standing.params[min(alike, key=lambda i: standing.ranks[i].sum())]
-        seen = set().union(*(standing.params[i] for i in alike))
+        seen = {n for i in alike for n in standing.params[i]}
         params = {n: v for n, v in {**nearest, **params}.items() if n in seen}
     return params, f"trial {number(standing, row)} with {name} = {value_text(choice, distribution)}"
 
 
 def trend(standing: Standing, rng: np.random.Generator) -> Made:
     """One of the best, moved to where a weighted rank of the values falls: the linear trend over trials like it."""
-    score = standing.ranks @ rng.dirichlet(np.ones(standing.values.shape[1]))
+    score = standing.ranks @ rng.dirichlet(np.ones(standing.n_objectives))
     row = min(standing.best, key=lambda i: score[i])
     own = standing.params[row]
     names = [name for name in own if is_number(standing.space[name])]
@@ -197,12 +208,10 @@ def trend(standing: Standing, rng: np.random.Generator) -> Made:
     like = trials_like(standing, own, names)
     units = np.array([[unit(standing, i, name) for name in names] for i in like])  # (L, P)
     slope = linear(units, score[like])
-    most = np.abs(slope).max()
-    low, high = np.log(STRIDE)
-    step = -slope / most * np.exp(rng.uniform(low, high)) if most > 0.0 else np.zeros(len(names))
+    stride = float(np.exp(rng.uniform(*np.log(STRIDE)))) / max(float(np.abs(slope).max()), 1e-300)
     moved = {
-        name: from_unit(unit(standing, row, name) + change, standing.space[name])
-        for name, change in zip(names, step.tolist(), strict=True)
+        name: from_unit(unit(standing, row, name) - stride * change, standing.space[name])
+        for name, change in zip(names, slope.tolist(), strict=True)
     }
     return {**own, **moved}, f"trial {number(standing, row)} along the trend of {len(like)} trials"
 
@@ -222,14 +231,14 @@ RULES: dict[str, Rule] = {"fill": fill, "extend": extend, "cross": cross, "swap"
 def wide_gap(standing: Standing, rng: np.random.Generator) -> tuple[int, int]:
     """Two rows next to each other along one objective, by chance: as the square of the step between them."""
     rows = np.array(standing.best)
-    values = standing.values[rows]
-    span = np.ptp(values, axis=0)
+    values = standing.values[rows] / 2  # the whole span may be beyond the largest float
+    span: NDArray[np.float64] = np.maximum(np.ptp(values, axis=0), 1e-300)
     pairs: list[tuple[int, int]] = []
     gaps: list[float] = []
     for m in range(values.shape[1]):
         order = np.argsort(values[:, m], kind="stable")
         pairs += zip(rows[order[:-1]].tolist(), rows[order[1:]].tolist(), strict=True)
-        gaps += (np.diff(values[order, m]) / (span[m] or 1.0)).tolist()
+        gaps += (np.diff(values[order, m]) / span[m]).tolist()
     chance = np.array(gaps) ** 2 + 1e-12  # never nothing at all
     return pairs[int(rng.choice(len(pairs), p=chance / chance.sum()))]
 
@@ -258,9 +267,9 @@ def along(standing: Standing, a: int, b: int, share: float, rng: np.random.Gener
 
 def linear(units: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[np.float64]:
     """(P,) the slope of a linear fit of score (L,) over units (L, P), kept small where there are few."""
-    centred = units - units.mean(axis=0)
+    centred = units - np.mean(units, axis=0)
     squares = centred.T @ centred + RIDGE * len(units) * np.eye(units.shape[1])
-    return np.linalg.solve(squares, centred.T @ (score - score.mean()))
+    return np.asarray(np.linalg.solve(squares, centred.T @ (score - score.mean())), dtype=np.float64)
 
 
 def distinct(params: Params, standing: Standing, rng: np.random.Generator) -> Params:
@@ -287,7 +296,7 @@ def drawn(distribution: BaseDistribution, rng: np.random.Generator) -> Any:
         return from_unit(float(rng.random()), distribution)
     if isinstance(distribution, CategoricalDistribution):
         return one_of(distribution.choices, rng)
-    return distribution.to_external_repr(distribution.low)  # pyright: ignore[reportAttributeAccessIssue]
+    return from_unit(0.0, distribution)  # of a single value
 
 
 def one_of(things: Sequence[T], rng: np.random.Generator) -> T:
