@@ -6,9 +6,10 @@
         [--problems NAME ...] [--methods NAME ...]
 
 No model is asked: `+ rules` is the sampler with StudyRulesProposer, one trial in ten. The figure is the hypervolume of
-a study's trials as a share of that of all studies on the problem together, values scaled to their common front, its
-worst values + 10 % being the reference point. `arms` is armwright's own task target-1, where `+ arm rules` are the
-rules for arms. With --keep, finished studies are kept as files, and the same command goes on.
+a study's trials as a share of that of all studies on the problem together. Its box reaches from the best values of all
+to 10 % beyond the worst ones on a study's front, median over the studies. `arms` is armwright's own task target-1,
+where `+ arm rules` are the rules for arms. With --keep, finished studies are kept as files, and the same command goes
+on.
 """
 
 import argparse
@@ -168,7 +169,10 @@ def shares(matrices: dict[tuple[str, int], Matrix]) -> dict[tuple[str, int], flo
     """Of each study's values (N, M) the hypervolume, as a share of that of all together."""
     together = np.concatenate(list(matrices.values()))
     front = together[front_mask(together)]
-    low, span = front.min(axis=0), np.maximum(np.ptp(front, axis=0), 1e-12)
+    low = front.min(axis=0)
+    # The typical study's front ends here: with the common front's own ends most would have no hypervolume at all.
+    worst = np.median([values[front_mask(values)].max(axis=0) for values in matrices.values()], axis=0)
+    span = np.maximum(worst - low, 1e-12)
     reference = (1.1,) * front.shape[1]
     whole = aw.hypervolume((front - low) / span, reference)
     return {key: aw.hypervolume((values - low) / span, reference) / whole for key, values in matrices.items()}
@@ -220,10 +224,8 @@ def show(loaded: dict[Cell, dict[str, Matrix]], problems: Sequence[str], methods
         base = method.partition(" + ")[0]
         both, alone = (table[methods.index(name)] if name in methods else table[0] * np.nan for name in (method, base))
         if base != method and not np.isnan(both - alone).all():
-            n = np.sum(~np.isnan(both - alone))
-            print(
-                f"{method} against {base}: better on {np.sum(both > alone)} of {n} problems, worse on {np.sum(both < alone)}"
-            )
+            n, better, worse = np.sum(~np.isnan(both - alone)), np.sum(both > alone), np.sum(both < alone)
+            print(f"{method} against {base}: better on {better} of {n} problems, worse on {worse}")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ What the rules for arms do with joints and links (`proposers/rules.py`), in term
 are filled, its ends are carried on, choices are exchanged with the parameters that hang on them.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -208,7 +209,8 @@ def trend(standing: Standing, rng: np.random.Generator) -> Made:
     like = trials_like(standing, own, names)
     units = np.array([[unit(standing, i, name) for name in names] for i in like])  # (L, P)
     slope = linear(units, score[like])
-    stride = float(np.exp(rng.uniform(*np.log(STRIDE)))) / max(float(np.abs(slope).max()), 1e-300)
+    low, high = STRIDE
+    stride = math.exp(rng.uniform(math.log(low), math.log(high))) / max(float(np.abs(slope).max()), 1e-300)
     moved = {
         name: from_unit(unit(standing, row, name) - stride * change, standing.space[name])
         for name, change in zip(names, slope.tolist(), strict=True)
