@@ -212,8 +212,8 @@ def show(loaded: dict[Cell, dict[str, Matrix]], problems: Sequence[str], methods
             own = [share for (name, _), share in found.items() if name == method]
             table[i, j] = np.mean(own) if own else np.nan
     tests = [j for j, problem in enumerate(problems) if problem != "arms"]
-    among = ~np.isnan(table[:, tests]).any(axis=1)
-    ranks = rankdata(-table[among][:, tests], axis=0).mean(axis=1) if tests else np.zeros(among.sum())
+    among = ~np.isnan(table[:, tests]).any(axis=1) & bool(tests)
+    ranks = rankdata(-table[among][:, tests], axis=0).mean(axis=1)
     print(f"{'method':<28}" + "".join(f"{name:>10}" for name in problems) + "   mean rank   s/study")
     order = iter(ranks)
     for i, method in enumerate(methods):
