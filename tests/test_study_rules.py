@@ -216,9 +216,18 @@ def test_ranges_that_changed_count_as_far_as_they_hold() -> None:
             trial = study.ask()
             study.tell(trial, trial.suggest_float("x", 0.0, high))
     standing = standing_of(study, aw.StudyRulesProposer().space(study), "rules")
-    assert all(own.get("x", 0.0) <= 5.0 for own in standing.params)
+    assert 5 <= len(standing.params) < 10
+    assert all(0.0 <= own["x"] <= 5.0 for own in standing.params)
     for seed in range(30):
         assert 0.0 <= aw.StudyRulesProposer().propose(study, seed, seed).params.get("x", 0.0) <= 5.0
+
+
+def test_a_stated_space_that_the_study_does_not_have_is_told() -> None:
+    """No trial lies in it, so there is nothing to make a proposal of; one from the space itself is refused."""
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(space={"x": FloatDistribution(2.0, 5.0)}), every=5)
+    study.optimize(lambda trial: trial.suggest_float("x", 0.0, 1.0), n_trials=15, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (0, {"design": 3})
 
 
 def test_a_study_without_parameters_has_no_proposal() -> None:

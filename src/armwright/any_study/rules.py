@@ -38,22 +38,19 @@ LONELY = 64  # points of which the one farthest from all trials is taken
 class Standing:
     """A study as the rules see it.
 
-    complete: its complete trials with values that are numbers.
+    complete: its complete trials with finite values, of which the space still holds a parameter.
+    params: of each of these, as far as the space holds them: ranges may have changed.
     best: those of them that `best_trials` names, by rising first value; two at least, or none.
     tried: the parameters of all trials, those under way included.
     """
 
     space: Space
     complete: tuple[FrozenTrial, ...]
+    params: tuple[Params, ...]
     values: NDArray[np.float64]  # (N, M), minimised; the infeasible ones behind all others
     best: tuple[int, ...]  # rows
     tried: tuple[Params, ...]
     name: str
-
-    @cached_property
-    def params(self) -> list[Params]:
-        """Of each complete trial, as far as the space still holds them."""
-        return [held(trial.params, self.space) for trial in self.complete]
 
     @cached_property
     def ranks(self) -> NDArray[np.float64]:
@@ -102,7 +99,9 @@ class StudyRulesProposer(StudyProposer):
 def standing_of(study: optuna.Study, space: Space, name: str) -> Standing:
     """The study as it stands, to the proposer of this name."""
     trials = study.get_trials(deepcopy=False)
-    complete = [t for t in trials if t.state == TrialState.COMPLETE and np.all(np.isfinite(t.values))]
+    finite = [t for t in trials if t.state == TrialState.COMPLETE and np.all(np.isfinite(t.values))]
+    known = [(trial, params) for trial in finite if (params := held(trial.params, space))]
+    complete = [trial for trial, _ in known]
     values = minimised(complete, study.directions)
     broken = np.array([[violation(trial)] for trial in complete]).reshape(len(complete), 1)
     chosen = {trial.number for trial in best_trials(complete, study.directions)}
@@ -110,7 +109,8 @@ def standing_of(study: optuna.Study, space: Space, name: str) -> Standing:
     if len(rows) < 2:  # a lonely best one has no neighbour but the next best
         rows = by_rising(ranked(values, broken)[:, 0])[:2] if len(complete) > 1 else []
     tried = tuple({**t.system_attrs.get("fixed_params", {}), **t.params} for t in trials)
-    return Standing(space, tuple(complete), ranked(values, broken), tuple(rows), tried, name)
+    params = tuple(params for _, params in known)
+    return Standing(space, tuple(complete), params, ranked(values, broken), tuple(rows), tried, name)
 
 
 def by_rising(values: NDArray[np.float64]) -> list[int]:
@@ -120,7 +120,7 @@ def by_rising(values: NDArray[np.float64]) -> list[int]:
 
 
 def held(params: Mapping[str, Any], space: Space) -> Params:
-    """What of a trial's parameters lies in the space: ranges may have changed."""
+    """What of a trial's parameters lies in the space."""
     found: Params = {}
     for name, value in params.items():
         try:
