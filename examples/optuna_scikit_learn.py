@@ -3,7 +3,7 @@
 python examples/optuna_scikit_learn.py --model openai-chat:gpt-4o
 python examples/optuna_scikit_learn.py --model qwen3 --base-url http://localhost:11434/v1 --n-trials 60
 
-Needs: pip install "armwright[llm]" scikit-learn. Without a model Optuna works alone.
+Needs: pip install "armwright[llm]" scikit-learn. Without a model built-in rules propose.
 """
 
 import argparse
@@ -68,16 +68,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"Optuna alone:    accuracy {alone.best_value:.4f} with {alone.best_params}")
     model = configured_model(options.model, options.base_url)
     if model is None:
-        print("No language model is configured (--model, ARMWRIGHT_MODEL), so this is all.")
-        return
-    proposer = aw.StudyLlmProposer(model.model, DESCRIPTION, model.base_url, origin=options.origin)
+        print("No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead.")
+        proposer, by = aw.StudyRulesProposer(), "rules"
+    else:
+        proposer = aw.StudyLlmProposer(model.model, DESCRIPTION, model.base_url, origin=options.origin)
+        by = model.model
     callback = aw.ProposalCallback(proposer, every=10, seed=options.seed)
     both = search(options.n_trials, options.seed, callback)
     print(f"With proposals:  accuracy {both.best_value:.4f} with {both.best_params}")
     for trial in both.trials:
         if "proposal" in trial.user_attrs:
             print(f"  trial {trial.number}: accuracy {trial.value:.4f}; {trial.user_attrs['reason']}")
-    print(f"{callback.proposed} proposals by {model.model}, faults: {dict(callback.faults) or 'none'}")
+    print(f"{callback.proposed} proposals by {by}, faults: {dict(callback.faults) or 'none'}")
 
 
 if __name__ == "__main__":

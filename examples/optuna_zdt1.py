@@ -3,7 +3,7 @@
 python examples/optuna_zdt1.py --model openai-chat:gpt-4o
 python examples/optuna_zdt1.py --model qwen3 --base-url http://localhost:11434/v1 --n-trials 1000
 
-Needs: pip install "armwright[llm]". Without a model Optuna works alone.
+Needs: pip install "armwright[llm]". Without a model built-in rules propose.
 """
 
 import argparse
@@ -56,14 +56,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"Optuna alone:    {result(search(options.n_trials, options.seed))}")
     model = configured_model(options.model, options.base_url)
     if model is None:
-        print("No language model is configured (--model, ARMWRIGHT_MODEL), so this is all.")
-        return
-    proposer = aw.StudyLlmProposer(model.model, DESCRIPTION, model.base_url, memory="own", origin=options.origin)
+        print("No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead.")
+        proposer, by = aw.StudyRulesProposer(), "rules"
+    else:
+        proposer = aw.StudyLlmProposer(model.model, DESCRIPTION, model.base_url, memory="own", origin=options.origin)
+        by = model.model
     callback = aw.ProposalCallback(proposer, every=10, seed=options.seed)
     both = search(options.n_trials, options.seed, callback)
     print(f"With proposals:  {result(both)}")
     on_front = sum("proposal" in trial.user_attrs for trial in both.best_trials)
-    print(f"{callback.proposed} proposals by {model.model}, {on_front} of them on the front, ", end="")
+    print(f"{callback.proposed} proposals by {by}, {on_front} of them on the front, ", end="")
     print(f"faults: {dict(callback.faults) or 'none'}")
 
 

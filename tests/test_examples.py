@@ -89,7 +89,10 @@ def test_the_zdt1_example(chat_server: ChatServer) -> None:
 
 
 def test_without_a_model_an_example_says_so() -> None:
-    assert "No language model is configured" in run("optuna_zdt1.py", "--n-trials", "5")
+    """And that rules propose in its place."""
+    said = run("optuna_zdt1.py", "--n-trials", "20")
+    assert "No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead." in said
+    assert "2 proposals by rules" in said
 
 
 def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

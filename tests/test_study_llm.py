@@ -15,7 +15,8 @@ from optuna.trial import TrialState, create_trial
 from armwright.any_study.callback import ProposalCallback
 from armwright.any_study.llm import StudyLlmProposer
 from armwright.any_study.parameters import observed_space, told_parameters
-from armwright.any_study.prompt import best_trials, study_prompt
+from armwright.any_study.prompt import study_prompt
+from armwright.any_study.standing import best_trials
 from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from armwright.any_study.callback import ProposalCallback
     from armwright.any_study.llm import StudyLlmProposer
     from armwright.any_study.proposals import StudyProposal, StudyProposer
+    from armwright.any_study.rules import StudyRulesProposer
     from armwright.arm import Arm, Joint, Link, uniform_link
     from armwright.buying import ArmComparison, ComparedArm, compare_arms
     from armwright.comparison import Comparison, compare_runs
@@ -82,6 +83,7 @@ _PLACES = {
     "StudyLlmProposer": "any_study.llm",
     "StudyProposal": "any_study.proposals",
     "StudyProposer": "any_study.proposals",
+    "StudyRulesProposer": "any_study.rules",
     "Task": "task",
     "UrdfArm": "urdf.reading",
     "UsageError": "exceptions",
@@ -147,6 +149,7 @@ __all__ = [
     "StudyLlmProposer",
     "StudyProposal",
     "StudyProposer",
+    "StudyRulesProposer",
     "Task",
     "UrdfArm",
     "UsageError",

@@ -8,7 +8,7 @@ from typing import Any
 import optuna
 
 from armwright.any_study.answer import StudyAnswer, answer_schema, read_answer, written_answer
-from armwright.any_study.parameters import Parameter, Space, described, observed_space, told_parameters
+from armwright.any_study.parameters import Parameter, Space, stated_space, told_parameters
 from armwright.any_study.prompt import Told, parameters_prompt, study_prompt, told_objectives
 from armwright.any_study.proposals import StudyProposal, StudyProposer
 from armwright.exceptions import ModelError, ProposalError, SettingsError
@@ -70,14 +70,7 @@ class StudyLlmProposer(Dialogue, StudyProposer):
 
     def space(self, study: optuna.Study) -> Space:
         """What was given, and what the trials have shown besides."""
-        observed = observed_space(study)
-        for name, given in self._space.items():
-            if type(observed.get(name, given)) is not type(given):
-                raise SettingsError(
-                    f"space says that {name} is {described(given)}; in the study's trials it is "
-                    f"{described(observed[name])}"
-                )
-        return {**observed, **self._space}
+        return stated_space(study, self._space)
 
     def check(self) -> None:
         """Makes sure that answers are to be had, before any trial; ModelError where not."""

@@ -15,7 +15,7 @@ import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.trial import FrozenTrial, TrialState
 
-from armwright.exceptions import DesignError, did_you_mean
+from armwright.exceptions import DesignError, SettingsError, did_you_mean
 
 Space = Mapping[str, BaseDistribution]
 
@@ -53,6 +53,18 @@ def observed_space(study: optuna.Study) -> dict[str, BaseDistribution]:
         if trial.state.is_finished():
             space.update(trial.distributions)
     return space
+
+
+def stated_space(study: optuna.Study, given: Space) -> dict[str, BaseDistribution]:
+    """What was given, and what the trials have shown besides; SettingsError where they differ in kind."""
+    observed = observed_space(study)
+    for name, distribution in given.items():
+        if type(observed.get(name, distribution)) is not type(distribution):
+            raise SettingsError(
+                f"space says that {name} is {described(distribution)}; in the study's trials it is "
+                f"{described(observed[name])}"
+            )
+    return {**observed, **given}
 
 
 def told_parameters(space: Space, trials: Sequence[FrozenTrial]) -> list[Parameter]:

@@ -10,9 +10,9 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
 from armwright.any_study.parameters import Parameter, keys, value_text
+from armwright.any_study.standing import best_trials
 from armwright.llm.feedback import N_PARETO, N_RANDOM
 from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, Form, estimated_tokens, fenced, rendered
-from armwright.pareto import front_mask
 
 FEWEST_PROPOSED = 1
 
@@ -89,21 +89,6 @@ def parameters_prompt(parameters: Sequence[Parameter], objectives: Sequence[Told
     return rendered("study_parameters.md.j2", values)
 
 
-def best_trials(complete: Sequence[FrozenTrial], directions: Sequence[StudyDirection]) -> list[FrozenTrial]:
-    """The Pareto front of the feasible trials; of one objective, the N_PARETO best, the best first.
-
-    Where none is feasible, those that come nearest to it.
-    """
-    feasible = [trial for trial in complete if _violation(trial) == 0.0]
-    if not feasible:
-        return sorted(complete, key=_violation)[:N_PARETO]
-    signs = np.array([-1.0 if d == StudyDirection.MAXIMIZE else 1.0 for d in directions])
-    values = signs * np.array([trial.values for trial in feasible])  # (N, M), minimised
-    if len(directions) == 1:
-        return [feasible[i] for i in np.argsort(values[:, 0], kind="stable")[:N_PARETO]]
-    return [feasible[i] for i in np.flatnonzero(front_mask(values))]
-
-
 def _drawn(
     complete: Sequence[FrozenTrial], best: Sequence[FrozenTrial], seed: int, *, ranked: bool
 ) -> tuple[list[FrozenTrial], list[FrozenTrial]]:
@@ -156,12 +141,6 @@ def _values(values: Sequence[float], objectives: Sequence[Told]) -> str:
 
 def _short(value: float) -> str:
     return f"{value:.6g}"
-
-
-def _violation(trial: FrozenTrial) -> float:
-    """By how much a trial is infeasible; infinite where that is not a number."""
-    total = sum(value for value in trial.constraints.values() if not value <= 0.0)
-    return total if total == total else float("inf")
 
 
 def _is_of(trial: FrozenTrial, name: str) -> bool:
