@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import armwright as aw
 from armwright.cli import app
 from armwright.problem import Problem
 from armwright.study import optimize
@@ -109,3 +110,15 @@ def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.Capt
     assert "link_4" in arm
     assert shown == f"{len(made.front)} {made.hypervolume[-1]}"
     assert counts == "3 Counter()"
+
+
+def test_the_mujoco_example_follows_our_postures() -> None:
+    """Motors strong enough bring the tip to where the inverse kinematics has it, within what gravity bends."""
+    follow = aw.load_evaluator(f"{EXAMPLES}/mujoco_simulation.py:follow")
+    problem = aw.Problem(aw.load_task("target-1"))
+    designs = problem.space.sample(3, 0)
+    errors = problem.evaluate(designs)[:, 0]
+    for design, error in zip(designs, errors, strict=True):
+        distance, work = follow(problem.arm(design), problem.task)
+        assert distance == pytest.approx(error, abs=0.02)  # m, of six to nine targets together
+        assert work > 0.0

@@ -267,6 +267,20 @@ def test_a_worker_says_what_is_wrong(tmp_path: Path) -> None:
         aw.optimize(PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=1, out=tmp_path / "run")
 
 
+def test_a_damaged_database_is_said_at_once(tmp_path: Path) -> None:
+    with_crew(tmp_path / "run", 1, n_total=1)
+    (tmp_path / "run" / "workers.db").write_bytes(b"no database, and much longer than a header" * 100)
+    for use in (
+        lambda: aw.work(tmp_path / "run"),
+        lambda: aw.optimize(
+            PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=3, out=tmp_path / "run", workers=aw.Workers(1)
+        ),
+    ):
+        with pytest.raises(StorageError, match="file is not a database"):
+            use()
+    assert len(records(tmp_path / "run")) == 6  # the run itself is unharmed
+
+
 def test_a_password_is_written_nowhere(tmp_path: Path) -> None:
     assert shown_url("postgresql://ada:secret@host/db?password=secret") == "postgresql://ada@host/db"
     record = aw.Workers(2, "postgresql://ada:secret@host:5432/db").record(tmp_path)

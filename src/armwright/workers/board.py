@@ -260,6 +260,8 @@ class Board:
             try:
                 made = call()
             except StorageInternalError as fault:
+                if not _is_passing(fault):
+                    raise StorageError(f"the database cannot be used: {_cause(fault)}") from fault
                 now = time.monotonic()
                 if until is None:
                     until = now + OUTAGE
@@ -383,6 +385,13 @@ def _without_marks(trial: FrozenTrial) -> FrozenTrial:
 def _rank(posted: Posted) -> int:
     """Values before what may still come, and that before failures."""
     return {TrialState.COMPLETE: 2, TrialState.RUNNING: 1, TrialState.WAITING: 1}.get(posted.state, 0)
+
+
+def _is_passing(fault: StorageInternalError) -> bool:
+    """Whether the database is away, locked or full; else it is damaged, and there is nothing to wait for."""
+    from sqlalchemy.exc import InterfaceError, OperationalError, TimeoutError
+
+    return isinstance(fault.__cause__, (OperationalError, InterfaceError, TimeoutError))
 
 
 def _cause(fault: BaseException) -> str:
