@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test check gp format bench clean
+.PHONY: demo test check gp docs docs-serve format bench clean
 
 demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
 	$(BIN)/armwright optimize target-1 --seed 0
@@ -19,6 +19,12 @@ check: .venv/.test .venv/.check  ## format, lint, types, import staircase
 	$(BIN)/lint-imports
 
 gp: .venv/.gp  ## what the sampler gp needs: torch, which is large; its tests are skipped without it
+
+docs: .venv/.docs  ## the user guide, in site/index.html; needs no server and no network
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+
+docs-serve: .venv/.docs  ## the same on 127.0.0.1:8000, made anew when a page changes
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs serve
 
 format: .venv/.check
 	$(BIN)/ruff format .
@@ -48,9 +54,13 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 	$(PIP) --group check
 	@touch $@
 
+.venv/.docs: .venv/.run
+	$(PIP) --group docs
+	@touch $@
+
 .venv/.gp: .venv/.run
 	$(PIP) --editable '.[gp,live,llm]'
 	@touch $@
 
 clean:
-	rm -rf .venv build dist .pytest_cache .ruff_cache
+	rm -rf .venv build dist site .pytest_cache .ruff_cache

@@ -83,22 +83,22 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     tie: parameters that always have the value of another (`link_3: link_2`).
     """
 
-    name: str = Field(default="paper", min_length=1, max_length=100)
+    name: str = Field(default="paper", min_length=1, max_length=100)  # for tables
     joints: int | tuple[int, int] = 4
     joint_types: tuple[JointType, ...] = Field(default=("R", "P", "Y"), min_length=1)
     joint_range: Range = (-2.4, 2.4)  # [rad]
     limit: Range | None = None  # [rad]
     stroke: float | Range = 0.3  # [m]
     travel: float = Field(default=0.01, gt=0.0, le=10.0)  # [m/rad]
-    origin_x: Range = (-1.0, 1.0)  # [m]
-    origin_y: Range = (-1.0, 1.0)  # [m]
-    origin_z: Range = (-1.0, 1.0)  # [m]
+    origin_x: Range = (-1.0, 1.0)  # of the base [m]
+    origin_y: Range = (-1.0, 1.0)  # of the base [m]
+    origin_z: Range = (-1.0, 1.0)  # of the base [m]
     mount: tuple[Mount, ...] = Field(default=("floor",), min_length=1)
-    link: Range = (0.03, 0.30)  # [m]
+    link: Range = (0.03, 0.30)  # the length of each [m]
     link_directions: tuple[Direction, ...] = Field(default=("+z",), min_length=1)
-    link_radius: float = Field(default=0.015, gt=0.0, le=1.0)  # [m]
+    link_radius: float = Field(default=0.015, gt=0.0, le=1.0)  # of all links [m]
     tool: Vector = (0.0, 0.0, 0.0)  # [m]
-    mass: MassModel = MassPerMetre()
+    mass: MassModel = MassPerMetre()  # of links, by their lengths
     actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MOST_ACTUATORS)
     actuator_torque: TorqueKind = "stall"
     safety_factor: float = Field(default=1.0, gt=0.0, le=100.0)

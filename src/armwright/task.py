@@ -60,7 +60,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # of run folders, too
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
     payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MOST_TIMES_PAYLOAD)], ...] = Field(
@@ -77,8 +77,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     constraints: tuple[str, ...] = ()
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
-    description: str = Field(default="", max_length=10_000)
-    provenance: str = Field(default="", max_length=10_000)
+    description: str = Field(default="", max_length=10_000)  # what the arm has to do; proposers are told
+    provenance: str = Field(default="", max_length=10_000)  # where the points come from
     _records: tuple[Target | None, ...] = PrivateAttr(())  # of each target that says more; empty where none does
 
     @model_validator(mode="wrap")
