@@ -41,6 +41,14 @@ class Problem:
     objectives: what is minimised, of one's own too; without them, the task's, else the paper's, and the orientation
         error where a target says which way the tool points.
     constraints: what a design has to keep, as the task says it.
+
+    >>> import armwright as aw
+    >>> problem = aw.Problem(aw.load_task("target-1"), aw.paper_space(joints=4))
+    >>> [objective.name for objective in problem.objectives]
+    ['position_error', 'torque']
+    >>> designs = problem.space.sample(1000, seed=0)
+    >>> problem.evaluate(designs).shape
+    (1000, 2)
     """
 
     task: Task
