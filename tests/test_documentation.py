@@ -45,6 +45,7 @@ LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/
 # Pages whose programs are run elsewhere, where what comes of them is looked at, too.
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 SAME_AS_README = {("docs/tasks.md", "armwright optimize my-task.yaml")}
+TRANSLATED = "README.ja.md"  # its commands are those of README.md, which are run there
 
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
 SHORT = "--n-init 4 --n-total 40 --no-figures"
@@ -176,7 +177,26 @@ def file_of(block: Block) -> str | None:
     return found[1] if found else None
 
 
-@pytest.mark.parametrize("page", [pytest.param(p, marks=pytest.mark.slow if p in SLOW else ()) for p in PAGES])
+def test_the_translation_shows_the_same() -> None:
+    """Commands of the original, nearly all of them, and the same program but for its comments."""
+
+    def without_comments(page: str, language: str) -> list[str]:
+        shown = [block.text for block in blocks(page) if block.language == language]
+        return [re.sub(r"\s+#.*", "", line) for text in shown for line in text.splitlines()]
+
+    here, there = ([command.text for command in commands(page)] for page in (TRANSLATED, "README.md"))
+    assert set(here) <= set(there)
+    assert len(here) > 0.9 * len(there)
+    assert without_comments(TRANSLATED, "python") == without_comments("README.md", "python")
+    assert set(without_comments(TRANSLATED, "yaml")) <= set(without_comments("README.md", "yaml"))
+    for page, other in ((TRANSLATED, "README.md"), ("README.md", TRANSLATED)):
+        assert f"]({other})" in (ROOT / page).read_text(encoding="utf-8").split("## ")[0]
+
+
+FOLLOWED = [page for page in PAGES if page != TRANSLATED and commands(page)]
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, marks=pytest.mark.slow if p in SLOW else ()) for p in FOLLOWED])
 def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
     """Its commands, files and programs, from the first to the last, in one folder."""
     shutil.copytree(ROOT / "examples", in_folder / "examples")
@@ -190,7 +210,7 @@ def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
     for block in blocks(page):
         for number in range(len(block.text.splitlines()) + 1):
             command = run.get(f"{page}:{block.line + number}")
-            if block.language == "sh" and command and (page, command.text) not in SAME_AS_README:
+            if command is not None and (page, command.text) not in SAME_AS_README:
                 run_command(command, in_folder)
         if block.language in ("yaml", "csv") and (name := file_of(block)):
             (in_folder / name).write_text(block.text)

@@ -53,8 +53,12 @@ BOUNDS = re.compile(
 
 
 def takes(model: type[BaseModel], key: str, value: float) -> bool:
+    return takes_record(model, LEAST[model] | {key: value})
+
+
+def takes_record(model: type[BaseModel], record: dict[str, Any]) -> bool:
     try:
-        model.model_validate(LEAST[model] | {key: value})
+        model.model_validate(record)
     except ValidationError:
         return False
     return True
@@ -85,8 +89,44 @@ def test_the_bounds_that_the_reference_tells_hold(model: type[BaseModel], key: k
     assert not takes(model, key.name, kind(low - small))
 
 
+# Bounds that validators hold, and that the reference tells beside the models: what is taken at them, and not beyond.
+HELD: dict[tuple[type[BaseModel], str], tuple[list[Any], list[Any]]] = {
+    (Task, "targets"): ([[[0, 0, 1000]], [[0, 0, 0.1]] * 10_000], [[], [[0, 0, 1001]], [[0, 0, 0.1]] * 10_001]),
+    (Task, "payload"): ([0, 10_000], [-1, 10_001]),
+    (Task, "obstacles"): ([[{"kind": "ground"}] * 100], [[{"kind": "ground"}] * 101]),
+    (Task, "moves"): ([[[1, 2]]], [[[1, 2], [1, 2]]]),
+    (Task, "move_time"): ([1e-3, 10_000], [0, 10_001]),
+    (Task, "workspace"): (
+        [[LEAST[Region] | {"points": 500}] * 20],
+        [[LEAST[Region]] * 21, [LEAST[Region] | {"points": 501}] * 20],
+    ),
+    (Task, "reference_point"): ([[1e-3, 1e-3]], [[0, 1]]),
+    (DesignSpace, "joints"): ([1, 8, [1, 8]], [0, 9, [0, 8], [1, 9]]),
+    (DesignSpace, "joint_range"): ([[-6.283, 6.283], [0, 1]], [[-6.284, 1], [0.1, 1]]),
+    (DesignSpace, "limit"): ([[0.0262, 6.283]], [[0.0261, 1], [1, 6.284]]),
+    (DesignSpace, "stroke"): ([0.003, 1000, [0.003, 1000]], [0.0029, 1001, [0.0029, 1]]),
+    (DesignSpace, "link"): ([[1e-3, 1000]], [[0, 1], [1, 1001]]),
+    (DesignSpace, "tool"): ([[0, 0, -1000]], [[0, 0, -1001]]),
+    (DesignSpace, "origin_x"): ([[-1000, 1000]], [[-1001, 0]]),
+    (DesignSpace, "origin_y"): ([[-1000, 1000]], [[-1001, 0]]),
+    (DesignSpace, "origin_z"): ([[-1000, 1000]], [[-1001, 0]]),
+    (ExperimentPlan, "seeds"): ([1, 10_000, [3, 1]], [0, 10_001, [1, 1]]),
+}
+
+
+@pytest.mark.parametrize("at", list(keys.BOUNDS), ids=lambda at: f"{at[0].__name__}.{at[1]}")
+def test_the_bounds_that_validators_hold_are_told(at: tuple[type[BaseModel], str]) -> None:
+    model, key = at
+    usual = {name: value for name, value in LEAST[model].items() if key != "targets" or "move" not in name}
+    taken, refused = HELD[at]
+    for value in taken:
+        assert takes_record(model, usual | {key: value}), value
+    for value in refused:
+        assert not takes_record(model, usual | {key: value}), value
+
+
 def test_there_are_many_such_bounds() -> None:
-    assert {key.name for _, key in numbers()} >= {"payload", "jitter", "restarts", "yaw", "radius", "joints", "mass"}
+    assert {key.name for _, key in numbers()} >= {"payload", "jitter", "restarts", "yaw", "radius", "mass"}
 
 
 def test_defaults_and_needs_are_those_of_the_models() -> None:
@@ -97,14 +137,6 @@ def test_defaults_and_needs_are_those_of_the_models() -> None:
             if key.is_needed:
                 without = {name: value for name, value in least.items() if name != key.name}
                 assert not takes_record(model, without), key.name
-
-
-def takes_record(model: type[BaseModel], record: dict[str, Any]) -> bool:
-    try:
-        model.model_validate(record)
-    except ValidationError:
-        return False
-    return True
 
 
 def test_every_key_has_words_and_every_length_its_unit() -> None:

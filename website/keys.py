@@ -64,6 +64,11 @@ BOUNDS: Mapping[tuple[type[BaseModel], str], str] = {
     (Task, "reference_point"): "above 0",
     (DesignSpace, "joints"): f"1 to {space.MOST_MODULES}",
     (DesignSpace, "joint_range"): f"within ±{space.LARGEST_ANGLE:.4g}; holds 0",
+    (DesignSpace, "limit"): f"{space.LEAST_TURN / 2:.4g} to {space.LARGEST_ANGLE:.4g}",
+    (DesignSpace, "stroke"): f"{space.LEAST_STROKE:g} to {space.LARGEST_LENGTH:,g}",
+    (DesignSpace, "link"): f"above 0, at most {space.LARGEST_LENGTH:,g}",
+    (DesignSpace, "tool"): f"within ±{space.LARGEST_LENGTH:,g}",
+    **{(DesignSpace, f"origin_{axis}"): f"within ±{space.LARGEST_LENGTH:,g}" for axis in "xyz"},
     (ExperimentPlan, "seeds"): f"1 to {plan.MOST_SEEDS:,}, or a list of different ones",
 }
 
