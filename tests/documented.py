@@ -7,7 +7,7 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "README.ja.md", *sorted(f"docs/{file.name}" for file in (ROOT / "docs").glob("*.md")))
+PAGES = tuple(sorted(str(file.relative_to(ROOT)) for at in (ROOT, ROOT / "docs") for file in at.glob("*.md")))
 
 PROGRAMS = ("armwright", ".venv/bin/armwright", "python", "python3", ".venv/bin/python", "pip", "make", "export", "sh",
             "xargs", "sudo", "apt", "apt-get", "dask", "ssh", "git", "docker", "optuna-dashboard", ".")  # fmt: skip

@@ -200,8 +200,8 @@ FOLLOWED = [page for page in PAGES if page != TRANSLATED and commands(page)]
 def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
     """Its commands, files and programs, from the first to the last, in one folder."""
     shutil.copytree(ROOT / "examples", in_folder / "examples")
-    for name in ("ur3", "so101"):
-        shutil.copy(robot(name), in_folder / f"{name}.urdf")
+    for name, file in (("ur3", "ur3_robot"), ("so101", "so101")):
+        shutil.copy(robot(file), in_folder / f"{name}.urdf")
     for name, text in FILES.get(page, {}).items():
         (in_folder / name).write_text(text)
     for line in BEFORE.get(page, ()):

@@ -5,7 +5,11 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGES = {"README.md": "index.md", "README.ja.md": "ja.md"}  # files outside docs/ that are pages, by their paths there
+# The files beside docs/ that are pages, and their paths there.
+PAGES = {file.name: file.name.lower() for file in ROOT.glob("*.md")} | {
+    "README.md": "index.md",
+    "README.ja.md": "ja.md",
+}
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".csv": "text", ".j2": "jinja", ".js": "javascript"}
 
 _LINK = re.compile(r"\]\((?P<to>[^)#:\s]+)(?P<anchor>#[^)\s]*)?\)")
