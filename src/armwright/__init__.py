@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from armwright.export.xacro import to_xacro
     from armwright.front import FrontRun, find_front
     from armwright.history import FinishedTrial, FrontMember, History
+    from armwright.measuring import Evaluator, evaluator, load_evaluator
     from armwright.parameters import Design
     from armwright.pareto import hypervolume
     from armwright.polish import polish_run
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
     from armwright.study import Run, optimize
     from armwright.task import Task, builtin_tasks, load_task, random_task
     from armwright.urdf.reading import UrdfArm, read_urdf
+    from armwright.workers.plan import Workers
+    from armwright.workers.worker import work
 
 # Where each public name lives. Modules load when a name of theirs is first used, so that the command line
 # answers at once and nobody pays for what is not used.
@@ -58,6 +61,7 @@ _PLACES = {
     "DesignSpace": "space",
     "Draft": "drafting",
     "Evaluation": "evaluation",
+    "Evaluator": "measuring",
     "FailureError": "exceptions",
     "FinishedTrial": "history",
     "FrontMember": "history",
@@ -81,13 +85,16 @@ _PLACES = {
     "Task": "task",
     "UrdfArm": "urdf.reading",
     "UsageError": "exceptions",
+    "Workers": "workers.plan",
     "builtin_tasks": "task",
     "compare_arms": "buying",
     "compare_runs": "comparison",
     "draft": "drafting",
     "evaluate": "evaluation",
+    "evaluator": "measuring",
     "find_front": "front",
     "hypervolume": "pareto",
+    "load_evaluator": "measuring",
     "load_space": "space",
     "load_task": "task",
     "optimize": "study",
@@ -104,6 +111,7 @@ _PLACES = {
     "to_xacro": "export.xacro",
     "uniform_link": "arm",
     "verify_run": "results",
+    "work": "workers.worker",
     "write_figures": "report.figures",
     "write_report": "report.page",
 }
@@ -118,6 +126,7 @@ __all__ = [
     "DesignSpace",
     "Draft",
     "Evaluation",
+    "Evaluator",
     "FailureError",
     "FinishedTrial",
     "FrontMember",
@@ -141,13 +150,16 @@ __all__ = [
     "Task",
     "UrdfArm",
     "UsageError",
+    "Workers",
     "builtin_tasks",
     "compare_arms",
     "compare_runs",
     "draft",
     "evaluate",
+    "evaluator",
     "find_front",
     "hypervolume",
+    "load_evaluator",
     "load_space",
     "load_task",
     "optimize",
@@ -164,6 +176,7 @@ __all__ = [
     "to_xacro",
     "uniform_link",
     "verify_run",
+    "work",
     "write_figures",
     "write_report",
 ]

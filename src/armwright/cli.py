@@ -83,6 +83,12 @@ DeviceName = Annotated[str, typer.Option(help="Where arms are evaluated: auto, c
 Figures = Annotated[
     bool, typer.Option("--figures/--no-figures", help="Make the page (report.html) and the figures of a finished run.")
 ]
+EvaluatorName = Annotated[
+    str | None,
+    typer.Option(
+        help="A Python function of your own that measures arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run."
+    ),
+]
 BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")]
 
 
@@ -91,6 +97,18 @@ def optimize(
     task: TaskName,
     space: SpaceFile = None,
     objectives: Objectives = None,
+    evaluator: EvaluatorName = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="So many designs at a time are evaluated by other processes: armwright worker RUN."),
+    ] = None,
+    storage: Annotated[
+        str | None,
+        typer.Option(
+            help="With --workers: URL of a database that all of them reach, such as postgresql://user@host/database. "
+            "[default: ARMWRIGHT_STORAGE, else a SQLite file in the run folder]"
+        ),
+    ] = None,
     sampler: Annotated[
         str, typer.Option(help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.")
     ] = "tpe",
@@ -174,9 +192,10 @@ def optimize(
     from armwright.proposers.choice import Wishes, choose_proposer
     from armwright.starts import read_design
     from armwright.study import optimize as run_study
+    from armwright.workers.plan import Workers
 
     words = view.stderr_console() if json_ else view.stdout_console()
-    problem = _problem(task, space, robust, device, objectives=objectives)
+    problem = _problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
     starts = [read_design(file, problem.space) for file in start or ()]
     wishes = Wishes(
         proposer, model, base_url, prompt, memory, answer, proposals, temperature, model_seed, output, origin,
@@ -184,6 +203,8 @@ def optimize(
     )  # fmt: skip
     if in_flight is not None and not overlap:
         raise SettingsError(f"--in-flight {in_flight} goes with --overlap")
+    if storage is not None and workers is None:
+        raise SettingsError("--storage goes with --workers")
     choice = choose_proposer(wishes)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     words.print(choice.reason)
@@ -205,6 +226,7 @@ def optimize(
                 start=starts,
                 on_model_failure=on_model_failure,
                 verify=verify,
+                workers=None if workers is None else Workers(workers, storage),
                 seed=seed,
                 out=folder,
                 watch=watch,
@@ -235,6 +257,32 @@ def optimize(
     elif run.resumed:
         words.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
     view.show_result(words, run, drawn)
+
+
+@app.command()
+def worker(
+    run: Annotated[Path, typer.Argument(help="A run folder that optimize --workers began, or a copy of it.")],
+    evaluator: EvaluatorName = None,
+    storage: Annotated[
+        str | None,
+        typer.Option(help="URL of the database.  [default: ARMWRIGHT_STORAGE, else as the run folder says]"),
+    ] = None,
+) -> None:
+    """Evaluate designs of RUN until its search is over. Start as many as you like, on any machine."""
+    import signal
+
+    from armwright.measuring import load_evaluator
+    from armwright.workers.plan import STORAGE_VARIABLE
+    from armwright.workers.worker import work
+
+    def stop(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)  # as Ctrl-C: what it evaluates goes to another worker at once
+    measured = None if evaluator is None else load_evaluator(evaluator)
+    url = storage or os.environ.get(STORAGE_VARIABLE)
+    done = work(run, measured, url, lambda words: print(words, flush=True))
+    print(f"the search is over; {done} designs were evaluated here")
 
 
 @app.command(name="prompt")
@@ -846,26 +894,35 @@ def _problem(
     device: str = "cpu",
     many: bool = False,
     objectives: str | None = None,
+    evaluator: str | None = None,
 ) -> "Problem":
     from armwright.kinematics.devices import resolve_device
-    from armwright.objectives import PAPER_OBJECTIVES
+    from armwright.measuring import load_evaluator
+    from armwright.objectives import PAPER_OBJECTIVES, named_objectives
     from armwright.problem import Problem
     from armwright.space import load_space, paper_space
     from armwright.task import load_task
     from armwright.tolerance import TOLERANCE
 
     loaded = load_task(task)
-    if objectives is not None:
-        names = tuple(name.strip() for name in objectives.split(","))
-        if names != (
-            loaded.objectives or tuple(o.name for o in PAPER_OBJECTIVES)
-        ):  # a reference point is for other ones
-            loaded = loaded.model_copy(update={"objectives": names, "reference_point": None})
+    measured = None if evaluator is None else load_evaluator(evaluator)
+    names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))
+    chosen = ()
+    if measured is not None:
+        # What the task says of objectives is of others than the evaluator's.
+        loaded = loaded.model_copy(update={"objectives": None, "reference_point": None})
+        chosen = named_objectives(names, measured.objectives) if names else measured.objectives
+    elif objectives is not None and names != (
+        loaded.objectives or tuple(o.name for o in PAPER_OBJECTIVES)
+    ):  # a reference point is for other ones
+        loaded = loaded.model_copy(update={"objectives": names, "reference_point": None})
     return Problem(
         loaded,
         paper_space() if space is None else load_space(space),
         tolerance=TOLERANCE if robust else 0.0,
         device=resolve_device(device, many),
+        objectives=chosen,
+        evaluator=measured,
     )
 
 

@@ -15,6 +15,8 @@
         ├── ModelError          a language model that cannot be used
         ├── ReplayError         a recorded run that cannot be played again, or not to the letter
         ├── ProposalError       a proposer gave no design; the trial becomes a black-box one
+        ├── EvaluatorError      an evaluator of one's own failed, or the workers that run it
+        ├── StorageError        the database that workers share does not answer, or holds no such study
         └── MissingExtraError   an optional dependency that is not installed
 
 A message is one line in the user's words: it names the value with its unit, what is allowed, and the
@@ -99,6 +101,14 @@ class ProposalError(FailureError):
         super().__init__(message)
         self.kind = kind
         self.final = final
+
+
+class EvaluatorError(FailureError):
+    """An evaluator of one's own failed, or the workers that run it."""
+
+
+class StorageError(FailureError):
+    """The database that workers share does not answer, or holds no such study."""
 
 
 class AnswerPendingError(ArmwrightError):

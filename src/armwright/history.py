@@ -36,6 +36,7 @@ class FinishedTrial:
     refines: the trial whose design was refined for this one.
     evaluations: designs that were evaluated to find it (a refined one: many; the same arm as an earlier one: none).
     same_as: the earlier trial whose arm it is, and whose values it has (`canonical.py`).
+    failure: why an evaluator of one's own gave no values, so that the design has the worst.
     seconds: wall time by part (proposing, sampling, evaluation).
     sampler_notes: what the sampler noted on its trial and study (a genetic one: generations), needed to resume.
     """
@@ -56,6 +57,7 @@ class FinishedTrial:
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     constraints: tuple[float, ...] = ()
+    failure: str = ""
 
     @property
     def is_feasible(self) -> bool:

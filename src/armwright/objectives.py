@@ -368,15 +368,19 @@ MANIPULABILITY = Objective(
 TO_BOUND = (*CLEARANCES, MANIPULABILITY)  # of which more is better: no objectives
 
 
-def named_objectives(names: Sequence[str]) -> tuple[Objective, ...]:
-    """The objectives of these names; SettingsError where one does not exist, or they are too many or named twice."""
+def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> tuple[Objective, ...]:
+    """The objectives of these names; SettingsError where one does not exist, or they are too many or named twice.
+
+    others: that may be named as well.
+    """
+    known = {objective.name: objective for objective in others} | dict(OBJECTIVES)
     for name in names:
-        if name not in OBJECTIVES:
+        if name not in known:
             raise SettingsError(
-                f'unknown objective "{name}".{did_you_mean(name, OBJECTIVES)} Objectives: {", ".join(OBJECTIVES)}'
+                f'unknown objective "{name}".{did_you_mean(name, known)} Objectives: {", ".join(known)}'
             )
     if not 1 <= len(names) <= MOST_OBJECTIVES or len(set(names)) < len(names):
         raise SettingsError(
             f"objectives: {', '.join(names) or 'none'}; 1 to {MOST_OBJECTIVES} different ones are needed"
         )
-    return tuple(OBJECTIVES[name] for name in names)
+    return tuple(known[name] for name in names)

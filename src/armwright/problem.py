@@ -1,6 +1,6 @@
 """The problem: a design space, a task, and what is minimised."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,10 +8,11 @@ import numpy as np
 from armwright.arm import Arm
 from armwright.constraints import Constraint, read_constraints
 from armwright.evaluation import Array, Evaluation, evaluate_arrays
-from armwright.exceptions import SettingsError, TaskError
+from armwright.exceptions import EvaluatorError, SettingsError, TaskError
 from armwright.feasibility import ranked
 from armwright.kinematics.arrays import ArmArrays, arrays_of
 from armwright.kinematics.devices import Device, resolve_device
+from armwright.measuring import Evaluator
 from armwright.objectives import (
     OF_CLEARANCE,
     OF_MOVES,
@@ -28,7 +29,21 @@ from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
 from armwright.tolerance import moved
 
+NOTHING_MEASURED: Mapping[str, Array] = {}
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What one design comes to.
+
+    values: its objectives.  constraints: how far it breaks each, <= 0: not at all.
+    failure: why its evaluator gave no values, so that it counts the worst; empty where it gave some.
+    """
+
+    values: tuple[float, ...]
+    constraints: tuple[float, ...]
+    failure: str = ""
 
 
 @dataclass(frozen=True)
@@ -40,6 +55,7 @@ class Problem:
     device: where arms are evaluated; `resolve_device` says which there are.
     objectives: what is minimised, of one's own too; without them, the task's, else the paper's, and the orientation
         error where a target says which way the tool points.
+    evaluator: a function of one's own that measures objectives in place of ours (`armwright.measuring`).
     constraints: what a design has to keep, as the task says it.
 
     >>> import armwright as aw
@@ -56,6 +72,7 @@ class Problem:
     tolerance: float = 0.0
     device: Device = "cpu"
     objectives: tuple[Objective, ...] = ()
+    evaluator: Evaluator | None = None
     constraints: tuple[Constraint, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
@@ -67,7 +84,13 @@ class Problem:
         if not self.objectives:
             names = self.task.objectives
             usual = (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.goals.oriented else PAPER_OBJECTIVES
+            if self.evaluator is not None:
+                usual = self.evaluator.objectives
             object.__setattr__(self, "objectives", usual if names is None else named_objectives(names))
+        if self.evaluator is not None and self.tolerance > 0.0:
+            raise SettingsError(
+                f"a tolerance does not go with the evaluator {self.evaluator.name}, which measures an arm as it is"
+            )
         for objective in self.objectives:
             if objective in OF_ORIENTATION and not self.task.goals.oriented:
                 raise SettingsError(
@@ -147,13 +170,16 @@ class Problem:
         known = (payloads, task.obstacles, task.goals, task.lines, task.workspace)
         return evaluate_arrays(arms, points, self.device, start, *known)
 
-    def _judged_rows(self, rows: Array) -> Array:
-        """(n, M + C) of designs as rows: the worst, in each by itself, of the cases that the task may come to."""
-        worst, others = self.judged(self.evaluation_of_rows(rows)), self.task.cases[1:]
+    def _judged_rows(self, rows: Array, measured: Mapping[str, Array] = NOTHING_MEASURED) -> Array:
+        """(n, M + C) of designs as rows: the worst, in each by itself, of the cases that the task may come to.
+
+        measured: (n,) of each objective that an evaluator measures.
+        """
+        worst, others = self.judged(self.evaluation_of_rows(rows), measured), self.task.cases[1:]
         arms = arrays_of(self.space, rows) if others else None
         for case in others:
             assert arms is not None
-            worst = np.maximum(worst, self.judged(self._of_case(arms, *case)))
+            worst = np.maximum(worst, self.judged(self._of_case(arms, *case), measured))
         return worst
 
     def evaluate_matrix(self, matrix: Array) -> Array:
@@ -184,9 +210,12 @@ class Problem:
         values, broken = self.judge_matrix(matrix)
         return ranked(values, broken) if self.constraints else values
 
-    def values(self, evaluation: Evaluation) -> Array:
-        """(N, M): the objectives of evaluated designs, minimised; SettingsError where one is not a finite number."""
-        values = np.column_stack([objective(evaluation) for objective in self.objectives])
+    def values(self, evaluation: Evaluation, measured: Mapping[str, Array] = NOTHING_MEASURED) -> Array:
+        """(N, M): the objectives of evaluated designs, minimised; SettingsError where one is not a finite number.
+
+        measured: (N,) of each objective that an evaluator measures.
+        """
+        values = np.column_stack([measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives])
         if not np.all(np.isfinite(values)):
             row, column = np.argwhere(~np.isfinite(values))[0]
             raise SettingsError(
@@ -195,9 +224,9 @@ class Problem:
             )
         return values
 
-    def judged(self, evaluation: Evaluation) -> Array:
+    def judged(self, evaluation: Evaluation, measured: Mapping[str, Array] = NOTHING_MEASURED) -> Array:
         """(N, M + C): the objectives of evaluated designs, then how far each constraint is broken."""
-        values = self.values(evaluation)
+        values = self.values(evaluation, measured)
         if not self.constraints:
             return values
         broken = np.column_stack([constraint(evaluation) for constraint in self.constraints])
@@ -219,11 +248,39 @@ class Problem:
         With a tolerance, or other cases of the task, the worst of each by itself.
         """
         rows = self.space.matrix(designs)
-        found = self._judged_rows(rows)
+        found = self._judged_rows(rows, self._measured([self._measurement(design)[0] for design in designs]))
         if self.tolerance > 0.0:
             for copies in moved(self.space, rows, self.tolerance):
                 found = np.maximum(found, self._judged_rows(copies))
         return self.split(found)
+
+    def judge_one(self, design: Design) -> Judgement:
+        """What one design comes to; EvaluatorError where its evaluator fails and has no `worst`."""
+        if self.evaluator is None:
+            values, broken = self.judge([design])
+            return Judgement(tuple(values[0].tolist()), tuple(broken[0].tolist()))
+        measured, failure = self._measurement(design)
+        values, broken = self.split(self._judged_rows(self.space.matrix([design]), self._measured([measured])))
+        return Judgement(tuple(values[0].tolist()), tuple(broken[0].tolist()), failure)
+
+    def _measurement(self, design: Design) -> tuple[tuple[float, ...], str]:
+        """What the evaluator, where there is one, measures of a design, and why it could not."""
+        if self.evaluator is None:
+            return (), ""
+        try:
+            return self.evaluator(self.arm(design), self.task), ""
+        except EvaluatorError as failure:
+            if self.evaluator.worst is None:
+                raise
+            return self.evaluator.worst, str(failure)
+
+    def _measured(self, rows: Sequence[Sequence[float]]) -> Mapping[str, Array]:
+        """The evaluator's numbers of N designs by objective."""
+        if self.evaluator is None:
+            return NOTHING_MEASURED
+        names = [objective.name for objective in self.evaluator.objectives]
+        table = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+        return {name: table[:, column] for column, name in enumerate(names)}
 
     def evaluate(self, designs: Sequence[Design]) -> Array:
         """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""

@@ -16,6 +16,7 @@ import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
@@ -32,6 +33,7 @@ from armwright.exceptions import DesignError, RunConflictError, RunFolderError
 from armwright.files import replace_file, writable
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.devices import Device, usable_device
+from armwright.measuring import Evaluator
 from armwright.objectives import OBJECTIVES, PAPER_OBJECTIVES, Objective
 from armwright.problem import Problem
 from armwright.space import DesignSpace
@@ -88,6 +90,21 @@ class FrontMethod(BaseModel, frozen=True, extra="forbid"):
         return 0
 
 
+class WorkersRecord(BaseModel, frozen=True, extra="forbid"):
+    """Where the designs of a study wait for workers (`armwright worker`).
+
+    storage: the URL of the database that search and workers share, without its password.
+    study: the name of Optuna's study there.
+    at_a_time: designs under way at most.
+    heartbeat: [s] between two signs of life of a worker; it counts as dead after some without.
+    """
+
+    storage: str
+    study: str
+    at_a_time: int = Field(ge=1, le=10_000)
+    heartbeat: int = Field(default=10, ge=1, le=3600)
+
+
 class ObjectiveRecord(BaseModel, frozen=True, extra="forbid"):
     """An objective as a run's settings tell of it; its formula is code."""
 
@@ -118,6 +135,8 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     reference_point: tuple[float, ...] | None
     method: Method | FrontMethod
     seed: int
+    evaluator: str | None = None  # of one's own that measured designs in place of ours, by name; never loaded from here
+    workers: WorkersRecord | None = None
     versions: dict[str, str]
     earlier_versions: list[dict[str, str]] = []  # of sessions that made earlier trials, where they were others
 
@@ -127,8 +146,13 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
 
         Objectives of one's own have their names and values here; to compute them again needs the problem itself.
         """
-        objectives = tuple(map(_recorded, self.objectives))
-        return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives)
+        return self.problem_with(None)
+
+    def problem_with(self, evaluator: Evaluator | None) -> Problem:
+        """The problem of the run with the evaluator that measures its designs."""
+        own = {} if evaluator is None else {objective.name: objective for objective in evaluator.objectives}
+        objectives = tuple(own.get(record.name) or _recorded(record) for record in self.objectives)
+        return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives, evaluator)
 
     @property
     def study(self) -> Method:
@@ -152,12 +176,15 @@ def _recorded(record: ObjectiveRecord) -> Objective:
             f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
         )
 
-    return Objective(record.name, record.label, record.unit, record.symbol, words=record.label.lower(), each=each)
+    words = record.label.lower()
+    return Objective(record.name, record.label, record.unit, record.symbol, words=words, each=each, over="arm")
 
 
-def versions() -> dict[str, str]:
-    """The versions that the numbers of a run depend on."""
+def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
+    """The versions that the numbers of a run depend on; of an evaluator's file, a part of its sha256."""
     found = {"python": platform.python_version()}
+    if evaluator is not None and evaluator.version:
+        found["evaluator"] = evaluator.version
     for package in PACKAGES:
         with suppress(metadata.PackageNotFoundError):  # an extra
             found[package] = metadata.version(package)
@@ -203,8 +230,12 @@ class RunFolder:
             return config
         there = read_config(self.path)
         check_same_run(self.path, there, config)
+        if config.workers is not None and there.workers is not None and config.workers != there.workers:
+            workers = config.workers.model_copy(update={"study": there.workers.study})  # where its designs lie
+            there = there.model_copy(update={"workers": workers})
+            self.write_config(there)
         if config.method != there.method:  # a larger n_total
-            if (self.path / TRIALS).read_bytes().count(b"\n") > there.study.n_trials:
+            if self._n_trials() > there.study.n_trials:
                 raise RunConflictError(
                     f"{self.path} was polished, so its study cannot go on; give another --out DIR, or polish it again"
                 )
@@ -212,9 +243,9 @@ class RunFolder:
             self.write_config(there)
         return there
 
-    def note_versions(self, config: RunConfig) -> RunConfig:
+    def note_versions(self, config: RunConfig, evaluator: Evaluator | None = None) -> RunConfig:
         """The configuration of a run that goes on: where the versions are others now, those before are noted."""
-        now = versions()
+        now = versions(evaluator)
         if config.versions != now:
             earlier = [*config.earlier_versions, config.versions]
             config = config.model_copy(update={"versions": now, "earlier_versions": earlier})
@@ -222,9 +253,14 @@ class RunFolder:
         return config
 
     def _holds_run(self) -> bool:
-        """Whether a run lies here that came to a trial, or to a first state of its search."""
+        """Whether a run lies here that came to a trial, or a first state of its search, or whose workers may have."""
+        if (self.path / SEARCH).exists() or self._n_trials():
+            return True
+        return (self.path / CONFIG).is_file() and read_config(self.path).workers is not None
+
+    def _n_trials(self) -> int:
         trials = self.path / TRIALS
-        return (self.path / SEARCH).exists() or (trials.is_file() and b"\n" in trials.read_bytes())
+        return trials.read_bytes().count(b"\n") if trials.is_file() else 0
 
     def _check_free(self) -> None:
         """RunConflictError where the folder holds anything but what a run without trials leaves."""
@@ -317,8 +353,8 @@ def read_run(path: str | Path) -> tuple[RunConfig, History]:
     return config, History(config.problem, trials, config.method.n_init, config.reference_point)
 
 
-class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, strict=True):
-    """One line of trials.jsonl."""
+class _BegunRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, strict=True):
+    """A trial that is to be evaluated."""
 
     number: int
     source: str
@@ -332,28 +368,54 @@ class _TrialRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, 
     evaluations: int = Field(default=1, ge=0)
     same_as: int | None = None
     params: dict[str, float | str]
+
+
+class _TrialRecord(_BegunRecord, frozen=True):
+    """One line of trials.jsonl."""
+
     values: list[float] = Field(min_length=1)
     constraints: list[float] = []
+    failure: str = ""
     seconds: dict[str, float]
     sampler_notes: dict[str, dict[str, Any]] = {}
 
 
+def begun_record(trial: FinishedTrial) -> dict[str, Any]:
+    """A trial that has no values yet, for `read_begun` in another process."""
+    return _BegunRecord(**_begun_fields(trial)).model_dump(exclude_defaults=True)
+
+
+def read_begun(record: Any, space: DesignSpace) -> FinishedTrial:
+    """The trial of a record; RunFolderError where it is none of this space."""
+    try:
+        return _begun_trial(_BegunRecord.model_validate(record), space)
+    except (ValueError, DesignError) as fault:
+        raise RunFolderError(f"a trial that was posted for workers is damaged: {_words(fault)}") from fault
+
+
+def _begun_fields(trial: FinishedTrial) -> dict[str, Any]:
+    return {
+        "number": trial.number,
+        "source": trial.source,
+        "proposal": trial.proposal,
+        "reason": writable(trial.reason),
+        "expected": None if trial.expected is None else list(trial.expected),
+        "fault": trial.fault,
+        "asked": trial.asked,
+        "feedback": trial.feedback,
+        "refines": trial.refines,
+        "evaluations": trial.evaluations,
+        "same_as": trial.same_as,
+        "params": dict(trial.design.params),
+    }
+
+
 def _trial_line(trial: FinishedTrial) -> bytes:
     record = _TrialRecord(
-        number=trial.number,
-        source=trial.source,
-        proposal=trial.proposal,
-        reason=writable(trial.reason),
-        expected=None if trial.expected is None else list(trial.expected),
-        fault=trial.fault,
-        asked=trial.asked,
-        feedback=trial.feedback,
-        refines=trial.refines,
-        evaluations=trial.evaluations,
-        same_as=trial.same_as,
-        params=dict(trial.design.params),
+        **_begun_fields(trial),
         values=list(trial.values),
         constraints=list(trial.constraints),
+        failure=writable(trial.failure),
         seconds=dict(trial.seconds),
         sampler_notes={place: dict(noted) for place, noted in trial.sampler_notes.items()},
     )
@@ -441,12 +503,22 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int
         raise ValueError(f"{len(record.constraints)} constraints where {n_constraints} are due")
     if record.number != number:
         raise ValueError(f"number {record.number} where {number} is due")
-    return FinishedTrial(
-        number=number,
-        source=record.source,
-        design=space.design(record.params),
+    return replace(
+        _begun_trial(record, space),
         values=tuple(record.values),
         constraints=tuple(record.constraints),
+        failure=record.failure,
+        seconds=record.seconds,
+        sampler_notes=record.sampler_notes,
+    )
+
+
+def _begun_trial(record: _BegunRecord, space: DesignSpace) -> FinishedTrial:
+    return FinishedTrial(
+        number=record.number,
+        source=record.source,
+        design=space.design(record.params),
+        values=(),
         proposal=record.proposal,
         reason=record.reason,
         expected=None if record.expected is None else tuple(record.expected),
@@ -456,8 +528,6 @@ def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int
         refines=record.refines,
         evaluations=record.evaluations,
         same_as=record.same_as,
-        seconds=record.seconds,
-        sampler_notes=record.sampler_notes,
     )
 
 
@@ -497,6 +567,7 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     content = config.model_dump(mode="json")
     content["task"] = {key: content["task"][key] for key in IDENTITY}
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
+    content["workers"] = None if content["workers"] is None else "evaluate"  # how many, and where, may change
     method = content.pop("method")
     method.pop("n_total", None)
     if method.get("begin_with"):

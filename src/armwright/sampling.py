@@ -6,7 +6,8 @@ whole run would repeat its first draws, this one goes on as if it had never stop
 
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
 from types import CodeType, FunctionType, MethodType
@@ -40,11 +41,11 @@ _verbosity = threading.Lock()  # of the process; else two threads would put back
 
 
 def _tpe(seed: int) -> BaseSampler:
-    return TPESampler(n_startup_trials=10, multivariate=False, constant_liar=False, seed=seed)
+    return TPESampler(n_startup_trials=10, multivariate=False, constant_liar=True, seed=seed)
 
 
 def _tpe_multivariate(seed: int) -> BaseSampler:
-    return TPESampler(n_startup_trials=10, multivariate=True, constant_liar=False, seed=seed)
+    return TPESampler(n_startup_trials=10, multivariate=True, constant_liar=True, seed=seed)
 
 
 def _nsga2(seed: int) -> BaseSampler:
@@ -280,11 +281,17 @@ def _attributes(source: str, proposal: str | None) -> dict[str, Any]:
 
 def quiet_study(storage: InMemoryStorage, directions: Sequence[StudyDirection]) -> optuna.Study:
     """A new study that Optuna does not announce."""
+    with quietly():
+        return optuna.create_study(storage=storage, directions=directions)
+
+
+@contextmanager
+def quietly() -> Generator[None, None, None]:
+    """Optuna announces each study at INFO; the user's own verbosity is put back."""
     with _verbosity:
-        # Optuna announces each study at INFO; the user's own verbosity is put back.
         verbosity = optuna.logging.get_verbosity()
         optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
         try:
-            return optuna.create_study(storage=storage, directions=directions)
+            yield
         finally:
             optuna.logging.set_verbosity(verbosity)

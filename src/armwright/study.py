@@ -17,17 +17,19 @@ from armwright.canonical import SameArms
 from armwright.control import Channel
 from armwright.exceptions import ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMember, History
+from armwright.judging import Here, Judged, Judging
 from armwright.parameters import Design
 from armwright.pareto import Array, FrontTracker
-from armwright.problem import Problem
+from armwright.problem import Judgement, Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.refining import Refinement, refine_one
 from armwright.results import discard_results, read_summary, results_are_there, summarize, write_results
-from armwright.run_folder import Method, RunConfig, RunFolder, record_objectives, versions
+from armwright.run_folder import Method, RunConfig, RunFolder, WorkersRecord, record_objectives, versions
 from armwright.sampling import BlackBox, SamplerFactory, sampler_name
 from armwright.turns import Asker, Nobody, Recorded, Schedule, Turn, Turns, asking_turns, past_turns
 from armwright.verification import verify_front
+from armwright.workers.plan import Workers
 
 LARGEST = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
@@ -55,6 +57,23 @@ class Progress:
     fault: str | None = None
     faults: Mapping[str, int] = field(default_factory=dict[str, int])
     note: str = ""
+
+
+@dataclass
+class _Begun:
+    """A trial that is under way.
+
+    trial: Optuna's.  finished: the trial as far as it is known.
+    proposing, sampling: seconds so far.
+    """
+
+    trial: Any
+    finished: FinishedTrial
+    turn: Turn | None
+    refinement: Refinement | None
+    proposing: float
+    sampling: float
+    judged: Judged | None = None
 
 
 @dataclass(frozen=True)
@@ -96,6 +115,7 @@ def optimize(
     start: Sequence[Design] = (),
     on_model_failure: str = "stop",
     verify: bool = True,
+    workers: Workers | None = None,
     seed: int = 0,
     out: str | Path | None = None,
     watch: Callable[[Progress], None] | None = None,
@@ -108,7 +128,8 @@ def optimize(
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
     start: designs to begin with, such as an arm that is there already: the first of the n_init trials are theirs.
-    verify: whether the front is verified where results are written (`verification.py`).
+    verify: whether the front is verified where results are written (`verification.py`); not with an evaluator.
+    workers: processes that evaluate in place of this one (`armwright worker`); needs `out`.
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials; a run
         that has begun always goes on.
 
@@ -132,14 +153,16 @@ def optimize(
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every, start)
     for design in method.start:
         problem.space.design(design)  # says what is wrong before anything is begun
-    config = study_config(problem, method, seed)
+    check_workers(workers, method, out)
+    record = None if workers is None or out is None else workers.record(Path(out))
+    config = study_config(problem, method, seed, record)
     with ExitStack() as stack:
         folder = None
         if out is not None:
             folder = stack.enter_context(RunFolder(Path(out)))
             config = folder.adopt(config)
-        study = Study(problem, config, proposer, sampler, folder, watch)
-        return study.run(on_model_failure, verify)
+        study = Study(problem, config, proposer, sampler, folder, watch, workers)
+        return study.run(on_model_failure, verify and problem.evaluator is None)
 
 
 class Study:
@@ -153,8 +176,10 @@ class Study:
         sampler: str | SamplerFactory,
         folder: RunFolder | None,
         watch: Callable[[Progress], None] | None,
+        workers: Workers | None = None,
     ) -> None:
         self.problem = problem
+        self.workers = workers
         self.config = config
         self.method = config.study
         self.proposer = proposer
@@ -175,6 +200,8 @@ class Study:
         for row in self._history().counted:
             self._tracker.add(row)
         self._freeze_reference_point()
+        self._judging: Judging = Here(problem)
+        self._under_way: dict[int, _Begun] = {}  # by number; a trial is recorded when all before it are
 
     @property
     def n_trials(self) -> int:
@@ -203,10 +230,61 @@ class Study:
         if self.proposer is not None:
             self._check(on_model_failure)
         self._begin()
+        if self.workers is not None and self.config.workers is not None:
+            self._judging = self._with_workers(self.workers, self.config.workers)
         with closing(self._turns()) as turns:
             for number in range(first, self.n_trials):
-                self._obey(number)
-                self._step(number, turns)
+                while not self._may_begin(number):
+                    self._hear()
+                    self._record_ready(turns)
+                if number not in self._under_way:
+                    self._obey(number)
+                    self._begin_trial(number, turns)
+            while self._n_waited_for:
+                self._hear()
+                if self._n_waited_for:
+                    self._record_ready(turns)
+            self._judging.finish()  # before the last is recorded: else a kill here would leave workers waiting
+            self._record_ready(turns)
+
+    def _with_workers(self, workers: Workers, record: WorkersRecord) -> Judging:
+        """The workers; what they did in earlier sessions, and what they do still, is under way."""
+
+        def say(words: str) -> None:
+            self._report("beginning", len(self.trials), "", note=words)
+
+        assert self.folder is not None
+        judging = workers.begin(self.problem, record, say)
+        for trial in judging.begun(len(self.trials)):
+            optunas, design = self.black_box.inject(trial.design, trial.number, trial.source, trial.proposal)
+            self._first_of.setdefault(self._same_arms.key(design), trial.number)
+            self._under_way[trial.number] = _Begun(optunas, trial, None, None, 0.0, 0.0)
+            if self._asker is not None and trial.proposal is not None:
+                self._asker.entered(trial.proposal)
+        say(workers.command(self.folder.path, self.problem.evaluator))
+        return judging
+
+    def _may_begin(self, number: int) -> bool:
+        """Whether there is room for one more trial; what depends on the random ones waits for all of them."""
+        if self.method.n_init == number and self._n_waited_for:
+            return False
+        return self._n_waited_for < self._judging.at_a_time
+
+    @property
+    def _n_waited_for(self) -> int:
+        """Trials that are being judged."""
+        return sum(begun.judged is None and begun.finished.same_as is None for begun in self._under_way.values())
+
+    def _hear(self) -> None:
+        """Takes what has been judged."""
+        for number, judged in self._judging.results().items():
+            self._tell(self._under_way[number], judged)
+
+    def _record_ready(self, turns: Turns) -> None:
+        """Records the trials before which nothing is missing any more."""
+        while (begun := self._under_way.get(len(self.trials))) is not None and self._is_ready(begun):
+            del self._under_way[len(self.trials)]
+            self._record(begun, turns)
 
     def _obey(self, number: int) -> None:
         """Waits as long as the watcher wants the study paused; StoppedError where it is to end."""
@@ -267,9 +345,10 @@ class Study:
         if self.folder is None:
             return
         discard_results(self.folder.path)
-        self.config = self.folder.note_versions(self.config)
+        self.config = self.folder.note_versions(self.config, self.problem.evaluator)
 
-    def _step(self, number: int, turns: Turns) -> None:
+    def _begin_trial(self, number: int, turns: Turns) -> None:
+        """The next trial: whose turn it is, its design, and, where that is new, somebody who judges it."""
         started = time.perf_counter()
         turn = turns.next(number)
         self._channel.say("evaluating", number, _fault_words(turn))
@@ -278,39 +357,57 @@ class Study:
         trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
         same_as = self._first_of.setdefault(self._same_arms.key(design), number)
-        values, constraints = self._judged(design) if same_as == number else self._known(same_as)
-        evaluated = time.perf_counter()
-        noted = self.black_box.tell(trial, values, constraints)
-        told = time.perf_counter()
-        seconds = {
-            "total": round(told - started, 6),
-            "sampling": round(sampled - proposed + told - evaluated, 6),
-            "evaluation": round(evaluated - sampled, 6),
-            "proposing": round(proposed - started, 6),
-        }
-        finished = replace(_finished(number, source, design, values, turn, noted, seconds), constraints=constraints)
+        finished = _begun(number, source, design, turn)
         if same_as != number:
             finished = replace(finished, same_as=same_as, evaluations=0)
         if refinement is not None:
             finished = replace(
                 finished, refines=refinement.refines, evaluations=finished.evaluations + refinement.evaluations
             )
+        self._under_way[number] = _Begun(trial, finished, turn, refinement, proposed - started, sampled - proposed)
+        if same_as == number:
+            self._judging.post(finished)
+
+    def _tell(self, begun: _Begun, judged: Judged) -> None:
+        """Lets the black box learn from a trial at once, whatever is before it."""
+        started = time.perf_counter()
+        noted = self.black_box.tell(begun.trial, judged.judgement.values, judged.judgement.constraints)
+        begun.sampling += time.perf_counter() - started
+        begun.judged = judged
+        begun.finished = replace(
+            begun.finished,
+            values=judged.judgement.values,
+            constraints=judged.judgement.constraints,
+            failure=judged.judgement.failure,
+            sampler_notes=noted,
+            seconds={
+                "total": round(begun.proposing + begun.sampling + judged.seconds, 6),
+                "sampling": round(begun.sampling, 6),
+                "evaluation": round(judged.seconds, 6),
+                "proposing": round(begun.proposing, 6),
+            },
+        )
+
+    def _is_ready(self, begun: _Begun) -> bool:
+        """Whether the trial that is recorded next has its values; if it is an earlier one's arm, they are known."""
+        if begun.judged is None and begun.finished.same_as is not None:
+            known = self.trials[begun.finished.same_as]
+            self._tell(begun, Judged(Judgement(known.values, known.constraints, known.failure), 0.0))
+        return begun.judged is not None
+
+    def _record(self, begun: _Begun, turns: Turns) -> None:
+        """Writes a trial whose values are known: from now on it is part of the run."""
+        finished, turn = begun.finished, begun.turn
         if self.folder is not None:
             self.folder.append(finished)
         self.trials.append(finished)
         if finished.is_feasible:
-            self._tracker.add(values)
+            self._tracker.add(finished.values)
         self._freeze_reference_point()
-        self._report("finished", number, source, turns, finished.fault, "" if turn is None else turn.note)
-
-    def _judged(self, design: Design) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Values and constraints of a design."""
-        values, constraints = self.problem.judge([design])
-        return tuple(values[0].tolist()), tuple(constraints[0].tolist())
-
-    def _known(self, number: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Those of an earlier trial's."""
-        return self.trials[number].values, self.trials[number].constraints
+        note = "" if turn is None else turn.note
+        if finished.failure:
+            note = f"trial {finished.number}: {finished.failure}"
+        self._report("finished", finished.number, finished.source, turns, finished.fault, note)
 
     def _refinement(self, number: int) -> Refinement | None:
         """A design of the front refined, where one is due."""
@@ -417,7 +514,17 @@ def study_method(
     )
 
 
-def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
+def check_workers(workers: Workers | None, method: Method, out: str | Path | None) -> None:
+    """SettingsError where workers do not go with the rest."""
+    if workers is None:
+        return
+    if out is None:
+        raise SettingsError("workers need a run folder (out): it tells them what to evaluate")
+    if method.in_flight is not None:
+        raise SettingsError("--overlap does not go with --workers: these go on while a question is asked")
+
+
+def study_config(problem: Problem, method: Method, seed: int, workers: WorkersRecord | None = None) -> RunConfig:
     """The settings of a new run."""
     return RunConfig(
         task=problem.task,
@@ -428,7 +535,9 @@ def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
         reference_point=problem.reference_point,
         method=method,
         seed=whole("seed", seed, 0),
-        versions=versions(),
+        evaluator=None if problem.evaluator is None else problem.evaluator.name,
+        workers=workers,
+        versions=versions(problem.evaluator),
     )
 
 
@@ -439,16 +548,9 @@ def _fault_words(turn: Turn | None) -> str | None:
     return "" if turn.proposal is not None else turn.note or None
 
 
-def _finished(
-    number: int,
-    source: str,
-    design: Design,
-    values: tuple[float, ...],
-    turn: Turn | None,
-    noted: Mapping[str, Mapping[str, Any]],
-    seconds: Mapping[str, float],
-) -> FinishedTrial:
-    trial = FinishedTrial(number, source, design, values, sampler_notes=noted, seconds=seconds)
+def _begun(number: int, source: str, design: Design, turn: Turn | None) -> FinishedTrial:
+    """A trial that has no values yet."""
+    trial = FinishedTrial(number, source, design, values=())
     if turn is None:
         return trial
     proposal = turn.proposal

@@ -1,0 +1,177 @@
+"""Evaluators of one's own: a Python function, such as a simulation, that measures an arm in place of our objectives.
+
+@evaluator("settling_error [m]", "energy [J]")
+def simulate(arm, task):
+    ...
+    return error, energy
+"""
+
+import hashlib
+import importlib
+import importlib.util
+import math
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from armwright.arm import Arm
+from armwright.evaluation import Array, Evaluation
+from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
+from armwright.objectives import MOST_OBJECTIVES, OBJECTIVES, Objective
+from armwright.task import Task
+
+Measure = Callable[[Arm, Task], Sequence[float] | float]
+
+NAMED = re.compile(r"([a-z][a-z0-9_]*)(?: \[([^\[\]]{1,40})\])?")  # such as "energy [J]"
+LONGEST_NAME = 40  # characters
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """A function that measures an arm for a task; each number is an objective, minimised.
+
+    name: `file.py:function` or `module:function`, by which a run's settings know it.
+    worst: what an arm counts for which the function raises, or gives what is no finite number; None: the run stops.
+    version: of the file that it is from; empty where it is from none.
+    place: as `load_evaluator` was given it.
+    """
+
+    name: str
+    measure: Measure
+    objectives: tuple[Objective, ...]
+    worst: tuple[float, ...] | None = None
+    version: str = field(default="", compare=False)
+    place: str = field(default="", compare=False)
+
+    def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
+        """The objectives of an arm; EvaluatorError where the function fails."""
+        try:
+            made = self.measure(arm, task)
+        except Exception as fault:
+            raise EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
+        names = [objective.name for objective in self.objectives]
+        try:
+            values = tuple(float(value) for value in np.atleast_1d(np.asarray(made, dtype=np.float64)))
+        except (TypeError, ValueError):
+            values = ()
+        if len(values) != len(names):
+            raise EvaluatorError(f"{self.name} gave {made!r:.80}; {len(names)} numbers are needed: {', '.join(names)}")
+        for name, value in zip(names, values, strict=True):
+            if not math.isfinite(value):
+                raise EvaluatorError(
+                    f"{self.name} gave {name} = {value}; it must be a finite number for every arm, a large one for a "
+                    "bad arm"
+                )
+        return values
+
+
+def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callable[[Measure], Evaluator]:
+    """Makes an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
+
+    objectives: their names, each with its unit in brackets where it has one: "energy [J]".
+    worst: what an arm counts for which the function fails, one number for each; without it, the run stops there.
+
+    >>> @evaluator("reach [m]")
+    ... def shortest(arm, task):
+    ...     return sum(link.length for link in arm.links)
+    >>> shortest.objectives[0].unit
+    'm'
+    """
+    if not 1 <= len(objectives) <= MOST_OBJECTIVES or len(set(objectives)) < len(objectives):
+        raise SettingsError(f"evaluator({', '.join(objectives)}): 1 to {MOST_OBJECTIVES} different names are needed")
+    values = None if worst is None else tuple(float(value) for value in worst)
+    if values is not None and (len(values) != len(objectives) or not all(map(math.isfinite, values))):
+        raise SettingsError(f"worst = {values}: {len(objectives)} finite numbers are needed, one for each objective")
+
+    def decorated(measure: Measure) -> Evaluator:
+        name = f"{measure.__module__}:{measure.__qualname__}"
+        words = " ".join((measure.__doc__ or "").split("\n\n")[0].split()) or f"what {measure.__qualname__} measures"
+        return Evaluator(name, measure, tuple(_objective(given, words, name) for given in objectives), values)
+
+    return decorated
+
+
+def load_evaluator(place: str) -> Evaluator:
+    """The evaluator of `file.py:function` or `module:function`; its code is run, so it has to be one's own.
+
+    SettingsError where there is none.
+    """
+    where, _, function = place.rpartition(":")
+    if not where or not function:
+        raise SettingsError(f'--evaluator "{place}": FILE.py:FUNCTION or MODULE:FUNCTION is needed')
+    is_file = where.endswith(".py")
+    module = _file_module(Path(where)) if is_file else _module(where)
+    found = getattr(module, function, None)
+    if not isinstance(found, Evaluator):
+        there = [name for name, value in vars(module).items() if isinstance(value, Evaluator)]
+        if callable(found):
+            raise SettingsError(
+                f'{place} is a plain function: put @armwright.evaluator("OBJECTIVE [UNIT]", ...) above it'
+            )
+        known = f"Evaluators there: {', '.join(there)}" if there else "There is no evaluator"
+        raise SettingsError(f"{where} has no evaluator {function}.{did_you_mean(function, there)} {known}")
+    name = f"{Path(where).name if is_file else where}:{function}"
+    file = getattr(module, "__file__", None)
+    version = "" if file is None else hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12]
+    return Evaluator(name, found.measure, found.objectives, found.worst, version, place)
+
+
+def _objective(given: str, words: str, name: str) -> Objective:
+    """The objective of a name with a unit; its value comes from the evaluator alone."""
+    match = NAMED.fullmatch(given)
+    if match is None or len(match[1]) > LONGEST_NAME:
+        raise SettingsError(
+            f'objective "{given}": a name of at most {LONGEST_NAME} small letters, digits and _, with its unit in '
+            'brackets where it has one, is needed, such as "energy [J]"'
+        )
+    if match[1] in OBJECTIVES:
+        raise SettingsError(f'objective "{match[1]}" is one of armwright\'s own; give another name')
+
+    def each(_: Evaluation) -> Array:
+        raise SettingsError(f"{match[1]} is measured by {name}, design by design, and only in `armwright optimize`")
+
+    label = match[1].replace("_", " ").capitalize()
+    return Objective(match[1], label, match[2] or "", f"E_{match[1]}", words, each, over="arm")
+
+
+def _module(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except Exception as fault:
+        raise SettingsError(f"cannot import {name}: {type(fault).__name__}: {fault}") from fault
+
+
+def _file_module(path: Path) -> ModuleType:
+    """A Python file as a module; what lies beside it can be imported there, as where it is run as a program."""
+    if not path.is_file():
+        raise SettingsError(f"cannot read {path}: there is no such file")
+    name = f"armwright_evaluator_{path.stem}"
+    beside = str(path.resolve().parent)
+    if beside not in sys.path:
+        sys.path.insert(0, beside)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # as pickle and dataclasses expect
+    try:
+        spec.loader.exec_module(module)
+    except Exception as fault:
+        raise SettingsError(f"cannot load {path}: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
+    return module
+
+
+def _place(fault: BaseException) -> str:
+    """Where it was raised, in the deepest frame: `file.py, line 12`."""
+    trace: Any = fault.__traceback__
+    if isinstance(fault, SyntaxError):
+        return f"{Path(fault.filename or '').name}, line {fault.lineno}"
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return "" if trace is None else f"{Path(trace.tb_frame.f_code.co_filename).name}, line {trace.tb_lineno}"
