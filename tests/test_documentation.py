@@ -160,14 +160,24 @@ def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[st
     return done
 
 
-def run_command(command: Command, folder: Path) -> None:
+def run_command(command: Command, folder: Path) -> str:
+    """What it prints, or writes into the file that it names."""
     text = command.text.replace(".venv/bin/", "")
     if LONG.fullmatch(text):
         for line in shell(f"{text} --print-commands", folder, command.where).stdout.splitlines():
             words = shlex.split(line)
             parsed(words[[Path(word).name for word in words].index("armwright") + 1 :])
     elif not reason_not_to_run(command.text):
-        shell(text, folder, command.where)
+        printed = shell(text, folder, command.where).stdout
+        out = re.search(r"--out (\S+)", text)
+        written = out is not None and (folder / out[1]).is_file()
+        return (folder / out[1]).read_text(encoding="utf-8") if out is not None and written else printed
+    return ""
+
+
+def letters(text: str) -> str:
+    """What of an output is the same on every processor."""
+    return " ".join(re.findall(r"[A-Za-z]+", text))
 
 
 def file_of(block: Block) -> str | None:
@@ -207,16 +217,22 @@ def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
     for line in BEFORE.get(page, ()):
         shell(line, in_folder, page)
     run = {command.where: command for command in commands(page)}
+    said = ""  # by what was run last
     for block in blocks(page):
         for number in range(len(block.text.splitlines()) + 1):
             command = run.get(f"{page}:{block.line + number}")
             if command is not None and (page, command.text) not in SAME_AS_README:
-                run_command(command, in_folder)
+                said = run_command(command, in_folder)
         if block.language in ("yaml", "csv") and (name := file_of(block)):
             (in_folder / name).write_text(block.text)
         if block.language == "python" and page not in PROGRAMS_RUN_IN:
             (in_folder / "program.py").write_text(block.text)
-            shell("python program.py", in_folder, block.where)
+            said = shell("python program.py", in_folder, block.where).stdout
+        if block.language == "jinja":
+            (in_folder / "shown.md.j2").write_text(block.text)
+            shell("armwright prompt target-1 --prompt shown.md.j2", in_folder, block.where)
+        if block.language == "text":
+            assert letters(block.text.splitlines()[0]) in letters(said), block.where
 
 
 @pytest.mark.parametrize(
@@ -245,7 +261,7 @@ def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
 
 
 def test_every_block_is_of_a_kind_that_is_tried() -> None:
-    """Formulas, drawings and what commands print are shown without a language, or as text."""
+    """What commands print is text; formulas and drawings have no language."""
     for page in PAGES:
         for block in blocks(page):
             assert block.language in ("sh", "yaml", "csv", "python", "jinja", "text", ""), block.where

@@ -27,6 +27,7 @@ PYTHON: Mapping[str, Sequence[str]] = {
                     "Design", "Problem"),
     "The search": ("optimize", "Run", "find_front", "FrontRun", "polish_run", "verify_run", "History",
                    "FinishedTrial", "FrontMember", "hypervolume"),
+    "Evaluators and workers": ("Evaluator", "evaluator", "load_evaluator", "Workers", "work"),
     "Arms": ("Arm", "Joint", "Link", "uniform_link", "read_urdf", "UrdfArm", "evaluate", "Evaluation"),
     "Exports": ("to_urdf", "to_mjcf", "to_sdf", "to_xacro", "to_srdf", "to_ros2_control"),
     "Runs and comparisons": ("read_run", "write_figures", "write_report", "compare_runs", "Comparison",
