@@ -47,6 +47,8 @@ PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_exampl
 SAME_AS_README = {("docs/tasks.md", "armwright optimize my-task.yaml")}
 TRANSLATED = "README.ja.md"  # its commands are those of README.md, which are run there
 
+LONGEST_WAIT = 900.0  # [s] for a command: one that waits for something that never comes is a fault of the page
+
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
 SHORT = "--n-total 40 --no-figures"
 POINTS = {"points.csv": "x,y,z\n400,-200,100\n400,200,100\n100,350,500\n"}
@@ -109,7 +111,8 @@ def test_every_command_and_option_exists(page: str) -> None:
                     assert set(name.split(",")) <= extras.keys(), command.where
                 assert all((ROOT / arguments[i + 1]).is_file() for i, a in enumerate(arguments) if a == "-c")
             case _:
-                assert reason_not_to_run(command.text), f"{command.where}: {command.text} is neither run nor excused"
+                run = reason_not_to_run(command.text) or shutil.which(program)
+                assert run, f"{command.where}: {command.text} can neither be run, nor is it excused"
 
 
 def test_what_is_not_run_is_there_to_be_excused() -> None:
@@ -153,7 +156,13 @@ def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[st
     path = os.pathsep.join([str(program.parent), str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PATH": path, "PYTHONWARNINGS": "error"}
     done = subprocess.run(
-        ["bash", "-c", line], cwd=folder, env=environment, capture_output=True, text=True, stdin=subprocess.DEVNULL
+        ["bash", "-c", line],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=LONGEST_WAIT,
     )
     assert done.returncode == 0, f"{where}: {line}\n{done.stdout}{done.stderr}"
     assert "Traceback" not in done.stderr, f"{where}: {line}\n{done.stderr}"
