@@ -86,9 +86,9 @@ class Key:
     is_needed: bool
 
 
-def page(title: str, words: str, models: Sequence[type[BaseModel]], example: str = "") -> str:
+def page(title: str, words: str, models: Sequence[type[BaseModel]]) -> str:
     """The reference of one kind of file, as Markdown: its own keys, then those of the records within."""
-    parts = [f"# {title}", words, *([f"```yaml\n{example.strip()}\n```"] if example else [])]
+    parts = [f"# {title}", words]
     for model in models:
         rows = [
             f"| `{key.name}` | {key.kind} | {key.bounds} | {key.unit} | {_default(key)} | {cell(key.words)} |"
@@ -110,15 +110,16 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
 def _key(model: type[BaseModel], name: str, field: FieldInfo, told: str, source: "_Source") -> Key:
     said = source.comments.get(name, "")
     units = set(_UNIT.findall(told) or _UNIT.findall(said)) or source.units_of(name)
+    unit = units.pop() if len(units) == 1 else ""
     words = told or said or _of_option(model, name)
-    bounds = [BOUNDS[model, name]] if (model, name) in BOUNDS else list(_bounds(name, field))
+    bounds = [BOUNDS[model, name]] if (model, name) in BOUNDS else _bounds(name, field)
     return Key(
         name=name,
         kind=KINDS.get((model, name)) or _kind(field.annotation),
         bounds="; ".join(bounds),
         default="" if field.is_required() else _shown(field.get_default(call_default_factory=True)),
-        unit=units.pop() if len(units) == 1 else "",
-        words=_UNIT.sub("", words).strip(" ;") if len(units) == 0 else words,
+        unit=unit,
+        words=(_UNIT.sub("", words) if unit else words).strip(" ;"),
         is_needed=field.is_required(),
     )
 
