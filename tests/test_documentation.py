@@ -33,6 +33,7 @@ NOT_RUN = {
     r"export \w+=.*": "a key of nobody's",
     r"armwright experiment .*--model .*": "needs a model's key",
     r"armwright .*--model .*": "needs a model; test_llm.py and test_draft.py run such against a server of their own",
+    r"armwright compare .* runs/gpt-4o": "needs a model's run; that of docs/experiments.md is run",
     r"armwright .*--proposer replay:.*": "needs a run that a model was asked in; test_replay.py makes one",
     r"armwright .*--proposer manual:.*": "waits for people; test_manual.py answers",
     r"armwright optimize .*--live|armwright live .*": "serves until nobody looks on; test_live.py looks on",

@@ -214,13 +214,14 @@ def test_the_guide_is_built_and_fetches_nothing(guide: Path) -> None:
 
 def test_a_browser_reads_and_searches_it_without_a_server(guide: Path, browser: Browser) -> None:
     tab = Tab(browser)
+    tab.page.set_default_timeout(180_000)  # a busy machine makes the index of the search slowly
     tab.page.goto((guide / "reference" / "task.html").as_uri())
     tab.page.get_by_role("link", name="Tutorial").first.click()
     tab.page.get_by_role("heading", name="an arm for a feeder").wait_for()
     tab.page.wait_for_load_state("load")  # before, nobody listens to keys
     tab.page.keyboard.press("f")
     tab.page.get_by_text("Type to start searching").wait_for()
-    tab.page.locator(".md-search__input").fill("payload_factors")
+    tab.page.locator(".md-search__input").press_sequentially("payload_factors")
     tab.page.locator(".md-search-result__link").first.wait_for()
     assert "Task files" in tab.text(".md-search-result__list")
     assert tab.faults == []
