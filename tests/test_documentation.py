@@ -38,6 +38,8 @@ NOT_RUN = {
     r"armwright .*--proposer manual:.*": "waits for people; test_manual.py answers",
     r"armwright optimize .*--live|armwright live .*": "serves until nobody looks on; test_live.py looks on",
     r"armwright compare-arms .* ur5e panda .*": "robot_descriptions fetches these arms from a network",
+    r"armwright optimize .*--workers .*|armwright worker .*": "waits for other processes; test_workers.py starts them",
+    r"optuna-dashboard .*": "serves until it is stopped",
     r"xargs .* < cells.txt": "minutes: all cells of the experiment; the lines of cells.txt are checked",
     r"python benchmarks/.*": "half an hour of benchmark; docs/benchmarks.md has the figures",
 }
@@ -81,6 +83,7 @@ SLOW = (
     "docs/page.md",
     "docs/spaces.md",
     "docs/tutorial.md",
+    "docs/workers.md",
 )
 
 
@@ -252,7 +255,7 @@ def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
             command = run.get(f"{page}:{block.line + number}")
             if command is not None and (page, command.text) not in SAME_AS_README:
                 said = run_command(command, in_folder)
-        if block.language in ("yaml", "csv") and (name := file_of(block)):
+        if block.language in ("yaml", "csv", "python") and (name := file_of(block)):
             (in_folder / name).write_text(block.text)
         if block.language == "python" and page not in PROGRAMS_RUN_IN:
             (in_folder / "program.py").write_text(block.text)

@@ -4,12 +4,16 @@ import json
 import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from armwright.cli import app
+from armwright.problem import Problem
+from armwright.study import optimize
+from armwright.task import load_task
 from tests.chat_server import Answer, ChatServer, Request
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -88,13 +92,17 @@ def test_without_a_model_an_example_says_so() -> None:
     assert "No language model is configured" in run("optuna_zdt1.py", "--n-trials", "5")
 
 
-def test_the_python_of_the_optuna_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out="runs/target-1-seed0")
     page = (EXAMPLES.parent / "docs" / "optuna.md").read_text()
     asking, *others = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     compile(asking, "optuna.md", "exec")  # needs a model
-    assert len(others) == 2
-    for code in others:
-        exec(code, {})
-    arm, counts = capsys.readouterr().out.splitlines()
+    assert len(others) == 3
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "PedAnova")  # what Optuna says of its importances
+        for code in others:
+            exec(code, {})
+    arm, shown, counts = capsys.readouterr().out.splitlines()
     assert "link_4" in arm
+    assert shown == f"{len(made.front)} {made.hypervolume[-1]}"
     assert counts == "3 Counter()"

@@ -36,7 +36,8 @@ def folder(run: Run) -> Path:
 
 def test_the_files_of_a_run(run: Run) -> None:
     names = {path.name for path in folder(run).iterdir()} - {".lock"}
-    assert names == {"config.yaml", "trials.jsonl", "trials.csv", "front.csv", "summary.json", "designs", "status.json"}
+    results = {"trials.csv", "front.csv", "summary.json", "designs", "study.db", "artifacts"}
+    assert names == {"config.yaml", "trials.jsonl", "status.json", *results}
 
 
 def test_trials_are_one_json_line_each(run: Run) -> None:

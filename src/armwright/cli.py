@@ -644,13 +644,29 @@ def export(
     design: Annotated[int | None, typer.Option(help="Its number; without it, the knee of the front.")] = None,
     format_: Annotated[
         str,
-        typer.Option("--format", help="urdf, xacro, srdf, ros2_control, sdf, mjcf, sheet (Markdown) or sheet-csv."),
+        typer.Option(
+            "--format",
+            help="urdf, xacro, srdf, ros2_control, sdf, mjcf, sheet (Markdown) or sheet-csv; "
+            "optuna: the whole run as a study.",
+        ),
     ] = "urdf",
-    out: Annotated[Path | None, typer.Option(help="File; without it, to stdout.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File; without it, to stdout; of optuna, study.db in the run's folder.")
+    ] = None,
 ) -> None:
-    """Write one design of RUN for a simulator or a workshop. Any design of the run, not only those of the front."""
-    from armwright.exporting import export_design
+    """Write one design of RUN for a simulator or a workshop, or all of RUN for Optuna.
 
+    Any design of the run, not only those of the front.
+    """
+    from armwright.exporting import OPTUNA, export_design, export_study
+
+    if format_ == OPTUNA:
+        if design is not None:
+            raise SettingsError(f"--design {design} goes with the other formats; optuna takes the whole run")
+        study = export_study(run, out)
+        kept = "" if study.kept is None else f"; the one before was changed by somebody, and is {study.kept} now"
+        print(f"{study.path}{kept}; it is shown by (pip install optuna-dashboard):\n  {study.command}")
+        return
     text = export_design(run, design, format_)
     if out is None:
         print(text, end="")

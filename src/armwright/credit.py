@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.history import History
-from armwright.pareto import Array, front_mask, hypervolume_history
+from armwright.pareto import Array, front_mask
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def hypervolume_gains(history: History) -> Array | None:
     """
     if history.reference_point is None:
         return None
-    return np.diff(hypervolume_history(history.counted, history.reference_point), prepend=0.0)
+    return np.diff(history.hypervolumes, prepend=0.0)
 
 
 def gained_by_source(history: History) -> dict[str, Array] | None:
@@ -60,9 +60,15 @@ def gained_by_source(history: History) -> dict[str, Array] | None:
 
 def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
     """For each source (I + 1,): how many of its trials are on the front after 0, 1, …, I counted iterations."""
-    fronts = [front_mask(history.counted[:n]) for n in _last_trials(history)]
+    first, *_ = last = _last_trials(history).tolist()
+    on_front = np.flatnonzero(front_mask(history.counted[:first]))
+    fronts = [on_front]
+    for number in range(first, last[-1]):  # one trial more; what has left a front never comes back
+        on_front = np.append(on_front, number)
+        on_front = on_front[front_mask(history.counted[on_front])]
+        fronts.append(on_front)
     return {
-        source: np.array([np.count_nonzero(front & mine[: len(front)]) for front in fronts])
+        source: np.array([np.count_nonzero(mine[front]) for front in fronts])
         for source, mine in masks_by_source(history).items()
     }
 

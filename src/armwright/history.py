@@ -1,6 +1,7 @@
 """What a study has found so far: its finished trials, their front and hypervolume."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,7 +13,7 @@ from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation
 from armwright.feasibility import counted, feasible_mask, violation
 from armwright.parameters import Design
-from armwright.pareto import default_reference_point, front_mask, front_numbers, hypervolume_history
+from armwright.pareto import FrontTracker, default_reference_point, front_mask, front_numbers
 from armwright.problem import Problem
 
 RANDOM = "random"
@@ -20,6 +21,8 @@ BBO = "bbo"
 START = "start"  # an arm that is there already
 POLISH = "polish"  # a design of the front, refined
 FRONT = "front"  # of a search for the whole front
+NOT_PROPOSED = (RANDOM, BBO, START, POLISH, FRONT)
+GROWING = ("values", "broken", "counted", "front", "proposed", "_course", "_first_of")  # what more trials add to
 
 
 @dataclass(frozen=True)
@@ -81,12 +84,16 @@ class History:
     """The finished trials of a study in the order of their numbers; the first `n_init` are random.
 
     frozen_reference_point: the one that the run found for itself, where the task states none.
+    earlier: what is known of a history that this one goes on with, and of how many trials (`grown`).
     """
 
     problem: Problem
     trials: Sequence[FinishedTrial]
     n_init: int
     frozen_reference_point: tuple[float, ...] | None = None
+    earlier: Mapping[str, tuple[int, Any]] = field(
+        default_factory=dict[str, tuple[int, Any]], repr=False, compare=False
+    )
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -94,16 +101,34 @@ class History:
     def __iter__(self) -> Iterator[FinishedTrial]:
         return iter(self.trials)
 
+    def grown(self, trials: Sequence[FinishedTrial], frozen_reference_point: tuple[float, ...] | None) -> "History":
+        """The history of these trials, whose first are this one's; what is known of those is not computed again."""
+        same_point = frozen_reference_point == self.frozen_reference_point
+        if same_point and len(trials) == len(self):
+            return self
+        known = {**self.earlier, **{name: (len(self), vars(self)[name]) for name in GROWING if name in vars(self)}}
+        if not same_point:
+            known.pop("_course", None)
+        return History(self.problem, trials, self.n_init, frozen_reference_point, known)
+
+    def _known(self, name: str, nothing: Any) -> tuple[Any, Sequence[FinishedTrial]]:
+        """What the earlier history knew, and the trials that came after it."""
+        n, known = self.earlier.get(name, (0, nothing))
+        return known, self.trials[n:]
+
     @cached_property
     def values(self) -> Array:
         """(N, M) the objectives; of the paper's: position error [m], torque [α-scaled]."""
-        return np.array([trial.values for trial in self.trials]).reshape(len(self.trials), len(self.problem.objectives))
+        known, new = self._known("values", np.empty((0, len(self.problem.objectives))))
+        rows = [trial.values for trial in new]
+        return np.vstack([known, np.array(rows, dtype=np.float64).reshape(len(rows), known.shape[1])])
 
     @cached_property
     def broken(self) -> Array:
         """(N, C) how far each constraint of the task is broken; <= 0: not at all."""
-        rows = [trial.constraints for trial in self.trials]
-        return np.array(rows, dtype=np.float64).reshape(len(rows), len(self.problem.constraints))
+        known, new = self._known("broken", np.empty((0, len(self.problem.constraints))))
+        rows = [trial.constraints for trial in new]
+        return np.vstack([known, np.array(rows, dtype=np.float64).reshape(len(rows), known.shape[1])])
 
     @cached_property
     def feasible(self) -> NDArray[np.bool_]:
@@ -113,7 +138,9 @@ class History:
     @cached_property
     def counted(self) -> Array:
         """(N, M) `values`, infinite where a design is infeasible: what fronts and hypervolumes are made of."""
-        return counted(self.values, self.broken)
+        known, _ = self._known("counted", np.empty((0, len(self.problem.objectives))))
+        n = len(known)
+        return np.vstack([known, counted(self.values[n:], self.broken[n:])])
 
     def nearest(self, most: int) -> list[int]:
         """The numbers of so many designs at most that break the constraints least, summed; the nearest first."""
@@ -127,10 +154,34 @@ class History:
     @cached_property
     def front(self) -> list[FrontMember]:
         """The Pareto set of the feasible designs, by rising first objective."""
-        return [self.member(number) for number in front_numbers(self.counted)]
+        known, new = self._known("front", [])
+        members = {member.number: member for member in known}
+        numbers = [*sorted(members), *range(len(self) - len(new), len(self))]
+        on_front = [numbers[place] for place in front_numbers(self.counted[numbers])] if numbers else []
+        return [members[number] if number in members else self.member(number) for number in on_front]
+
+    @cached_property
+    def proposed(self) -> tuple[FinishedTrial, ...]:
+        """The trials that are proposers'."""
+        known, new = self._known("proposed", ())
+        return (*known, *(trial for trial in new if trial.source not in NOT_PROPOSED))
+
+    @cached_property
+    def _first_of(self) -> dict[Design, int]:
+        """The first trial of each design; histories that grow from one another add to the same one."""
+        known, new = self._known("_first_of", {})
+        for trial in new:
+            known.setdefault(trial.design, trial.number)
+        return known
+
+    def has_tried(self, design: Design) -> bool:
+        """Whether a trial has this design."""
+        return self._first_of.get(design, len(self)) < len(self)
 
     def before(self, number: int) -> "History":
         """What was known when trial `number` began."""
+        if number >= len(self):
+            return self
         return History(self.problem, self.trials[:number], self.n_init, self.frozen_reference_point)
 
     def member(self, number: int) -> FrontMember:
@@ -139,11 +190,26 @@ class History:
         return FrontMember(number, trial.source, trial.design, self.problem.arm(trial.design), trial.values)
 
     @cached_property
+    def _course(self) -> tuple[Array, FrontTracker]:
+        """(N,) `hypervolumes`, and what they go on with."""
+        assert self.reference_point is not None
+        tracker = FrontTracker(len(self.problem.objectives), self.reference_point)
+        (known, tracker), _ = self._known("_course", (np.zeros(0), tracker))
+        tracker, new = copy(tracker), np.zeros(len(self) - len(known))
+        for i, row in enumerate(self.counted[len(known) :]):
+            tracker.add(row)
+            new[i] = tracker.hypervolume
+        return np.concatenate([known, new]), tracker
+
+    @property
+    def hypervolumes(self) -> Array:
+        """(N,) after each trial, the random ones included; (0,) as long as there is no reference point."""
+        return np.zeros(0) if self.reference_point is None else self._course[0]
+
+    @property
     def hypervolume(self) -> Array:
         """Over the counted trials (those after the first n_init); the initial points count in each value."""
-        if self.reference_point is None:
-            return np.zeros(0)
-        return hypervolume_history(self.counted, self.reference_point)[self.n_init :]
+        return self.hypervolumes[self.n_init :]
 
     def found_reference_point(self) -> tuple[float, ...]:
         """For a task that states none, from the first n_init trials."""

@@ -43,6 +43,9 @@ class Judging(Protocol):
     def finish(self) -> None:
         """There is nothing more to judge."""
 
+    def close(self) -> None:
+        """The session is over."""
+
 
 class Here(Judging):
     """In this process, at once."""

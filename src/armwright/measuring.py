@@ -14,11 +14,13 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armwright.arm import Arm
 from armwright.evaluation import Array, Evaluation
@@ -56,10 +58,7 @@ class Evaluator:
         except Exception as fault:
             raise EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
         names = [objective.name for objective in self.objectives]
-        try:
-            values = tuple(float(value) for value in np.atleast_1d(np.asarray(made, dtype=np.float64)))
-        except (TypeError, ValueError):
-            values = ()
+        values = _numbers(made)
         if len(values) != len(names):
             raise EvaluatorError(f"{self.name} gave {made!r:.80}; {len(names)} numbers are needed: {', '.join(names)}")
         for name, value in zip(names, values, strict=True):
@@ -120,6 +119,15 @@ def load_evaluator(place: str) -> Evaluator:
     file = getattr(module, "__file__", None)
     version = "" if file is None else hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12]
     return Evaluator(name, found.measure, found.objectives, found.worst, version, place)
+
+
+def _numbers(made: object) -> tuple[float, ...]:
+    """What a function gave as numbers; none where it is anything else."""
+    if isinstance(made, np.ndarray):
+        made = cast("NDArray[Any]", made).tolist()
+    several = list(cast("tuple[object, ...]", made)) if isinstance(made, (tuple, list)) else [made]
+    numbers = [float(one) for one in several if isinstance(one, Real)]
+    return tuple(numbers) if len(numbers) == len(several) else ()
 
 
 def _objective(given: str, words: str, name: str) -> Objective:

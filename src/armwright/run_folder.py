@@ -5,9 +5,10 @@
     transcripts.jsonl  every call to a language model (llm/transcript.py)
     control.json, status.json  between a running study and whoever watches it (control.py)
     search.npz, proposals/  where a search for the whole front stands, and what it began with (front.py)
-    trials.csv, front.csv, summary.json, designs/NNNN/ (results.py) and figures/ (report/figures.py)
+    trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), study.db and artifacts/ (study_db.py),
+        and figures/ (report/figures.py)
 
-What stands in the last line is made from the finished trials, and can be made again.
+What stands in the last lines is made from the finished trials, and can be made again.
 """
 
 import errno
@@ -285,7 +286,8 @@ class RunFolder:
         trials, intact = _read_trials(path, space, n_objectives, n_constraints)
         try:
             self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
-            self._trials.truncate(intact)
+            if intact < self._trials.tell():  # else the file keeps its time
+                self._trials.truncate(intact)
         except OSError as fault:
             raise _write_error(path, fault) from fault
         return trials

@@ -196,6 +196,9 @@ class Study:
         self._first_of: dict[Hashable, int] = {}  # the first trial of each arm
         for trial in self.trials:
             self._first_of.setdefault(self._same_arms.key(trial.design), trial.number)
+        self._faults = Counter(trial.fault for trial in self.trials if trial.fault)
+        self._refined = sum(trial.refines is not None for trial in self.trials)
+        self._latest = History(problem, (), self.method.n_init, config.reference_point)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
         for row in self._history().counted:
             self._tracker.add(row)
@@ -221,6 +224,8 @@ class Study:
             meant = isinstance(end, (KeyboardInterrupt, StoppedError))
             self._channel.say("stopped", len(self.trials), None if meant else str(end) or type(end).__name__)
             raise
+        finally:
+            self._judging.close()
         self._channel.finish(len(self.trials))
         return run
 
@@ -234,12 +239,13 @@ class Study:
             self._judging = self._with_workers(self.workers, self.config.workers)
         with closing(self._turns()) as turns:
             for number in range(first, self.n_trials):
+                if number < len(self.trials) or number in self._under_way:
+                    continue  # it was begun in an earlier session
                 while not self._may_begin(number):
                     self._hear()
                     self._record_ready(turns)
-                if number not in self._under_way:
-                    self._obey(number)
-                    self._begin_trial(number, turns)
+                self._obey(number)
+                self._begin_trial(number, turns)
             while self._n_waited_for:
                 self._hear()
                 if self._n_waited_for:
@@ -400,14 +406,21 @@ class Study:
         finished, turn = begun.finished, begun.turn
         if self.folder is not None:
             self.folder.append(finished)
-        self.trials.append(finished)
-        if finished.is_feasible:
-            self._tracker.add(finished.values)
+        self._count(finished)
         self._freeze_reference_point()
         note = "" if turn is None else turn.note
         if finished.failure:
             note = f"trial {finished.number}: {finished.failure}"
         self._report("finished", finished.number, finished.source, turns, finished.fault, note)
+
+    def _count(self, trial: FinishedTrial) -> None:
+        """Takes a new trial into all that is kept of them, so that the next one costs no more after many."""
+        self.trials.append(trial)
+        if trial.is_feasible:
+            self._tracker.add(trial.values)
+        if trial.fault:
+            self._faults[trial.fault] += 1
+        self._refined += trial.refines is not None
 
     def _refinement(self, number: int) -> Refinement | None:
         """A design of the front refined, where one is due."""
@@ -415,7 +428,7 @@ class Study:
         if every is None:
             return None
         due = (number - self.method.n_init) // every
-        if sum(trial.refines is not None for trial in self.trials) >= due:
+        if self._refined >= due:
             return None
         history = self._history()
         return refine_one(history, self.config.seed) if history.front else None  # else nothing is feasible yet
@@ -435,7 +448,9 @@ class Study:
         return *self.black_box.draw(number, source), source
 
     def _history(self) -> History:
-        return History(self.problem, tuple(self.trials), self.method.n_init, self.config.reference_point)
+        """Grown from the one before, so that a proposer's question costs no more after many trials."""
+        self._latest = self._latest.grown(tuple(self.trials), self.config.reference_point)
+        return self._latest
 
     def _freeze_reference_point(self) -> None:
         """Writes a reference point that the task left open into config.yaml as soon as it is known."""
@@ -468,7 +483,7 @@ class Study:
                 source=source,
                 under_way=0 if turns is None else turns.under_way,
                 fault=fault,
-                faults=Counter(trial.fault for trial in self.trials if trial.fault),
+                faults=self._faults.copy(),
                 note=note,
             )
         )

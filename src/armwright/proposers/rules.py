@@ -15,7 +15,6 @@ from armwright.evaluation import Array
 from armwright.history import FrontMember, History
 from armwright.objectives import PAPER_OBJECTIVES, TORQUE
 from armwright.parameters import Design
-from armwright.pareto import hypervolume_history
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.proposers.structures import OPENING, fitted
 
@@ -60,7 +59,7 @@ class RulesProposer(Proposer):
     def propose(self, history: History, seed: int, number: int) -> Proposal:
         """The next structure of the opening, then what the rule that has brought most says."""
         rng = np.random.default_rng(seed)
-        earlier = sum(trial.source == self.name for trial in history)
+        earlier = sum(trial.source == self.name for trial in history.proposed)
         inside = members_inside(history)
         if earlier < len(OPENING) or not inside:
             rule, (design, reason) = "open", open_with(history, earlier, rng)
@@ -84,10 +83,10 @@ def members_inside(history: History) -> list[FrontMember]:
 
 def most_promising(history: History, name: str) -> str:
     """The rule whose proposals, one imagined among them, have added most hypervolume on average."""
-    volume = hypervolume_history(history.counted, bounds(history))
+    volume = history.hypervolumes
     gain = np.diff(volume, prepend=0.0)
     added = {rule: [expected * float(volume[-1])] for rule, expected in EXPECTED.items()}
-    for trial in history:
+    for trial in history.proposed:
         rule = (trial.proposal or "").rpartition("-")[2]
         if trial.source == name and rule in added:
             added[rule].append(float(gain[trial.number]))
@@ -223,10 +222,9 @@ def towards_missed(history: History, member: FrontMember) -> Array:
 
 def distinct(design: Design, history: History, rng: np.random.Generator) -> Design:
     """The design, a little changed where it has been tried; the same where the space leaves no other."""
-    tried = {trial.design for trial in history}
     space, spread = history.problem.space, 0.01
     for _ in range(20):
-        if design not in tried:
+        if not history.has_tried(design):
             break
         origin = np.array(design.origin) + rng.normal(0.0, spread, 3)
         links = np.array(design.links) * np.exp(rng.normal(0.0, spread, len(design.links)))

@@ -26,7 +26,7 @@ from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
 from armwright.obstacles import Obstacle
 from armwright.parameters import FloatParameter
-from armwright.pareto import front_numbers, hypervolume, hypervolume_history
+from armwright.pareto import hypervolume
 from armwright.report.repeat import repeat_command
 from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.results import read_summary
@@ -48,6 +48,7 @@ class RunContent:
         self._reader = TrialsReader(folder, self.config)
         self._chunks: list[tuple[int, Arrays]] = []  # designs by the number of their first
         self._n = 0
+        self.history = self._nothing()
         self.refresh()
 
     def is_still(self, config: RunConfig) -> bool:
@@ -61,16 +62,17 @@ class RunContent:
         self.config = read_config(self.folder)  # the reference point may have been found
         is_other = self._reader.read_on() or len(self._reader.trials) < self._n
         if is_other:
-            self._chunks, self._n = [], 0
+            self._chunks, self._n, self.history = [], 0, self._nothing()
         self.summary = read_summary(self.folder)
         self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
-        self.history = History(
-            self.config.problem, self._reader.trials, self.config.method.n_init, self.config.reference_point
-        )
+        self.history = self.history.grown(self._reader.trials, self.config.reference_point)
         if len(self.history) > self._n:
             self._chunks.append((self._n, _designs(self.history, range(self._n, len(self.history)))))
             self._n = len(self.history)
         return is_other
+
+    def _nothing(self) -> History:
+        return History(self.config.problem, (), self.config.method.n_init, self.config.reference_point)
 
     @property
     def study(self) -> Method | None:
@@ -85,10 +87,7 @@ class RunContent:
         if designs_from not in {self._n, *(first for first, _ in self._chunks)}:
             designs_from = 0  # the page knows another state of the run than any that was sent: all of it anew
         arrays = _joined([arrays for first, arrays in self._chunks if first >= designs_from])
-        curve = np.zeros(0)
-        if self.history.reference_point is not None and len(self.history):
-            curve = hypervolume_history(self.history.counted, self.history.reference_point)
-        front = front_numbers(self.history.counted) if len(self.history) else []
+        front = [member.number for member in self.history.front]
         search = None if self.summary is None or self.study is not None else self.summary["search"]
         spent = None if search is None else search["evaluations"]
         head = {
@@ -107,7 +106,7 @@ class RunContent:
             "calls": [asdict(call) for call in self.calls[calls_from:]],
             "files": {number: design_files(self.history, number) for number in front} if with_files else {},
         }
-        return pack(head, {**arrays, "curve": curve})
+        return pack(head, {**arrays, "curve": self.history.hypervolumes})
 
 
 def _bought(folder: Path, history: History) -> list[dict[str, Any]]:

@@ -103,8 +103,9 @@ class Board:
             ) from fault
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Ends all connections."""
         self._storage.remove_session()
+        self._database.engine.dispose()
 
     # --- the search's side -------------------------------------------------------------------------------------------
 
@@ -118,7 +119,9 @@ class Board:
 
     def post_again(self, posted: Posted) -> None:
         """Lets workers evaluate a failed trial once more, as Optuna does with the trial of a dead worker."""
-        retry = RetryHeartbeatStaleTrialCallback()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ExperimentalWarning)  # since Optuna 2.8
+            retry = RetryHeartbeatStaleTrialCallback()
         self._once(lambda: retry(self._study, _without_marks(self._study.trials[posted.place])), posted.number)
 
     def _once(self, post: Callable[[], object], number: int) -> None:
@@ -302,7 +305,7 @@ class Heartbeats:
 
 def shown_url(url: str) -> str:
     """The URL of a database without its password; SettingsError where it is none."""
-    from sqlalchemy import make_url
+    from sqlalchemy import URL, make_url
     from sqlalchemy.exc import ArgumentError
 
     try:
@@ -312,8 +315,9 @@ def shown_url(url: str) -> str:
             '--storage: a URL such as "postgresql://user@host/database" is needed, with the password in PGPASSWORD or '
             "~/.pgpass"
         ) from None
-    shown = parsed.set(password=None) if parsed.password is not None else parsed
-    return shown.difference_update_query(["password"]).render_as_string(hide_password=False)
+    query = {name: value for name, value in parsed.query.items() if name != "password"}
+    shown = URL.create(parsed.drivername, parsed.username, None, parsed.host, parsed.port, parsed.database, query)
+    return shown.render_as_string()
 
 
 def sqlite_url(file: Path) -> str:

@@ -74,6 +74,9 @@ class ByWorkers(Judging):
     def finish(self) -> None:
         """Lets the workers end."""
         self._board.finish()
+
+    def close(self) -> None:
+        """Ends the connection; workers go on with what is posted."""
         self._board.close()
 
     def _again(self, trial: Posted) -> None:

@@ -1,0 +1,42 @@
+"""An evaluator of your own: each arm is simulated in MuJoCo on its way along the targets.
+
+    pip install mujoco
+    armwright optimize target-1 --evaluator examples/mujoco_simulation.py:follow --n-total 50
+
+or, in several processes (the same on other machines, with --storage postgresql://...):
+
+    armwright optimize target-1 --evaluator examples/mujoco_simulation.py:follow --workers 2
+    armwright worker runs/target-1-seed0 --evaluator examples/mujoco_simulation.py:follow     # twice
+
+Motors hold the joints by a PD law with limited torque. The arm begins straight and has a second for each target; what
+counts is how far its tip is from the target then, summed, and the work that its motors did.
+"""
+
+import mujoco
+import numpy as np
+
+import armwright as aw
+
+STIFFNESS, DAMPING = 2.0, 0.05  # [N m/rad], [N m s/rad]; the paper's arms weigh some ten grams
+LARGEST_TORQUE = 0.5  # [N m]
+SECONDS = 1.0  # for each target
+
+
+@aw.evaluator("distance [m]", "work [J]", worst=(10.0, 100.0))
+def follow(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+    """what becomes of the arm in a simulation: its distance from the targets, and the work of its motors"""
+    model = mujoco.MjModel.from_xml_string(aw.to_mjcf(arm))
+    model.opt.timestep = 0.002
+    model.dof_armature[:] = 1e-4  # [kg m²] of the rotors, without which joints of so light arms are stiff to compute
+    data = mujoco.MjData(model)
+    tip = model.site("tip").id
+    postures = aw.evaluate([arm], task.points).q[0, :, : model.nq]  # (T, D) [rad], by our inverse kinematics
+    distance = work = 0.0
+    for target, posture in zip(task.points, postures, strict=True):
+        for _ in range(round(SECONDS / model.opt.timestep)):
+            torque = STIFFNESS * (posture - data.qpos) - DAMPING * data.qvel
+            data.qfrc_applied[:] = np.clip(torque, -LARGEST_TORQUE, LARGEST_TORQUE)
+            work += float(np.abs(data.qfrc_applied * data.qvel).sum()) * model.opt.timestep
+            mujoco.mj_step(model, data)
+        distance += float(np.linalg.norm(data.site_xpos[tip] - target))
+    return distance, work

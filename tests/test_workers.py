@@ -1,0 +1,438 @@
+"""Workers: designs evaluated by other processes, from one shared Optuna study."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import optuna
+import pytest
+
+import armwright as aw
+from armwright.exceptions import EvaluatorError, RunConflictError, SettingsError, StorageError
+from armwright.history import History
+from armwright.proposers.proposer import Proposal, Proposer
+from armwright.run_folder import read_config, read_run
+from armwright.study import Progress
+from armwright.workers import judging, worker
+from armwright.workers.board import shown_url
+from tests.postgres import PostgresServer
+
+TASK = aw.load_task("target-1")
+PROBLEM = aw.Problem(TASK)
+
+
+@pytest.fixture(autouse=True)
+def _hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time between two looks is no part of what is tested."""
+    monkeypatch.setattr(judging, "LOOK_EVERY", 0.01)
+    monkeypatch.setattr(worker, "LOOK_EVERY", 0.01)
+
+
+class Crew:
+    """Workers in threads of this process, that begin as soon as the run does."""
+
+    def __init__(self, run: Path, n: int, **wanted: Any) -> None:
+        self.done: list[int] = []
+        self.faults: list[BaseException] = []
+        self._began = threading.Event()
+        self._threads = [threading.Thread(target=self._work, args=(run, wanted)) for _ in range(n)]
+        for thread in self._threads:
+            thread.start()
+
+    def hear(self, progress: Progress) -> None:
+        if "start" in progress.note and "worker" in progress.note:
+            self._began.set()
+
+    def _work(self, run: Path, wanted: dict[str, Any]) -> None:
+        self._began.wait()
+        try:
+            self.done.append(aw.work(run, say=lambda _: None, **wanted))
+        except BaseException as fault:  # noqa: BLE001 raised in the test's thread
+            self.faults.append(fault)
+
+    def begin(self) -> None:
+        self._began.set()
+
+    def join(self) -> None:
+        self._began.set()
+        for thread in self._threads:
+            thread.join()
+
+
+def with_crew(run: Path, n: int, problem: aw.Problem = PROBLEM, **asked: Any) -> tuple[aw.Run, Crew]:
+    crew = Crew(run, n, evaluator=problem.evaluator)
+    settings = {"proposer": "rules", "n_init": 5, "n_step": 4, "n_total": 12, **asked}
+    try:
+        found = aw.optimize(problem, out=run, workers=aw.Workers(n, heartbeat=1), watch=crew.hear, **settings)
+    finally:
+        crew.join()
+    assert not crew.faults
+    return found, crew
+
+
+def records(run: Path) -> list[dict[str, Any]]:
+    lines = (run / "trials.jsonl").read_text().splitlines()
+    return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in lines]
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
+def test_one_worker_makes_the_run_of_none(tmp_path: Path, sampler: str) -> None:
+    """To the bit: where a design is evaluated changes nothing."""
+    aw.optimize(PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=12, sampler=sampler, out=tmp_path / "here")
+    found, crew = with_crew(tmp_path / "there", 1, sampler=sampler)
+    assert records(tmp_path / "there") == records(tmp_path / "here")
+    assert crew.done == [17 - found.summary["same_arms"]]
+
+
+class Numbered(Proposer):
+    """Each proposal is a design of its own."""
+
+    name = "numbered"
+
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
+        return Proposal(history.problem.space.sample(1, seed)[0], f"numbered-{number}")
+
+
+def test_many_workers_evaluate_each_trial_once(tmp_path: Path) -> None:
+    evaluated: Counter[aw.Arm] = Counter()
+    lock = threading.Lock()
+
+    @aw.evaluator("reach [m]", "joints_used")
+    def measured(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+        with lock:
+            evaluated[arm] += 1
+        return sum(link.length for link in arm.links), 1.0 + arm.base[2]
+
+    problem = aw.Problem(TASK.model_copy(update={"reference_point": None}), evaluator=measured)
+    found, crew = with_crew(tmp_path / "run", 4, problem, n_total=40, proposer=Numbered())
+    assert [trial.number for trial in found.trials] == list(range(45))
+    assert set(evaluated.values()) == {1}
+    assert sum(evaluated.values()) == sum(crew.done) == 45
+    proposals = [trial.proposal for trial in found.trials if trial.source == "numbered"]
+    assert len(proposals) == len(set(proposals)) == 10
+    for trial in found.trials:
+        assert trial.values == problem.judge_one(trial.design).values
+    _, history = read_run(tmp_path / "run")
+    assert [trial.values for trial in history] == [trial.values for trial in found.trials]
+
+
+def test_optuna_sees_the_study(tmp_path: Path) -> None:
+    """Its own front is the run's; constraints, sources and parameters are there."""
+    task = TASK.model_copy(update={"constraints": ("length <= 0.6",)})
+    found, _ = with_crew(tmp_path / "run", 2, aw.Problem(task), n_total=20)
+    record = found.config.workers
+    assert record is not None
+    study = optuna.load_study(storage=record.storage, study_name=record.study)
+    assert sorted(trial.user_attrs["number"] for trial in study.best_trials) == sorted(m.number for m in found.front)
+    by_number = {trial.user_attrs["number"]: trial for trial in study.trials}
+    for trial in found.trials:
+        if trial.same_as is None:
+            theirs = by_number[trial.number]
+            assert (tuple(theirs.values), theirs.user_attrs["source"]) == (trial.values, trial.source)
+            assert theirs.params == dict(trial.design.params)
+    assert study.metric_names == ["position_error", "torque"]
+
+
+def test_a_run_that_was_left_goes_on_with_what_workers_did_meanwhile(tmp_path: Path) -> None:
+    """Designs that were evaluated while no search was there are not evaluated again."""
+    evaluated: Counter[aw.Arm] = Counter()
+
+    @aw.evaluator("reach [m]", "height [m]")
+    def measured(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+        evaluated[arm] += 1
+        return sum(link.length for link in arm.links), 1.0 + arm.base[2]
+
+    problem = aw.Problem(TASK.model_copy(update={"reference_point": None}), evaluator=measured)
+
+    def leave(progress: Any) -> None:
+        if "worker" in progress.note:
+            raise KeyboardInterrupt
+
+    def search(watch: Callable[[Any], None]) -> aw.Run:
+        return aw.optimize(
+            problem, proposer="rules", n_init=6, n_step=4, n_total=8, out=tmp_path / "run",
+            workers=aw.Workers(3, heartbeat=1), watch=watch,
+        )  # fmt: skip
+
+    with pytest.raises(KeyboardInterrupt):  # as soon as workers are called, before anything is posted
+        search(leave)
+    left = threading.Event()
+
+    def leave_later(progress: Any) -> None:
+        if "none is there" in progress.note:
+            left.set()
+            raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judging, "LONELY", 0.0)
+        with pytest.raises(KeyboardInterrupt):
+            search(leave_later)
+    assert left.is_set()
+    assert records(tmp_path / "run") == []
+    crew = Crew(tmp_path / "run", 1, evaluator=measured)
+    crew.begin()
+    found = search(lambda _: None)
+    crew.join()
+    assert not crew.faults
+    assert set(evaluated.values()) == {1}
+    assert len(found.trials) == 14
+
+
+def test_an_evaluator_that_fails_stops_the_search_and_its_trial_is_evaluated_again(tmp_path: Path) -> None:
+    state = {"broken": True}
+
+    @aw.evaluator("reach [m]", "height [m]")
+    def measured(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+        if state["broken"] and arm.base[2] < 0.0:
+            raise ValueError("below the floor")
+        return sum(link.length for link in arm.links), 1.0 + arm.base[2]
+
+    problem = aw.Problem(TASK.model_copy(update={"reference_point": None}), evaluator=measured)
+    crew = Crew(tmp_path / "run", 2, evaluator=measured)
+
+    def search() -> aw.Run:
+        return aw.optimize(
+            problem, proposer="none", n_init=6, n_total=6, out=tmp_path / "run",
+            workers=aw.Workers(2, heartbeat=1), watch=crew.hear,
+        )  # fmt: skip
+
+    with pytest.raises(EvaluatorError, match=r"trial \d+: .* failed: ValueError: below the floor .* same command"):
+        search()
+    state["broken"] = False
+    found = search()
+    crew.join()
+    assert not crew.faults
+    assert len(found.trials) == 12
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda run: aw.Workers(0), "1 to 10,000"),
+        (lambda run: aw.Workers(1, heartbeat=0), "1 to 3600"),
+        (lambda run: aw.optimize(PROBLEM, workers=aw.Workers(1)), "workers need a run folder"),
+        (lambda run: aw.optimize(PROBLEM, workers=aw.Workers(1, "nonsense"), out=run), "a URL such as"),
+        (lambda run: aw.optimize(PROBLEM, workers=aw.Workers(1, "sqlite://"), out=run), "in memory"),
+        (lambda run: aw.optimize(PROBLEM, workers=aw.Workers(1, "sqlite:////no/such/place.db"), out=run), "no folder"),
+        (
+            lambda run: aw.optimize(PROBLEM, workers=aw.Workers(1), in_flight=1, proposer="rules", out=run),
+            "does not go with",
+        ),
+    ],
+)
+def test_what_cannot_be_is_said(tmp_path: Path, ask: Callable[[Path], object], words: str) -> None:
+    with pytest.raises(SettingsError, match=words):
+        ask(tmp_path / "run")
+
+
+def test_a_worker_says_what_is_wrong(tmp_path: Path) -> None:
+    with_crew(tmp_path / "run", 1, n_total=1)
+    aw.optimize(PROBLEM, n_total=1, proposer="none", out=tmp_path / "other")
+    with pytest.raises(SettingsError, match="was not begun with --workers"):
+        aw.work(tmp_path / "other")
+    with pytest.raises(StorageError, match="the database holds no study armwright-run-"):
+        aw.work(tmp_path / "run", storage=f"sqlite:///{tmp_path}/empty.db")
+    own = aw.evaluator("energy [J]")(lambda arm, task: 1.0)
+    with pytest.raises(SettingsError, match=r"is evaluated by armwright itself, not by tests.test_workers"):
+        aw.work(tmp_path / "run", own)
+    with pytest.raises(RunConflictError, match="workers: evaluate there, None asked"):
+        aw.optimize(PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=1, out=tmp_path / "run")
+
+
+def test_a_password_is_written_nowhere(tmp_path: Path) -> None:
+    assert shown_url("postgresql://ada:secret@host/db?password=secret") == "postgresql://ada@host/db"
+    record = aw.Workers(2, "postgresql://ada:secret@host:5432/db").record(tmp_path)
+    assert record.storage == "postgresql://ada@host:5432/db"
+    assert "secret" not in repr(aw.Workers(2, "postgresql://ada:secret@host/db"))
+
+
+# --- processes of their own on a real PostgreSQL ----------------------------------------------------------------------
+
+EVALUATOR = """
+import hashlib, os, pathlib, time
+import armwright as aw
+
+HERE = pathlib.Path(__file__).parent
+
+@aw.evaluator("reach [m]", "height [m]")
+def measured(arm, task):
+    name = hashlib.sha256(repr(arm).encode()).hexdigest()[:12]
+    with open(HERE / "evaluated", "a") as log:
+        log.write(f"{os.getpid()} {name}\\n")
+    while (HERE / "hold").exists():
+        time.sleep(0.01)
+    return sum(link.length for link in arm.links), 1.0 + arm.base[2]
+"""
+
+
+class Place:
+    """A folder with an evaluator that is held as long as the file `hold` is there."""
+
+    def __init__(self, folder: Path, storage: str) -> None:
+        self.folder = folder
+        self.run = folder / "run"
+        (folder / "sim.py").write_text(EVALUATOR)
+        self._storage = storage
+
+    def search(self, n_total: int = 10, at_a_time: int = 2) -> aw.Run:
+        problem = aw.Problem(
+            TASK.model_copy(update={"reference_point": None}),
+            evaluator=aw.load_evaluator(f"{self.folder}/sim.py:measured"),
+        )
+        return aw.optimize(
+            problem, proposer="rules", n_init=5, n_step=5, n_total=n_total, out=self.run,
+            workers=aw.Workers(at_a_time, self._storage, heartbeat=1), watch=self._hear,
+        )  # fmt: skip
+
+    def _hear(self, progress: Any) -> None:
+        self.heard.append(progress.note)
+        self.news.set()
+
+    def begin(self, n_total: int = 10, at_a_time: int = 2) -> Future[aw.Run]:
+        self.heard: list[str] = []
+        self.news = threading.Event()
+        return ThreadPoolExecutor(1).submit(self.search, n_total, at_a_time)
+
+    def wait_for(self, there: Callable[[], bool]) -> None:
+        """A bounded wait for something that other processes do."""
+        gone = threading.Event()
+        for _ in range(6000):
+            if there():
+                return
+            gone.wait(0.01)
+        raise AssertionError(f"it did not come; heard: {self.heard}, evaluated: {self.evaluated}")
+
+    @contextmanager
+    def workers(self, n: int) -> Iterator[list[subprocess.Popen[str]]]:
+        self.wait_for(lambda: any("armwright worker" in words for words in self.heard))
+        command = [sys.executable, "-m", "armwright", "worker", "run", "--evaluator", "sim.py:measured"]
+        started = [
+            subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            for _ in range(n)
+        ]
+        try:
+            yield started
+        finally:
+            for process in started:
+                process.kill()
+                process.wait()
+                assert process.stdout is not None
+                process.stdout.close()
+
+    @property
+    def evaluated(self) -> list[tuple[int, str]]:
+        file = self.folder / "evaluated"
+        lines = file.read_text().splitlines() if file.exists() else []
+        return [(int(line.split()[0]), line.split()[1]) for line in lines]
+
+
+@pytest.fixture
+def place(tmp_path: Path, postgres: PostgresServer) -> Place:
+    return Place(tmp_path, postgres.database())
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_the_trial_of_a_killed_worker_is_evaluated_by_another(place: Place) -> None:
+    (place.folder / "hold").touch()
+    search = place.begin()
+    with place.workers(2) as workers:
+        place.wait_for(lambda: len(place.evaluated) == 2)
+        workers[0].kill()
+        workers[0].wait()
+        (place.folder / "hold").unlink()
+        found = search.result()
+        words, _ = workers[1].communicate()
+        assert workers[1].returncode == 0
+        assert "the search is over" in words
+    assert any("is not heard any more" in words for words in place.heard)
+    (twice,) = [name for name, n in Counter(name for _, name in place.evaluated).items() if n > 1]
+    assert {pid for pid, name in place.evaluated if name == twice} == {workers[0].pid, workers[1].pid}
+    assert [trial.number for trial in found.trials] == list(range(15))
+    config = read_config(place.run)
+    assert config.workers is not None
+    study = optuna.load_study(storage=config.workers.storage, study_name=config.workers.study)
+    states = Counter(trial.state.name for trial in study.trials)
+    assert states == {"COMPLETE": 15 - found.summary["same_arms"], "FAIL": 1}
+    retry = optuna.storages.RetryHeartbeatStaleTrialCallback
+    assert sum(retry.retried_trial_number(trial) is not None for trial in study.trials) == 1
+
+
+def test_a_worker_that_is_stopped_gives_its_trial_back_at_once(place: Place) -> None:
+    (place.folder / "hold").touch()
+    search = place.begin()
+    with place.workers(2) as workers:
+        place.wait_for(lambda: len(place.evaluated) == 2)
+        workers[0].send_signal(signal.SIGTERM)
+        words, _ = workers[0].communicate()
+        assert workers[0].returncode == 130
+        assert "Traceback" not in words
+        (place.folder / "hold").unlink()
+        assert len(search.result().trials) == 15
+    assert not any("is not heard any more" in words for words in place.heard)
+
+
+def test_a_worker_that_wakes_too_late_changes_nothing(place: Place) -> None:
+    (place.folder / "hold").touch()
+    search = place.begin()
+    with place.workers(2) as workers:
+        place.wait_for(lambda: len(place.evaluated) == 2)
+        os.kill(workers[0].pid, signal.SIGSTOP)
+        (place.folder / "hold").unlink()
+        found = search.result()
+        os.kill(workers[0].pid, signal.SIGCONT)
+        words, _ = workers[0].communicate()
+        assert workers[0].returncode == 0
+        assert "too late" in words
+    assert [trial.number for trial in found.trials] == list(range(15))
+
+
+def test_a_database_that_is_away_for_a_while_is_waited_for(tmp_path: Path, postgres: PostgresServer) -> None:
+    place = Place(tmp_path, postgres.database())
+    (place.folder / "hold").touch()
+    search = place.begin()
+    with place.workers(2) as workers:
+        place.wait_for(lambda: len(place.evaluated) == 2)
+        postgres.stop("immediate")
+        try:
+            (place.folder / "hold").unlink()
+            place.wait_for(lambda: any("the database does not answer" in words for words in place.heard))
+        finally:
+            postgres.start()
+        found = search.result()
+        assert [process.wait() for process in workers] == [0, 0]
+    assert any("the database answers again" in words for words in place.heard)
+    assert [trial.number for trial in found.trials] == list(range(15))
+    assert set(Counter(name for _, name in place.evaluated).values()) == {1}
+
+
+def test_a_search_that_is_killed_goes_on_with_its_workers(place: Place) -> None:
+    """kill -9 of the search itself, at a moment when designs are under way."""
+    (place.folder / "hold").touch()
+    command = [
+        sys.executable, "-m", "armwright", "optimize", "target-1", "--evaluator", "sim.py:measured", "--workers", "2",
+        "--proposer", "rules", "--n-init", "5", "--n-step", "5", "--n-total", "10", "--no-figures", "--out", "run",
+    ]  # fmt: skip
+    environment = {**os.environ, "ARMWRIGHT_STORAGE": place._storage}
+    place.heard = ["armwright worker"]
+    with subprocess.Popen(command, cwd=place.folder, env=environment, stdout=subprocess.PIPE, text=True) as search:
+        assert search.stdout is not None
+        next(line for line in search.stdout if "start 2 of: armwright worker run" in line)
+        with place.workers(2) as workers:
+            place.wait_for(lambda: len(place.evaluated) == 2)
+            search.kill()
+            search.wait()
+            (place.folder / "hold").unlink()
+            again = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True)
+            assert again.returncode == 0, again.stderr
+            assert [process.wait() for process in workers] == [0, 0]
+    assert [record["number"] for record in records(place.run)] == list(range(15))
+    assert set(Counter(name for _, name in place.evaluated).values()) == {1}
