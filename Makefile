@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test check gp format bench package clean
+.PHONY: demo test check gp docs docs-serve format bench package clean
 
 demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
 	$(BIN)/armwright optimize target-1 --seed 0
@@ -19,6 +19,12 @@ check: .venv/.test .venv/.check  ## format, lint, types, import staircase
 	$(BIN)/lint-imports
 
 gp: .venv/.gp  ## what the sampler gp needs: torch, which is large; its tests are skipped without it
+
+docs: .venv/.docs  ## the user guide, in site/index.html; needs no server and no network
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+
+docs-serve: .venv/.docs  ## the same on 127.0.0.1:8000, made anew when a page changes
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs serve
 
 format: .venv/.check
 	$(BIN)/ruff format .
@@ -51,6 +57,10 @@ package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare 
 	$(PIP) --group check
 	@touch $@
 
+.venv/.docs: .venv/.run
+	$(PIP) --group docs
+	@touch $@
+
 .venv/.gp: .venv/.run
 	$(PIP) --editable '.[gp,live,llm]'
 	@touch $@
@@ -60,4 +70,4 @@ package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare 
 	@touch $@
 
 clean:
-	rm -rf .venv build dist .pytest_cache .ruff_cache
+	rm -rf .venv build dist site .pytest_cache .ruff_cache

@@ -24,21 +24,21 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     Masses in kg, torques in N m, speed in rad/s without load, size in m, price in USD.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,39}$")
-    maker: str = Field(default="", max_length=100)
-    kind: str = Field(default="", max_length=40)
-    voltage: float | None = Field(default=None, gt=0.0)
-    mass: float = Field(ge=0.0, le=1e4)
-    stall_torque: float | None = Field(default=None, gt=0.0, le=1e6)
-    rated_torque: float | None = Field(default=None, gt=0.0, le=1e6)
-    peak_torque: float | None = Field(default=None, gt=0.0, le=1e6)
-    speed: float | None = Field(default=None, gt=0.0)
-    width: float | None = Field(default=None, gt=0.0)
-    height: float | None = Field(default=None, gt=0.0)
-    depth: float | None = Field(default=None, gt=0.0)
-    price: float | None = Field(default=None, ge=0.0)
-    source: str = Field(default="", max_length=500)
-    note: str = Field(default="", max_length=1000)
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,39}$")  # for space files and tables
+    maker: str = Field(default="", max_length=100)  # who sells it
+    kind: str = Field(default="", max_length=40)  # what it is: a servo, a gear motor
+    voltage: float | None = Field(default=None, gt=0.0)  # that the numbers hold for [V]
+    mass: float = Field(ge=0.0, le=1e4)  # of all of it [kg]
+    stall_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # when it is held fast [N m]
+    rated_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # for any time [N m]
+    peak_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # for a short time [N m]
+    speed: float | None = Field(default=None, gt=0.0)  # without load [rad/s]
+    width: float | None = Field(default=None, gt=0.0)  # [m]
+    height: float | None = Field(default=None, gt=0.0)  # [m]
+    depth: float | None = Field(default=None, gt=0.0)  # [m]
+    price: float | None = Field(default=None, ge=0.0)  # [USD]
+    source: str = Field(default="", max_length=500)  # where the numbers stand
+    note: str = Field(default="", max_length=1000)  # what else is to be known
 
     def torque(self, kind: TorqueKind) -> float | None:
         """The stall, rated or peak torque [N m]."""

@@ -12,7 +12,7 @@ class MassPerMetre(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Links of one section and material: mass grows with length."""
 
     kind: Literal["per_metre"] = "per_metre"
-    kg: float = Field(default=0.0121, ge=0.0, le=1e4)
+    kg: float = Field(default=0.0121, ge=0.0, le=1e4)  # of a metre of link [kg/m]
 
     def mass(self, length: float) -> float:
         """Of a link of `length` [m], in [kg]."""
@@ -30,7 +30,7 @@ class MassPerLink(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Modules of one mass, whatever their length."""
 
     kind: Literal["per_link"]
-    kg: float = Field(default=0.002, ge=0.0, le=1e4)
+    kg: float = Field(default=0.002, ge=0.0, le=1e4)  # of each link [kg]
 
     def mass(self, length: float) -> float:
         """Of any link, in [kg]."""
@@ -48,9 +48,9 @@ class MassOfTube(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Links cut from a round tube (or bar, where the wall is half the diameter) of a real material."""
 
     kind: Literal["tube"]
-    density: float = Field(gt=0.0, le=3e4)  # [kg/m³]
-    outer_diameter: float = Field(gt=0.0, le=1.0)  # [m]
-    wall: float = Field(gt=0.0)  # [m]
+    density: float = Field(gt=0.0, le=3e4)  # of the material [kg/m³]
+    outer_diameter: float = Field(gt=0.0, le=1.0)  # of all tubes [m]
+    wall: float = Field(gt=0.0)  # at most half the diameter [m]
 
     @model_validator(mode="after")
     def _check_wall(self) -> Self:

@@ -45,11 +45,11 @@ class Box(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A box of three sides about its centre, turned by yaw, or by roll, pitch and yaw as in URDF."""
 
     kind: Literal["box"]
-    name: Name = ""
-    center: Place
+    name: Name = ""  # for messages and drawings
+    center: Place  # of the whole
     size: tuple[Size, Size, Size]  # along its own x, y and z [m]
-    yaw: Angle = 0.0
-    rpy: tuple[Angle, Angle, Angle] | None = None
+    yaw: Angle = 0.0  # about z
+    rpy: tuple[Angle, Angle, Angle] | None = None  # instead of it: about x, then y, then z
 
     @model_validator(mode="after")
     def _check_one_rotation(self) -> Self:
@@ -75,9 +75,9 @@ class Sphere(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A ball."""
 
     kind: Literal["sphere"]
-    name: Name = ""
-    center: Place
-    radius: Size
+    name: Name = ""  # for messages and drawings
+    center: Place  # of the whole
+    radius: Size  # about the centre
 
     @property
     def solid(self) -> Solid:
@@ -92,10 +92,10 @@ class Cylinder(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A round bar with flat ends. axis: its direction, a letter or a vector of any length."""
 
     kind: Literal["cylinder"]
-    name: Name = ""
-    center: Place
-    radius: Size
-    height: Size
+    name: Name = ""  # for messages and drawings
+    center: Place  # of the whole
+    radius: Size  # of its round ends
+    height: Size  # from end to end
     axis: Literal["x", "y", "z"] | Place = "z"
 
     @model_validator(mode="after")
@@ -130,8 +130,8 @@ class Ground(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """All that lies below a height, such as a floor or the top of a table without end."""
 
     kind: Literal["ground"]
-    name: Name = ""
-    z: Coordinate = 0.0
+    name: Name = ""  # for messages and drawings
+    z: Coordinate = 0.0  # below which all is solid
 
     @property
     def solid(self) -> Solid:

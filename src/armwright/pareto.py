@@ -13,6 +13,9 @@ def front_mask(values: Array) -> NDArray[np.bool_]:
     """(N,) True where no other row of `values` (N, M) is better or equal in all and better in one.
 
     Of equal rows the first is kept. Infinite rows, as of infeasible designs (`armwright.feasibility`), are not on it.
+
+    >>> front_mask([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0]])
+    array([ True,  True, False, False])
     """
     values = np.asarray(values, dtype=np.float64)
     if len(values) == 0:
@@ -29,8 +32,14 @@ def front_numbers(values: Array) -> list[int]:
 def hypervolume(values: Array, reference_point: Sequence[float]) -> float:
     """The area (volume) dominated by `values` (N, M) and bounded by the reference point.
 
-    Points that are not below the reference point in all objectives count nothing.
+    Points that are not below the reference point in all objectives count nothing, nor do dominated ones.
+
+    >>> hypervolume([[1.0, 2.0], [2.0, 1.0]], (3.0, 3.0))
+    3.0
+    >>> hypervolume([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [0.0, 3.0]], (3.0, 3.0))
+    3.0
     """
+    values = np.asarray(values, dtype=np.float64)
     inside = np.all(values < np.asarray(reference_point), axis=1) if len(values) else np.zeros(0, dtype=bool)
     if not inside.any():
         return 0.0
@@ -90,6 +99,9 @@ def knee_number(values: Array, reference_point: Sequence[float]) -> int | None:
     """The row on the front that is farthest below the straight line (plane) between its ends within the reference box.
 
     None where fewer than three designs of the front lie in the box.
+
+    >>> knee_number(np.array([[0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]), (5.0, 5.0))
+    1
     """
     numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
     if len(numbers) < 3:

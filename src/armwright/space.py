@@ -83,22 +83,22 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     tie: parameters that always have the value of another (`link_3: link_2`).
     """
 
-    name: str = Field(default="paper", min_length=1, max_length=100)
+    name: str = Field(default="paper", min_length=1, max_length=100)  # for tables
     joints: int | tuple[int, int] = 4
     joint_types: tuple[JointType, ...] = Field(default=("R", "P", "Y"), min_length=1)
     joint_range: Range = (-2.4, 2.4)  # [rad]
     limit: Range | None = None  # [rad]
     stroke: float | Range = 0.3  # [m]
     travel: float = Field(default=0.01, gt=0.0, le=10.0)  # [m/rad]
-    origin_x: Range = (-1.0, 1.0)  # [m]
-    origin_y: Range = (-1.0, 1.0)  # [m]
-    origin_z: Range = (-1.0, 1.0)  # [m]
+    origin_x: Range = (-1.0, 1.0)  # of the base [m]
+    origin_y: Range = (-1.0, 1.0)  # of the base [m]
+    origin_z: Range = (-1.0, 1.0)  # of the base [m]
     mount: tuple[Mount, ...] = Field(default=("floor",), min_length=1)
-    link: Range = (0.03, 0.30)  # [m]
+    link: Range = (0.03, 0.30)  # the length of each [m]
     link_directions: tuple[Direction, ...] = Field(default=("+z",), min_length=1)
-    link_radius: float = Field(default=0.015, gt=0.0, le=1.0)  # [m]
+    link_radius: float = Field(default=0.015, gt=0.0, le=1.0)  # of all links [m]
     tool: Vector = (0.0, 0.0, 0.0)  # [m]
-    mass: MassModel = MassPerMetre()
+    mass: MassModel = MassPerMetre()  # of links, by their lengths
     actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MOST_ACTUATORS)
     actuator_torque: TorqueKind = "stall"
     safety_factor: float = Field(default=1.0, gt=0.0, le=100.0)
@@ -436,7 +436,19 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
 
 def paper_space(joints: int = 4) -> DesignSpace:
-    """The design space of the paper, with `joints` joints (4 in its experiments)."""
+    """The design space of the paper, with `joints` joints (4 in its experiments).
+
+    >>> import armwright as aw
+    >>> space = aw.paper_space(joints=2)
+    >>> [parameter.name for parameter in space.parameters]
+    ['origin_x', 'origin_y', 'origin_z', 'joint_1', 'joint_2', 'link_1', 'link_2']
+    >>> params = {"origin_x": 0, "origin_y": 0, "origin_z": 0.1, "joint_1": "Y", "joint_2": "P", "link_1": 0.2}
+    >>> space.design(params | {"link_2": 0.3}).joints
+    'YP'
+    >>> space.design(params | {"link_2": 0.4})
+    Traceback (most recent call last):
+    armwright.exceptions.DesignError: link_2 = 0.4 m is outside 0.03 <= link_2 <= 0.3 m
+    """
     content = {"name": "paper" if joints == 4 else f"paper-{joints}", "joints": joints}
     return check_document(content, DesignSpace, SpaceError, "paper_space")
 
@@ -447,7 +459,12 @@ def builtin_spaces() -> list[str]:
 
 
 def load_space(name_or_path: str | Path) -> DesignSpace:
-    """A built-in space by its name, or that of a YAML file; keys that it leaves out are as in the paper."""
+    """A built-in space by its name, or that of a YAML file; keys that it leaves out are as in the paper.
+
+    >>> import armwright as aw
+    >>> aw.load_space("slideopt").joint_types
+    ('R', 'P', 'Y', 'O', 'S', 'F')
+    """
     name = str(name_or_path)
     if name == "paper":
         return paper_space()

@@ -14,7 +14,7 @@ from armwright.space import DesignSpace
 class DesignFile(BaseModel, frozen=True, extra="forbid"):
     """A design as a run writes it into designs/NNNN/design.json; of a file of one's own, `params` is enough."""
 
-    params: dict[str, float | str]
+    params: dict[str, float | str]  # a value for each parameter of the space, by its name
     number: Any = None
     source: Any = None
     reason: Any = None

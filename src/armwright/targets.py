@@ -26,7 +26,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     weight: that multiplies its share of a sum of errors.
     """
 
-    position: Point
+    position: Point  # where the tip should be [m]
     axis: Point | None = None
     orientation: Point | None = None
     tolerance: float = Field(default=REACHED, gt=0.0, le=LARGEST_COORDINATE)

@@ -60,7 +60,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # of run folders, too
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
     payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MOST_TIMES_PAYLOAD)], ...] = Field(
@@ -77,8 +77,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     constraints: tuple[str, ...] = ()
     # One value an objective; of the paper's: (position error [m], torque [α-scaled]).
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
-    description: str = Field(default="", max_length=10_000)
-    provenance: str = Field(default="", max_length=10_000)
+    description: str = Field(default="", max_length=10_000)  # what the arm has to do; proposers are told
+    provenance: str = Field(default="", max_length=10_000)  # where the points come from
     _records: tuple[Target | None, ...] = PrivateAttr(())  # of each target that says more; empty where none does
 
     @model_validator(mode="wrap")
@@ -235,7 +235,12 @@ def builtin_names() -> list[str]:
 
 
 def builtin_tasks() -> dict[str, Task]:
-    """The tasks that come with armwright, by name."""
+    """The tasks that come with armwright, by name.
+
+    >>> import armwright as aw
+    >>> {name: len(task.targets) for name, task in aw.builtin_tasks().items() if name.startswith("target")}
+    {'target-1': 8, 'target-2': 9, 'target-3': 8}
+    """
     return {name: _builtin(name) for name in builtin_names()}
 
 
@@ -246,7 +251,15 @@ def _builtin(name: str) -> Task:
 
 
 def load_task(name_or_path: str | Path) -> Task:
-    """A built-in task by its name, `random-N` of the seeded family, or the task of a YAML file."""
+    """A built-in task by its name, `random-N` of the seeded family, or the task of a YAML file.
+
+    >>> import armwright as aw
+    >>> aw.load_task("target-1").targets[0]
+    (-0.45, -0.45, -0.45)
+    >>> aw.load_task("target-4")
+    Traceback (most recent call last):
+    armwright.exceptions.TaskError: unknown task "target-4". Did you mean "target-3"? ...
+    """
     known = builtin_names()
     if str(name_or_path) in known:
         return _builtin(str(name_or_path))

@@ -39,7 +39,7 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     label: str = Field(min_length=1, max_length=40)
     proposer: str = "none"
-    front: str | None = None
+    front: str | None = None  # a budget of `armwright front`, which then runs instead of a study
     sampler: str = "tpe"
     n_step: Count = 10
     in_flight: Count | None = None
@@ -81,8 +81,8 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 class FigurePlan(BaseModel, frozen=True, extra="forbid"):
     """Hypervolume curves of some methods, a panel for each task."""
 
-    title: str
-    methods: tuple[Key, ...] = Field(min_length=1)
+    title: str  # above the curves
+    methods: tuple[Key, ...] = Field(min_length=1)  # whose curves are drawn
 
 
 class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -96,18 +96,18 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         the first of them that has runs.
     """
 
-    name: Key
-    description: str = ""
+    name: Key  # of its folder
+    description: str = ""  # what it is to show
     tasks: tuple[str, ...] | Literal["all"]
     seeds: Annotated[int, Field(ge=1, le=MOST_SEEDS)] | tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...] = 5
     n_init: Count = 10
     n_total: Count = 200
     space: str | None = None
     robust: bool = False
-    methods: dict[Key, MethodPlan] = Field(min_length=1)
+    methods: dict[Key, MethodPlan] = Field(min_length=1)  # by names of yours
     baseline: Key | None = None
     published: dict[Key, dict[str, tuple[float, float]]] = {}
-    published_in: str = ""
+    published_in: str = ""  # where these numbers stand
     figures: dict[Key, FigurePlan] = {}
     samples: tuple[Key, ...] = ()
 

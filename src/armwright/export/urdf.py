@@ -27,6 +27,16 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
     Link frames stand at their joints; with all joints at 0 they are parallel to the world's. The tip is the tool's, its
     z along the tool's axis and its x to the tool's side. Links are solid cylinders of uniform density from joint to
     joint, for inertia, collision and sight.
+
+    >>> import armwright as aw
+    >>> space = aw.paper_space(joints=2)
+    >>> arm = space.arm(space.sample(1, seed=0)[0])
+    >>> print(aw.to_urdf(arm, "two"))
+    <?xml version="1.0"?>
+    <robot name="two">
+    ...
+    </robot>
+    <BLANKLINE>
     """
     return text_of(urdf_tree(arm, name))
 

@@ -21,8 +21,10 @@ class ModelName:
 
 
 class _ConfigurationFile(BaseModel, frozen=True, extra="forbid"):
-    model: str | None = None
-    base_url: str | None = None
+    """What holds where neither an option nor the environment says otherwise."""
+
+    model: str | None = None  # such as openai-chat:gpt-4o
+    base_url: str | None = None  # of any OpenAI-compatible server
 
 
 def configuration_path() -> Path:

@@ -1,0 +1,69 @@
+"""What the documentation shows: its commands, programs and files, as blocks of the pages."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from markdown_it import MarkdownIt
+
+ROOT = Path(__file__).parents[1]
+PAGES = tuple(sorted(str(file.relative_to(ROOT)) for at in (ROOT, ROOT / "docs") for file in at.glob("*.md")))
+
+PROGRAMS = ("armwright", ".venv/bin/armwright", "python", "python3", ".venv/bin/python", "pip", "make", "export", "sh",
+            "xargs", "sudo", "apt", "apt-get", "dask", "ssh", "git", "docker", "optuna-dashboard", ".")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of code on a page. language: as it is fenced; of an indented one sh where it begins with a program."""
+
+    page: str
+    line: int
+    language: str
+    text: str
+
+    @property
+    def where(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+@dataclass(frozen=True)
+class Command:
+    """A line for a shell, without what is said behind #."""
+
+    where: str
+    text: str
+
+
+def blocks(page: str) -> list[Block]:
+    """All blocks of code, indented or fenced, in their order."""
+    tokens = MarkdownIt().parse((ROOT / page).read_text(encoding="utf-8"))
+    found = []
+    for token in tokens:
+        if token.type in ("fence", "code_block"):
+            language = token.info.strip() or ("sh" if _begins_with_a_program(token.content) else "")
+            assert token.map is not None
+            found.append(Block(page, token.map[0] + 1, language, token.content))
+    return found
+
+
+def commands(page: str) -> list[Command]:
+    """The commands of a page, in their order."""
+    return [
+        Command(f"{block.page}:{block.line + number}", text)
+        for block in blocks(page)
+        if block.language in ("sh", "console", "bash")
+        for number, line in enumerate(block.text.splitlines())
+        if (text := without_comment(line))
+    ]
+
+
+def without_comment(line: str) -> str:
+    """A line for a shell up to its comment."""
+    found = re.match(r"""(?:[^\s"'#][^\s"']*|"[^"]*"|'[^']*'|\s+)*""", line)
+    assert found is not None
+    return found[0].strip()
+
+
+def _begins_with_a_program(text: str) -> bool:
+    return text.split()[:1] in [[program] for program in PROGRAMS]

@@ -1,0 +1,45 @@
+"""The examples in docstrings."""
+
+import doctest
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import armwright as aw
+
+SOURCES = Path(str(aw.__file__)).parent
+MODULES = sorted(
+    ".".join(("armwright", *file.relative_to(SOURCES).with_suffix("").parts))
+    for file in SOURCES.rglob("*.py")
+    if ">>> " in file.read_text(encoding="utf-8")
+)
+# What users call first.
+SHOWN = (
+    "Arm",
+    "Problem",
+    "builtin_tasks",
+    "evaluate",
+    "find_front",
+    "hypervolume",
+    "load_space",
+    "load_task",
+    "optimize",
+    "paper_space",
+    "to_urdf",
+)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_the_examples_of_a_module(module: str, in_folder: Path) -> None:
+    for example in doctest.DocTestFinder().find(import_module(module)):
+        said: list[str] = []
+        runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+        assert runner.run(example, out=said.append).failed == 0, "".join(said)
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_what_users_call_is_shown_by_an_example(name: str) -> None:
+    thing = getattr(aw, name)
+    assert f"{thing.__module__}" in MODULES
+    assert ">>> " in thing.__doc__

@@ -1,0 +1,310 @@
+"""Everything that the documentation shows is tried: commands are run, files are loaded, programs are executed.
+
+What cannot be run here stands in NOT_RUN, by name and with the reason; its options are checked all the same.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+import yaml
+from markdown_it import MarkdownIt
+
+import armwright as aw
+from armwright.experiment.plan import ExperimentPlan, cells_of, load_experiment
+from armwright.space import DesignSpace
+from armwright.task import Task
+from tests.documented import PAGES, ROOT, Block, Command, blocks, commands
+from tests.robots import robot
+from website.commands import commands as cli
+
+# Commands that are not run, by what they match as a whole; the first that matches counts.
+NOT_RUN = {
+    r"make .*": "installs from a network, and some take half an hour; that Makefile has the target is checked",
+    r"python3 -m venv .*|\. \.venv/bin/activate": "the tests run in an environment already",
+    r"(\S*python -m )?pip install .*": "installs from a network; that the extras exist is checked",
+    r"export \w+=.*": "a key of nobody's",
+    r"armwright experiment .*--model .*": "needs a model's key",
+    r"armwright .*--model .*": "needs a model; test_llm.py and test_draft.py run such against a server of their own",
+    r"armwright compare .* runs/gpt-4o": "needs a model's run; that of docs/experiments.md is run",
+    r"armwright .*--proposer replay:.*": "needs a run that a model was asked in; test_replay.py makes one",
+    r"armwright .*--proposer manual:.*": "waits for people; test_manual.py answers",
+    r"armwright optimize .*--live|armwright live .*": "serves until nobody looks on; test_live.py looks on",
+    r"armwright compare-arms .* ur5e panda .*": "robot_descriptions fetches these arms from a network",
+    r"armwright optimize .*--workers .*|armwright worker .*": "waits for other processes; test_workers.py starts them",
+    r"optuna-dashboard .*": "serves until it is stopped",
+    r"xargs .* < cells.txt": "minutes: all cells of the experiment; the lines of cells.txt are checked",
+    r"python benchmarks/.*": "half an hour of benchmark; docs/benchmarks.md has the figures",
+}
+# Experiments of minutes to hours: run with --print-commands, so that all of their cells are made and none is run.
+LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/\S+)( --model \S+)?")
+# Pages whose programs are run elsewhere, where what comes of them is looked at, too.
+PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
+SAME_AS_README = {("docs/tasks.md", "armwright optimize my-task.yaml")}
+TRANSLATED = "README.ja.md"  # its commands are those of README.md, which are run there
+
+LONGEST_WAIT = 900.0  # [s] for a command: one that waits for something that never comes is a fault of the page
+
+# What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
+SHORT = "--n-total 40 --no-figures"
+POINTS = {"points.csv": "x,y,z\n400,-200,100\n400,200,100\n100,350,500\n"}
+TEMPLATE = '{% extends "proposal.md.j2" %}\n{% block analysis %}\nSay which lengths are in stock.\n{% endblock %}\n'
+FILES = {
+    "README.md": POINTS,
+    "docs/tasks.md": POINTS,
+    "docs/spaces.md": {
+        "mine.yaml": "name: mine\ntargets: [[0.3, 0.0, 0.2], [0.2, 0.2, 0.3]]\n",
+        "space.yaml": "joints: 2\njoint_types: [Y, P]\n",
+        "arm.json": '{"params": {"origin_x": 0.0, "origin_y": 0.0, "origin_z": 0.0, "joint_1": "Y", "joint_2": "P", '
+        '"link_1": 0.2, "link_2": 0.25}}',
+    },
+    "docs/experiments.md": {"shelf.yaml": "name: rack\ntargets: [[0.3, 0.0, 0.2]]\n", "my-prompt.md.j2": TEMPLATE,
+                            "six-axis.yaml": "joints: 6\n"},
+}  # fmt: skip
+BEFORE = {
+    "docs/exports.md": [f"armwright optimize target-1 {SHORT}"],
+    "docs/page.md": [f"armwright optimize target-1 {SHORT} --out runs/{name}" for name in "ab"],
+    "docs/language-models.md": [f"armwright optimize target-1 {SHORT} --out runs/mine"],
+    "docs/experiments.md": [f"armwright optimize target-1 --proposer {proposer} {SHORT} --out runs/{name}"
+                            for name, proposer in (("a", "none"), ("b", "rules"), ("others/c", "rules --seed 1"))],
+}  # fmt: skip
+SLOW = (
+    "README.md",
+    "docs/buy-or-build.md",
+    "docs/examples.md",
+    "docs/experiments.md",
+    "docs/page.md",
+    "docs/spaces.md",
+    "docs/tutorial.md",
+    "docs/workers.md",
+)
+
+
+def reason_not_to_run(command: str) -> str:
+    return next((reason for pattern, reason in NOT_RUN.items() if re.fullmatch(pattern, command)), "")
+
+
+def parsed(arguments: Sequence[str]) -> None:
+    """Arguments of armwright, taken apart by its own parser; nothing is run."""
+    name, *rest = arguments
+    assert name in cli(), f"there is no command {name}"
+    cli()[name].make_context(f"armwright {name}", list(rest))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_and_option_exists(page: str) -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for command in commands(page):
+        program, *arguments = shlex.split(command.text.split(" > ")[0].split(" < ")[0])
+        match Path(program).name:
+            case "armwright":
+                parsed(arguments)
+            case "make":
+                subprocess.run(["make", "--dry-run", *arguments], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+            case "python" | "python3" if arguments[0].endswith(".py"):
+                assert (ROOT / arguments[0]).is_file(), command.where
+            case "pip" | "python" | "python3" if "install" in arguments:
+                for name in re.findall(r"\[([\w,]+)\]", command.text):
+                    assert set(name.split(",")) <= extras.keys(), command.where
+                assert all((ROOT / arguments[i + 1]).is_file() for i, a in enumerate(arguments) if a == "-c")
+            case _:
+                run = reason_not_to_run(command.text) or shutil.which(program)
+                assert run, f"{command.where}: {command.text} can neither be run, nor is it excused"
+
+
+def test_what_is_not_run_is_there_to_be_excused() -> None:
+    shown = [command.text for page in PAGES for command in commands(page)]
+    for pattern in NOT_RUN:
+        assert any(re.fullmatch(pattern, command) for command in shown), pattern
+    for page, command in SAME_AS_README:
+        assert command in [c.text for c in commands(page)]
+        assert command in [c.text for c in commands("README.md")]
+    for page, file in PROGRAMS_RUN_IN.items():
+        assert Path(page).name in (Path(__file__).parent / file).read_text(), page
+
+
+def test_what_is_said_in_passing_exists() -> None:
+    """`armwright front`, `--budget` and the like within sentences."""
+    options = {
+        name: {o for p in command.params for o in (*p.opts, *p.secondary_opts)} for name, command in cli().items()
+    }
+    scripts = "".join(file.read_text() for place in ("benchmarks", "tests") for file in (ROOT / place).rglob("*.py"))
+    ours = set(re.findall(r'add_argument\(\s*"(--[a-z-]+)"', scripts))
+    known = set[str]().union(*options.values()) | {"--version", "--help"} | ours
+    for page in PAGES:
+        for block in MarkdownIt().enable("table").parse((ROOT / page).read_text(encoding="utf-8")):
+            for span in block.children or ():
+                if span.type != "code_inline":
+                    continue
+                words = span.content.split()
+                said = {word.split("=")[0] for word in words if re.fullmatch(r"--[a-z][a-z-]+(=.*)?", word)}
+                if words[0] == "armwright" and len(words) > 1 and not words[1].startswith("-"):
+                    assert words[1] in options, f"{page}: {span.content}"
+                    assert said <= options[words[1]] | {"--help"}, f"{page}: {span.content}"
+                elif words[0].startswith("--"):
+                    assert said <= known, f"{page}: {span.content}"
+
+
+def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[str]:
+    """A line as a user types it, in a folder, with armwright on the path."""
+    program = folder / ".bin" / "armwright"
+    if not program.is_file():
+        program.parent.mkdir()
+        program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m armwright "$@"\n')
+        program.chmod(0o755)
+    path = os.pathsep.join([str(program.parent), str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = {**os.environ, "PATH": path, "PYTHONWARNINGS": "error"}
+    done = subprocess.run(
+        ["bash", "-c", line],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=LONGEST_WAIT,
+    )
+    assert done.returncode == 0, f"{where}: {line}\n{done.stdout}{done.stderr}"
+    assert "Traceback" not in done.stderr, f"{where}: {line}\n{done.stderr}"
+    return done
+
+
+def planned(experiment: str, folder: Path, where: str) -> None:
+    """All cells of an experiment, as commands that could be run."""
+    cells = shell(f"{experiment} --print-commands", folder, where).stdout.splitlines()
+    assert len(cells) > 20
+    for line in cells:
+        words = shlex.split(line)
+        parsed(words[[Path(word).name for word in words].index("armwright") + 1 :])
+
+
+EXPERIMENTS = {command.text for page in PAGES for command in commands(page) if LONG.fullmatch(command.text)}
+
+
+@pytest.mark.parametrize("experiment", sorted(EXPERIMENTS - {"armwright experiment mine.yaml"}))
+def test_long_experiments_are_planned(experiment: str, in_folder: Path) -> None:
+    shutil.copytree(ROOT / "examples", in_folder / "examples")
+    planned(experiment, in_folder, experiment)
+
+
+def run_command(command: Command, folder: Path) -> str:
+    """What it prints, or writes into the file that it names."""
+    text = command.text.replace(".venv/bin/", "")
+    if LONG.fullmatch(text):
+        if "mine.yaml" in text:  # the others are planned once for all pages
+            planned(text, folder, command.where)
+    elif not reason_not_to_run(command.text):
+        printed = shell(text, folder, command.where).stdout
+        out = re.search(r"--out (\S+)", text)
+        written = out is not None and (folder / out[1]).is_file()
+        return (folder / out[1]).read_text(encoding="utf-8") if out is not None and written else printed
+    return ""
+
+
+def letters(text: str) -> str:
+    """What of an output is the same on every processor."""
+    return " ".join(re.findall(r"[A-Za-z]+", text))
+
+
+def file_of(block: Block) -> str | None:
+    """The file that a block is shown as: the paragraph before it ends with its name and a colon."""
+    before = "\n".join((ROOT / block.page).read_text(encoding="utf-8").splitlines()[: block.line - 1]).rstrip()
+    found = re.search(r"`([\w-]+\.\w+)`:$", before)
+    return found[1] if found else None
+
+
+def test_the_translation_shows_the_same() -> None:
+    """Commands of the original, nearly all of them, and the same program but for its comments."""
+
+    def without_comments(page: str, language: str) -> list[str]:
+        shown = [block.text for block in blocks(page) if block.language == language]
+        return [re.sub(r"\s+#.*", "", line) for text in shown for line in text.splitlines()]
+
+    here, there = ([command.text for command in commands(page)] for page in (TRANSLATED, "README.md"))
+    assert set(here) <= set(there)
+    assert len(here) > 0.9 * len(there)
+    assert without_comments(TRANSLATED, "python") == without_comments("README.md", "python")
+    assert set(without_comments(TRANSLATED, "yaml")) <= set(without_comments("README.md", "yaml"))
+    for page, other in ((TRANSLATED, "README.md"), ("README.md", TRANSLATED)):
+        assert f"]({other})" in (ROOT / page).read_text(encoding="utf-8").split("## ")[0]
+
+
+FOLLOWED = [page for page in PAGES if page != TRANSLATED and commands(page)]
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, marks=pytest.mark.slow if p in SLOW else ()) for p in FOLLOWED])
+def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
+    """Its commands, files and programs, from the first to the last, in one folder."""
+    shutil.copytree(ROOT / "examples", in_folder / "examples")
+    for name, file in (("ur3", "ur3_robot"), ("so101", "so101")):
+        shutil.copy(robot(file), in_folder / f"{name}.urdf")
+    for name, text in FILES.get(page, {}).items():
+        (in_folder / name).write_text(text)
+    for line in BEFORE.get(page, ()):
+        shell(line, in_folder, page)
+    run = {command.where: command for command in commands(page)}
+    said = ""  # by what was run last
+    for block in blocks(page):
+        for number in range(len(block.text.splitlines()) + 1):
+            command = run.get(f"{page}:{block.line + number}")
+            if command is not None and (page, command.text) not in SAME_AS_README:
+                said = run_command(command, in_folder)
+        if block.language in ("yaml", "csv", "python") and (name := file_of(block)):
+            (in_folder / name).write_text(block.text)
+        if block.language == "python" and page not in PROGRAMS_RUN_IN:
+            (in_folder / "program.py").write_text(block.text)
+            said = shell("python program.py", in_folder, block.where).stdout
+        if block.language == "jinja":
+            (in_folder / "shown.md.j2").write_text(block.text)
+            shell("armwright prompt target-1 --prompt shown.md.j2", in_folder, block.where)
+        if block.language == "text":
+            assert letters(block.text.splitlines()[0]) in letters(said), block.where
+
+
+@pytest.mark.parametrize(
+    "block", [b for page in PAGES for b in blocks(page) if b.language == "yaml"], ids=lambda b: b.where
+)
+def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
+    content = yaml.safe_load(block.text)
+    for name, text in FILES.get("docs/experiments.md", {}).items():
+        (in_folder / name).write_text(text)
+    file = in_folder / "shown.yaml"
+    if "methods" in content:
+        file.write_text(block.text)
+        plan, beside = load_experiment("shown.yaml")
+        cells, skipped = cells_of(plan, beside, in_folder / "out")
+        assert len(cells) + len(skipped) == len(plan.methods) * len(plan.task_list) * len(plan.seed_list)
+    elif content.keys() & (Task.model_fields.keys() - DesignSpace.model_fields.keys()):
+        named = "" if "name" in content else "name: shown\n"  # a part of a file
+        some = "" if {"targets", "workspace"} & content.keys() else "targets: [[0.3, 0.0, 0.2]]\n"
+        file.write_text(named + some + block.text)
+        space = DesignSpace(actuators=("XL430-W250",), joints=3)  # type: ignore[arg-type]
+        problem = aw.Problem(aw.load_task("shown.yaml"), space)
+        assert len(problem.evaluate(problem.space.sample(2, 0))) == 2
+    else:
+        file.write_text(block.text)
+        assert aw.load_space("shown.yaml").parameters
+
+
+def test_every_block_is_of_a_kind_that_is_tried() -> None:
+    """What commands print is text; formulas and drawings have no language."""
+    for page in PAGES:
+        for block in blocks(page):
+            assert block.language in ("sh", "yaml", "csv", "python", "jinja", "text", ""), block.where
+            formulas = page in ("docs/method.md", "docs/architecture.md")
+            assert block.language or formulas, f"{block.where}: a block of no language"
+
+
+def test_every_key_of_an_experiment_s_method_is_an_option() -> None:
+    """The reference tells them by the help of `armwright optimize`."""
+    options = {parameter.name for parameter in cli()["optimize"].params}
+    assert set(ExperimentPlan.model_fields["methods"].annotation.__args__[1].model_fields) <= options | {
+        "label",
+        "front",
+    }  # type: ignore[union-attr]
