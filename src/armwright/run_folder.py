@@ -187,7 +187,7 @@ class RunFolder:
                 f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
             ) from fault
         except OSError as fault:
-            raise _write_error(self.path, fault) from fault
+            raise _write_error(Path(fault.filename or self.path), fault) from fault
         return self
 
     def __exit__(

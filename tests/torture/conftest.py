@@ -22,6 +22,13 @@ def kills(pytestconfig: pytest.Config) -> int:
     return int(pytestconfig.getoption("--kills"))
 
 
+@pytest.fixture
+def thorough(kills: int) -> None:
+    """What takes a minute is left to `make torture`."""
+    if kills < 100:
+        pytest.skip("takes a minute; `make torture` runs it")
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     told = [pair for report in terminalreporter.getreports("passed") for pair in report.user_properties]
     if told:

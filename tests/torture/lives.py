@@ -23,6 +23,7 @@ import psutil
 
 LOOK_SECONDS = 0.003
 SHARES = {"start": 0.15, "search": 0.45, "results": 0.4}  # of the kills
+MOST_KILLS = 12  # of one run
 STRIDE = 0.25  # of the whole search, the most between two kills in it
 SIGNALS = {"INT": [signal.SIGINT], "INT INT": [signal.SIGINT] * 2, "TERM": [signal.SIGTERM]}
 COST = {"seconds", "call_seconds"}  # what differs between equal runs
@@ -34,7 +35,8 @@ class Scenario:
 
     check: what must hold after each kill, of a folder and the reference. same: what must hold at the end.
     program: what is begun with the arguments; the command line as it is, unless told otherwise.
-    victims: who is killed: the process, one of its workers, or all at once.
+    victims: who is killed: the process, one of its workers, or all at once; or what signals the process gets.
+    is_begun: whether Python and its modules are loaded, and the work begins.
     """
 
     arguments: Callable[[Path], Sequence[str]]
@@ -43,6 +45,7 @@ class Scenario:
     same: Callable[[Path, Path], None]
     program: Sequence[str] = ("-m", "armwright")
     victims: Sequence[str] = ("process",)
+    is_begun: Callable[["Command"], bool] = lambda command: command.words.stat().st_size > 0
     environment: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -148,11 +151,13 @@ def kill_often(scenario: Scenario, place: Path, kills: int, seed: str) -> Counte
     whole = place / "whole"
     times = run_whole(scenario, whole)
     fell: Counter[str] = Counter()
-    while fell.total() < kills:
+    while fell.total() - fell["ended"] < kills:
         folder = place / f"run{fell['ended']}"
+        left = min(chance.randint(1, MOST_KILLS), kills - fell.total() + fell["ended"])
         while True:
             command = Command(scenario, folder)
-            landed = "" if fell.total() - fell["ended"] >= kills else _kill_once(command, chance, times)
+            landed = _kill_once(command, chance, times) if left else ""
+            left -= 1
             if not landed:
                 assert command.process.wait() == 0, command.said()
             assert "Traceback" not in command.said(), command.said()
@@ -170,16 +175,14 @@ def _kill_once(command: Command, chance: random.Random, times: Times) -> str:
     scenario, folder = command.scenario, command.folder
     part = chance.choices(list(SHARES), list(SHARES.values()))[0]
     victim = chance.choice(scenario.victims)
-    if part == "start":
-        # Before the first words Python itself begins, which tells of a signal in its own way.
-        goes_on = victim not in SIGNALS or command.wait_for(lambda: command.words.stat().st_size > 0)
-        goes_on = goes_on and command.wait_seconds(chance.uniform(0.0, times.start))
-    elif part == "search":
-        goal = min(1.0, scenario.progress(folder) + chance.uniform(0.0, STRIDE))
-        goes_on = command.wait_for(lambda: scenario.progress(folder) >= goal)
+    if part == "start" and victim not in SIGNALS:  # of which Python itself tells in its own way while it begins
+        goes_on = command.wait_seconds(chance.uniform(0.0, times.start))
+    elif part in ("start", "search"):
+        goal = min(1.0, scenario.progress(folder) + (part == "search") * chance.uniform(0.0, STRIDE))
+        goes_on = command.wait_for(lambda: scenario.is_begun(command) and scenario.progress(folder) >= goal)
         goes_on = goes_on and command.wait_seconds(chance.uniform(0.0, 0.02))
     else:
-        goes_on = command.wait_for(lambda: scenario.progress(folder) >= 1.0)
+        goes_on = command.wait_for(lambda: scenario.is_begun(command) and scenario.progress(folder) >= 1.0)
         goes_on = goes_on and command.wait_seconds(chance.uniform(0.0, times.results))
     if not goes_on or not command.kill(victim):
         return ""

@@ -189,9 +189,7 @@ def test_a_folder_that_becomes_read_only_goes_on_when_it_is_not(tmp_path: Path, 
 
 NO_HOME: list[dict[str, str | None]] = [
     {"HOME": None, "XDG_CONFIG_HOME": None, "XDG_CACHE_HOME": None},
-    {"HOME": "/proc/self/nowhere", "XDG_CONFIG_HOME": None, "XDG_CACHE_HOME": None},
-    {"HOME": "", "XDG_CONFIG_HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"},
-    {"HOME": "/dev/null", "XDG_CONFIG_HOME": "relative", "XDG_CACHE_HOME": "relative", "TMPDIR": "/proc"},
+    {"HOME": "/proc/self/nowhere", "XDG_CONFIG_HOME": "/dev/null", "XDG_CACHE_HOME": "relative", "TMPDIR": "/proc"},
 ]
 
 
@@ -206,7 +204,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory, whole: Path) -> Path:
     return copied
 
 
-@pytest.mark.parametrize("environment", NO_HOME, ids=["unset", "nowhere", "empty", "no folders at all"])
+@pytest.mark.parametrize("environment", NO_HOME, ids=["unset", "no folders at all"])
 def test_no_home(tmp_path: Path, whole: Path, cache: Path, environment: dict[str, str | None]) -> None:
     folder = tmp_path / "run"
     done = study(folder, environment={**environment, "WARP_CACHE_PATH": str(cache)}, cwd=tmp_path)
@@ -217,7 +215,9 @@ def test_no_home(tmp_path: Path, whole: Path, cache: Path, environment: dict[str
 @pytest.mark.slow
 def test_figures_without_a_home(tmp_path: Path, cache: Path) -> None:
     """matplotlib makes do with a temporary folder, and says so."""
-    done = study(tmp_path / "run", "--figures", environment={**NO_HOME[1], "WARP_CACHE_PATH": str(cache)})
+    done = study(
+        tmp_path / "run", "--figures", environment={"HOME": "/proc/self/nowhere", "WARP_CACHE_PATH": str(cache)}
+    )
     assert done.returncode == 0
     assert "Traceback" not in done.stderr
     assert list((tmp_path / "run" / "figures").glob("*.png"))

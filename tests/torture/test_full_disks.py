@@ -45,6 +45,7 @@ def test_a_file_may_not_grow(tmp_path: Path, whole: Path, kills: int, record_pro
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("thorough")
 def test_the_page_and_the_figures_find_no_room(tmp_path: Path, record_property: Tell, kills: int) -> None:
     whole = tmp_path / "whole"
     study(whole, "--figures")
@@ -74,7 +75,7 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_disk_runs_full(disk: Path, whole: Path, kills: int, record_property: Tell) -> None:
     """A real disk, full after a random number of pages; then it grows."""
     chance = random.Random("disk")
-    rounds = max(2, kills // 10)
+    rounds = max(1, kills // 10)
     for n in range(rounds):
         folder, other = disk / f"run{n}", disk / "other"
         subprocess.run(["mount", "-o", "remount,size=64k", disk], check=True)
@@ -93,7 +94,7 @@ def test_a_disk_runs_full(disk: Path, whole: Path, kills: int, record_property: 
 def test_no_room_for_a_search(tmp_path: Path) -> None:
     asked = ("front", "target-1", "--budget", "5000", "--no-figures", "--out")
     assert armwright(*asked, tmp_path / "whole").returncode == 0
-    for n in (100, 1000, 20_000, 60_000):
+    for n in (1000, 20_000):
         folder = tmp_path / f"run{n}"
         assert "File too large" in one_line(armwright(*asked, folder, preexec_fn=limit(n)))
         assert armwright(*asked, folder).returncode == 0
@@ -117,6 +118,7 @@ def test_no_room_for_an_answer(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("thorough")
 def test_no_room_for_the_kernels(tmp_path: Path, whole: Path) -> None:
     cache = {"WARP_CACHE_PATH": str(tmp_path / "cache")}
     words = one_line(study(tmp_path / "run", environment=cache, preexec_fn=limit(50_000)))

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 import subprocess
 import sys
 import zlib
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 import yaml
 
+from armwright.run_folder import is_held
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
 from tests.torture.lives import (
     Scenario,
@@ -207,7 +207,10 @@ def searching(folder: Path) -> list[str]:
     return ["front", "target-1", *settings, "--out", str(folder)]
 
 
-SEARCH = Scenario(searching, evaluations, is_front, is_same_front, program=("-c", OFTEN))
+SEARCH = Scenario(
+    searching, evaluations, is_front, is_same_front,
+    program=("-c", OFTEN), is_begun=lambda command: is_held(command.folder),
+)  # fmt: skip
 
 
 def test_a_search_for_the_whole_front(torture: Callable[[str, Scenario], Counter[str]]) -> None:
@@ -261,6 +264,20 @@ def test_an_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp_pat
     )  # fmt: skip
 
 
+@pytest.mark.usefixtures("thorough")
+def test_the_first_start_of_all(
+    torture: Callable[[str, Scenario], Counter[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernels are compiled by the first command; each folder here has a cache of its own, which is empty."""
+    short = study(3, "--proposer", "none", "--no-figures")
+
+    def arguments(folder: Path) -> list[str]:
+        monkeypatch.setenv("WARP_CACHE_PATH", str(folder.with_name(f"{folder.name}-cache")))
+        return list(short.arguments(folder))
+
+    torture("the first start, kernels compiled", Scenario(arguments, short.progress, is_beginning, is_same_run))
+
+
 ENDED = ("INT", "INT INT", "TERM")
 
 
@@ -271,17 +288,3 @@ def test_a_study_that_is_told_to_end(torture: Callable[[str, Scenario], Counter[
 
 def test_a_search_that_is_told_to_end(torture: Callable[[str, Scenario], Counter[str]]) -> None:
     torture("front, Ctrl-C, Ctrl-C twice, SIGTERM", replace(SEARCH, victims=ENDED))
-
-
-def test_the_first_start_of_all(
-    torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The kernels are compiled by the first command; each folder here has a cache of its own, which is empty."""
-    short = study(3, "--proposer", "none", "--no-figures")
-
-    def arguments(folder: Path) -> list[str]:
-        monkeypatch.setenv("WARP_CACHE_PATH", str(folder.with_name(f"{folder.name}-cache")))
-        return list(short.arguments(folder))
-
-    torture("the first start, kernels compiled", Scenario(arguments, short.progress, is_beginning, is_same_run))
-    assert os.environ["WARP_CACHE_PATH"]

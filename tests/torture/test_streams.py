@@ -30,7 +30,7 @@ def test_nobody_reads_the_output(tmp_path: Path, whole: Path) -> None:
     is_same_run(folder, whole)
 
 
-@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
 def test_streams_that_are_closed(tmp_path: Path, whole: Path, closed: str) -> None:
     """Nor does any file of the run take their numbers."""
     folder = tmp_path / "run"
@@ -45,7 +45,7 @@ def test_an_error_without_a_stderr(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (1, "")
 
 
-@pytest.mark.parametrize("terminal", [None, "dumb", "no-such-terminal", ""])
+@pytest.mark.parametrize("terminal", [None, "no-such-terminal"])
 def test_no_terminal(tmp_path: Path, whole: Path, terminal: str | None) -> None:
     folder = tmp_path / "run"
     done = study(folder, environment={"TERM": terminal, "COLUMNS": "0", "LINES": None}, start_new_session=True)
