@@ -13,7 +13,7 @@ test: .venv/.test  ## the whole suite
 	$(BIN)/python -m pytest
 
 torture: .venv/.test  ## faults by the hundred, among them 200 kills; a quarter of an hour on two cores (docs/reliability.md)
-	$(BIN)/python -m pytest tests/torture --kills 200
+	$(BIN)/python -m pytest tests/torture --kills 200 --dist load --maxschedchunk 1
 
 check: .venv/.test .venv/.check  ## format, lint, types, import staircase
 	$(BIN)/ruff format --check .

@@ -865,11 +865,13 @@ def _figures(folder: Path) -> list[Path]:
     from armwright.report.figures import write_figures
     from armwright.report.page import write_report
     from armwright.results import FIGURES, REPORT
+    from armwright.run_folder import RunFolder
 
-    there = sorted((folder / FIGURES).glob("*.png"))
-    if not (folder / REPORT).is_file():
-        write_report(folder)
-    return there or write_figures(folder)
+    with RunFolder(folder):
+        there = sorted((folder / FIGURES).glob("*.png"))
+        if not (folder / REPORT).is_file():
+            write_report(folder)
+        return there or write_figures(folder)
 
 
 def _problem(

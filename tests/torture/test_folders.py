@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import RunFolderError
+from armwright.files import replace_folder
 from armwright.problem import Problem
 from armwright.run_folder import RunFolder, is_held
 from armwright.study import Progress, optimize
@@ -199,6 +200,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory, whole: Path) -> Path:
     import warp
 
     assert whole.exists()
+    PROBLEM.evaluate(PROBLEM.space.sample(1, seed=0))  # from here on Warp knows where its cache is
     copied = tmp_path_factory.mktemp("kernels") / "cache"
     shutil.copytree(Path(warp.config.kernel_cache_dir).parent, copied)
     return copied
@@ -224,7 +226,8 @@ def test_figures_without_a_home(tmp_path: Path, cache: Path) -> None:
 
 
 def test_no_cache_for_the_kernels(tmp_path: Path) -> None:
-    words = one_line(study(tmp_path / "run", environment={**NO_HOME[1], "WARP_CACHE_PATH": None}))
+    nowhere = {"HOME": "/proc/self/nowhere", "XDG_CACHE_HOME": None, "WARP_CACHE_PATH": None}
+    words = one_line(study(tmp_path / "run", environment=nowhere))
     assert "the compiled kernels cannot be kept" in words
     assert "set WARP_CACHE_PATH to a folder that can be written" in words
 
@@ -236,3 +239,28 @@ def test_a_cache_that_is_full_and_read_only(tmp_path: Path, whole: Path, cache: 
         )
     assert (done.returncode, done.stderr) == (0, "")
     is_same_run(tmp_path / "run", whole)
+
+
+@pytest.mark.parametrize("with_part", [True, False])
+def test_a_folder_that_is_replaced_is_whole_or_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_part: bool
+) -> None:
+    """Whatever step the process dies at: here when it takes away the files of the old one, one by one."""
+    place, part = tmp_path / "figures", tmp_path / "figures.part"
+    for folder, content in ((place, "old"), (part, "new")):
+        folder.mkdir()
+        for n in range(3):
+            (folder / f"{n}.png").write_text(content)
+
+    def dies(folder: Path) -> None:
+        next(folder.iterdir()).unlink()
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "rmtree", dies)
+        with pytest.raises(KeyboardInterrupt):
+            replace_folder(place, part if with_part else None)
+    assert [file.read_text() for file in place.glob("*")] == (["new"] * 3 if with_part else [])
+    replace_folder(place)
+    assert not place.exists()
+    assert not place.with_name("figures.old").exists()
