@@ -4,13 +4,16 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test check gp docs docs-serve format bench package clean
+.PHONY: demo test torture check gp docs docs-serve format bench package clean
 
 demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
 	$(BIN)/armwright optimize target-1 --seed 0
 
 test: .venv/.test  ## the whole suite
 	$(BIN)/python -m pytest
+
+torture: .venv/.test  ## faults by the hundred, among them 200 kills; a quarter of an hour on two cores (docs/reliability.md)
+	$(BIN)/python -m pytest tests/torture --kills 200 --dist load --maxschedchunk 1
 
 check: .venv/.test .venv/.check  ## format, lint, types, import staircase
 	$(BIN)/ruff format --check .

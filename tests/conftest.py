@@ -11,6 +11,10 @@ from tests.chat_server import ChatServer
 from tests.postgres import PostgresServer, binaries
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--kills", type=int, default=10, help="how often runs are killed in tests/torture")
+
+
 @pytest.fixture(autouse=True)
 def _own_home(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """No test sees the user's models and keys, and none can call a real model."""

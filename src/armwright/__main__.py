@@ -1,5 +1,11 @@
-"""`python -m armwright`."""
+"""`python -m armwright`, and the command `armwright`."""
+
+import signal
+
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # while modules load, Ctrl-C ends the process without a traceback
 
 from armwright.cli import main
 
-main()
+if __name__ == "__main__":
+    main()

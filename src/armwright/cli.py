@@ -2,7 +2,9 @@
 
 import os
 import shlex
+import signal
 import sys
+from contextlib import suppress
 from dataclasses import asdict
 from io import TextIOWrapper
 from pathlib import Path
@@ -35,6 +37,10 @@ INTERRUPTED = 130  # the shell's word for Ctrl-C
 
 def main() -> NoReturn:
     """The entry point: what we raise on purpose becomes one line and an exit code."""
+    _open_what_is_closed()
+    for number in _ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell sets it for what runs in its background
+            signal.signal(number, _end)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without "³" still shows the rest
@@ -44,12 +50,39 @@ def main() -> NoReturn:
         print(f"armwright: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
     except OSError as fault:
-        print(f"armwright: {fault.strerror or fault}: {fault.filename or 'the output'}", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what stdout still holds cannot be written either
+        with suppress(OSError):  # stderr may be gone as well
+            print(f"armwright: {_words(fault)}", file=sys.stderr, flush=True)
+        for number in (1, 2):  # what they still hold cannot be written either
+            os.dup2(os.open(os.devnull, os.O_WRONLY), number)
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
     sys.exit(0)
+
+
+def _words(fault: OSError) -> str:
+    if isinstance(fault, BrokenPipeError):
+        return "nobody reads the output any more; the same command goes on with a run"
+    return f"{fault.strerror or fault}: {fault.filename or 'the output'}"
+
+
+def _open_what_is_closed() -> None:
+    """So that no file of a run takes the number of stdout or stderr, where others write what they have to say."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
+
+
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+
+
+def _end(*_: object) -> None:
+    """Ctrl-C, or SIGTERM, ends a command in order; a second one ends it at once, as kill -9 may at any moment."""
+    for number in _ENDING:
+        signal.signal(number, signal.SIG_DFL)
+    raise KeyboardInterrupt
 
 
 def _version(asked: bool) -> None:
@@ -896,11 +929,13 @@ def _figures(folder: Path) -> list[Path]:
     from armwright.report.figures import write_figures
     from armwright.report.page import write_report
     from armwright.results import FIGURES, REPORT
+    from armwright.run_folder import RunFolder
 
-    there = sorted((folder / FIGURES).glob("*.png"))
-    if not (folder / REPORT).is_file():
-        write_report(folder)
-    return there or write_figures(folder)
+    with RunFolder(folder):
+        there = sorted((folder / FIGURES).glob("*.png"))
+        if not (folder / REPORT).is_file():
+            write_report(folder)
+        return there or write_figures(folder)
 
 
 def _problem(

@@ -405,14 +405,21 @@ def _standing_words(arm: ComparedArm, front: int) -> str:
     return f"dominates {arm.dominates} of the {front} designs of the front, dominated by {arm.dominated_by}"
 
 
+class _Console(Console):
+    """Says where nobody reads any more, as any stream does; rich would end the process without a word."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError
+
+
 def stdout_console() -> Console:
     """Words on stdout, as plain text where stdout is no terminal."""
-    return Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
+    return _Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def stderr_console() -> Console:
     """Words on stderr, where stdout is for a program."""
-    return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    return _Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def _obstacle_note(problem: Problem) -> str:

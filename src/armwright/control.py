@@ -67,14 +67,14 @@ class Status(BaseModel, frozen=True, extra="forbid", strict=True):
 
     pid: of its process, which may have been killed since.
     number: the trial that it came to when it began to do so; of a finished study, how many trials there are.
-    since: when it began to do so [s since 1970].
+    since: when it began to do so [s since 1970]; by a wrong clock before that.
     fault: why the last question, or the session, failed; empty where it did not.
     """
 
     pid: int = Field(gt=0, lt=2**31)
     doing: Doing
     number: int = Field(ge=0, lt=2**31)
-    since: float = Field(ge=0.0, allow_inf_nan=False)
+    since: float = Field(allow_inf_nan=False)
     fault: str = ""
 
 

@@ -1,6 +1,7 @@
 """Files replaced in one step, and text that they can hold."""
 
 import os
+import shutil
 from pathlib import Path
 
 
@@ -9,6 +10,19 @@ def replace_file(target: Path, content: bytes) -> None:
     part = target.with_name(target.name + ".part")
     part.write_bytes(content)
     os.replace(part, target)
+
+
+def replace_folder(target: Path, part: Path | None = None) -> None:
+    """Puts the folder `part` in the place of another, or nothing; a crash leaves the old one, none or the new one."""
+    old = target.with_name(target.name + ".old")
+    if old.exists():
+        shutil.rmtree(old)
+    if target.exists():
+        target.rename(old)  # in one step, while its files go one by one
+    if part is not None:
+        part.rename(target)
+    if old.exists():
+        shutil.rmtree(old)
 
 
 def writable(text: str) -> str:

@@ -13,7 +13,6 @@ knows of the other. Needs the extra `live`.
 import asyncio
 import ipaddress
 import json
-import os
 import secrets
 import socket
 import subprocess
@@ -45,7 +44,7 @@ from armwright.llm.transcript import TRANSCRIPTS, used_hints
 from armwright.report.content import RunContent, design_files
 from armwright.report.page import render_page
 from armwright.results import SUMMARY
-from armwright.run_folder import CONFIG, TRIALS, read_config
+from armwright.run_folder import CONFIG, TRIALS, is_held, read_config
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -104,7 +103,7 @@ class LiveRun:
         """Reads what has changed."""
         with self._lock:
             seen = [_stamp(self.folder / name) for name in WATCHED]
-            if seen == self._seen and not (self.status["doing"] in RUNNING and not self._is_alive()):
+            if seen == self._seen and not (self.status["doing"] in RUNNING and not is_held(self.folder)):
                 return
             self._seen = seen
             try:
@@ -138,10 +137,6 @@ class LiveRun:
         elif self._content.refresh():
             self._run += 1
 
-    def _is_alive(self) -> bool:
-        status = read_status(self.folder)
-        return status is not None and _lives(status.pid)
-
     def _status(self) -> dict[str, Any]:
         """What the bar of the page says."""
         content, said, asked = self._content, read_status(self.folder), read_control(self.folder)
@@ -150,7 +145,7 @@ class LiveRun:
         planned = None if study is None else study.n_trials
         n = 0 if history is None else len(history)
         doing = "unknown" if said is None else said.doing
-        if doing in RUNNING and not self._is_alive():
+        if doing in RUNNING and not is_held(self.folder):
             doing = "gone"
         if said is None and content is not None and content.summary is not None:
             doing = "finished"
@@ -195,18 +190,6 @@ def _stamp(path: Path) -> tuple[int, ...] | None:
     except OSError:
         return None
     return there.st_mtime_ns, there.st_ctime_ns, there.st_size, there.st_ino
-
-
-def _lives(pid: int) -> bool:
-    if sys.platform == "win32":  # there is no asking without ending it
-        return True
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass
-    return True
 
 
 def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages: "Pages") -> "Starlette":

@@ -26,6 +26,7 @@ from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.feasibility import violation
+from armwright.files import replace_folder
 from armwright.history import FinishedTrial, FrontMember, History
 from armwright.misses import why_missed
 from armwright.pareto import hypervolume
@@ -88,8 +89,7 @@ def discard_results(path: Path) -> None:
     try:
         (path / SUMMARY).unlink(missing_ok=True)
         (path / REPORT).unlink(missing_ok=True)
-        if (path / FIGURES).exists():
-            shutil.rmtree(path / FIGURES)
+        replace_folder(path / FIGURES)
         discard_study(path)
     except OSError as fault:
         raise RunFolderError(f"cannot remove the old results in {path}: {fault.strerror or fault}") from fault

@@ -15,6 +15,8 @@ import errno
 import json
 import os
 import platform
+import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -40,12 +42,14 @@ from armwright.problem import Problem
 from armwright.space import DesignSpace
 from armwright.task import Task
 
+LOCK = ".lock"  # held by whoever writes; the system lets go of a dead process's, and the file stays
+LOCK_SECONDS = 2.0  # that a command waits for it: the workers of a killed experiment take a moment to end
 CONFIG = "config.yaml"
 TRIALS = "trials.jsonl"
 PROPOSALS = "proposals"
 SEARCH = "search.npz"
 BEFORE_TRIALS = {
-    ".lock", CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
+    LOCK, CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
 }  # fmt: skip
 # Of a task; its words may change.
 IDENTITY = (
@@ -197,19 +201,21 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._lock = FileLock(path / ".lock")
+        self._lock = FileLock(path / LOCK)
+        self._place: os.stat_result | None = None
         self._trials: BinaryIO | None = None
 
     def __enter__(self) -> Self:
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            self._lock.acquire(timeout=0)
+            self._lock.acquire(timeout=LOCK_SECONDS)
+            self._place = self.path.stat()
         except Timeout as fault:
             raise RunFolderError(
                 f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
             ) from fault
         except OSError as fault:
-            raise _write_error(self.path, fault) from fault
+            raise _write_error(Path(fault.filename or self.path), fault) from fault
         return self
 
     def __exit__(
@@ -295,6 +301,7 @@ class RunFolder:
     def append(self, trial: FinishedTrial) -> None:
         """Writes one finished trial: a single write, so that a crash leaves a whole line or a cut last one."""
         assert self._trials is not None, "open_trials comes first"
+        self._check_here()
         line = _trial_line(trial)
         try:
             if os.fstat(self._trials.fileno()).st_nlink == 0:
@@ -304,6 +311,20 @@ class RunFolder:
                 raise OSError(errno.ENOSPC, "No space left on device")
         except OSError as fault:
             raise _write_error(self.path / TRIALS, fault) from fault
+
+    def _check_here(self) -> None:
+        """RunFolderError where the folder is another than the one that is held: nothing is written beside its run."""
+        try:
+            is_here = self._place is not None and os.path.samestat(self._place, self.path.stat())
+        except FileNotFoundError:
+            is_here = False
+        except OSError as fault:
+            raise _write_error(self.path, fault) from fault
+        if not is_here:
+            raise RunFolderError(
+                f"{self.path} was moved or deleted while the run went on; move it back, and the same command goes on "
+                "from its last finished trial"
+            )
 
     def replace_trials(self, trials: Iterable[FinishedTrial]) -> None:
         """Writes all trials anew."""
@@ -316,11 +337,31 @@ class RunFolder:
     def write_bytes(self, name: str, content: bytes) -> None:
         """The same for a file that is no text."""
         target = self.path / name
+        self._check_here()
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             replace_file(target, content)
         except OSError as fault:
             raise _write_error(target, fault) from fault
+
+
+def is_held(folder: Path) -> bool:
+    """Whether a process holds a run folder for writing, here or, where the file system knows, on another machine."""
+    if sys.platform == "win32":  # no looking without holding it oneself
+        return True
+    import fcntl
+
+    try:
+        lock = os.open(folder / LOCK, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(lock)  # and with it what was taken
+    return False
 
 
 class _ConfigDumper(yaml.SafeDumper):
@@ -343,8 +384,19 @@ def read_config(path: Path) -> RunConfig:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as fault:
-        raise RunFolderError(f"{path} is not a run folder: cannot read {CONFIG} ({fault})") from fault
-    return parse_document(text, RunConfig, RunFolderError, str(file))
+        raise RunFolderError(
+            f"{path} is not a run folder: cannot read {CONFIG} ({fault}); restore it, or give another folder"
+        ) from fault
+    try:
+        return parse_document(text, RunConfig, RunFolderError, str(file))
+    except RunFolderError as fault:
+        raise RunFolderError(f"{fault}{_writer(text)}; restore the file, or give another --out DIR") from fault
+
+
+def _writer(config: str) -> str:
+    """Which armwright wrote a config.yaml that cannot be read, where it was another."""
+    said, ours = re.search(r"^  armwright: '?([^'\s]+)", config, re.MULTILINE), versions().get("armwright")
+    return f" (written by armwright {said[1]}; this is {ours})" if said and said[1] != ours else ""
 
 
 def read_run(path: str | Path) -> tuple[RunConfig, History]:

@@ -8,6 +8,7 @@ import yaml
 from armwright.comparison import Comparison, read_run_record
 from armwright.exceptions import FailureError, RunFolderError
 from armwright.experiment.plan import Cell, ExperimentPlan
+from armwright.files import replace_file
 from armwright.results import read_summary
 
 PLAN = "experiment.yaml"  # what was run, as it was
@@ -37,6 +38,6 @@ def write_plan(plan: ExperimentPlan, out: Path) -> None:
     text = yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True), sort_keys=False, allow_unicode=True)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        (out / PLAN).write_text(text, encoding="utf-8")
+        replace_file(out / PLAN, text.encode())
     except OSError as fault:
         raise RunFolderError(f"cannot write {out / PLAN}: {fault.strerror or fault}") from fault

@@ -100,8 +100,9 @@ def _said_where_it_is_kept() -> Generator[None]:
     try:
         yield
     except OSError as fault:
+        where = "" if fault.filename is None else f": {fault.filename}"
         raise FailureError(
-            f"the compiled kernels cannot be kept: {fault.strerror or fault}: {fault.filename}; "
+            f"the compiled kernels cannot be kept: {fault.strerror or fault}{where}; "
             "set WARP_CACHE_PATH to a folder that can be written"
         ) from fault
 

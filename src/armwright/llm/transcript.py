@@ -1,10 +1,12 @@
 """Every call to a language model, one JSON line each: what was asked, what came back, what it cost."""
 
+import errno
 import json
 import os
 import threading
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -72,10 +74,8 @@ class Transcript:
             if self._path is None:
                 return
             try:
-                with open(self._path, "ab") as file:
-                    file.write((json.dumps(_record(call)) + "\n").encode())
-                    file.flush()
-                    os.fsync(file.fileno())
+                with open(self._path, "ab", buffering=0) as file:
+                    _append(file, (json.dumps(_record(call)) + "\n").encode())
             except OSError as fault:
                 raise RunFolderError(f"cannot write {self._path}: {fault.strerror or fault}") from fault
 
@@ -98,6 +98,18 @@ def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
     """The hints that the question for a proposal went with; where it was asked again, the last time."""
     asked = (call for call in reversed(calls) if call.proposal == proposal and call.step in FIRST_STEPS)
     return next((call.hints for call in asked), ())
+
+
+def _append(file: FileIO, line: bytes) -> None:
+    """Adds a line to a file, or nothing: a part of one would spoil the next, which another thread may write."""
+    before = os.fstat(file.fileno()).st_size
+    try:
+        if file.write(line) != len(line):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        os.fsync(file.fileno())
+    except OSError:
+        file.truncate(before)
+        raise
 
 
 def _record(call: Call) -> dict[str, Any]:

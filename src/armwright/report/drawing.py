@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from armwright.exceptions import RunFolderError
+from armwright.files import replace_folder
 from armwright.report.style import RC
 
 
@@ -35,10 +36,7 @@ def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
             shutil.rmtree(part)
         part.mkdir(parents=True)
         names = [_save(figure, part / f"{name}.png") for name, figure in drawn]
-        # In one step, so that a folder with this name always holds all figures of one state of the run.
-        if place.exists():
-            shutil.rmtree(place)
-        part.rename(place)
+        replace_folder(place, part)  # which so always holds all figures of one state of the run
     return [place / name for name in names]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from armwright.comparison import Comparison, Row, Run
 from armwright.exceptions import RunFolderError
+from armwright.files import replace_file
 from armwright.results import as_csv
 from armwright.statistics import Interval, least_p
 
@@ -45,7 +46,7 @@ def write_tables(
         path = place / name
         try:
             place.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
+            replace_file(path, text.encode())
         except OSError as fault:
             raise RunFolderError(f"cannot write {path}: {fault.strerror or fault}; the runs are safe") from fault
         written.append(path)

@@ -1,0 +1,266 @@
+"""Folders that are held, read-only, moved or gone; no home; no cache."""
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armwright.exceptions import RunFolderError
+from armwright.files import replace_folder
+from armwright.problem import Problem
+from armwright.run_folder import RunFolder, is_held
+from armwright.study import Progress, optimize
+from armwright.task import load_task
+from tests.torture.lives import is_beginning, is_same_run, n_lines, trials
+from tests.torture.short import N_TRIALS, armwright, as_a_plain_user, command, one_line, run, study
+
+SETTINGS: dict[str, Any] = {"proposer": "rules", "n_init": 5, "n_step": 4, "n_total": 20, "seed": 3}
+PROBLEM = Problem(load_task("target-1"))
+
+
+def at(number: int, act: Callable[[], object]) -> Callable[[Progress], None]:
+    """Acts when this trial is finished."""
+
+    def watch(progress: Progress) -> None:
+        if (progress.doing, progress.number) == ("finished", number):
+            act()
+
+    return watch
+
+
+def test_a_second_process_is_refused_and_the_first_is_as_if_alone(tmp_path: Path, whole: Path) -> None:
+    folder, refusals = tmp_path / "run", []
+
+    def second() -> None:
+        assert is_held(folder)
+        refusals.append(one_line(study(folder)))
+        refusals.append(one_line(armwright("front", "target-1", "--out", folder)))
+
+    optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, second))
+    assert len(refusals) == 2
+    assert all("is in use by another armwright process; wait for it, or give another --out DIR" in r for r in refusals)
+    assert not is_held(folder)
+    assert trials(folder) == trials(whole)
+
+
+def test_of_two_that_begin_at_once_one_has_the_folder(tmp_path: Path, whole: Path) -> None:
+    folder = tmp_path / "run"
+    both = [subprocess.Popen(command(folder, "--no-figures"), stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in both:
+        _, said = process.communicate()
+        assert process.returncode == 0 or "is in use by another armwright process" in said
+        assert "Traceback" not in said
+    is_same_run(folder, whole)
+
+
+def test_the_lock_of_a_killed_process_is_free(tmp_path: Path, whole: Path) -> None:
+    folder = tmp_path / "run"
+    process = subprocess.Popen(command(folder, "--no-figures"), stdout=subprocess.DEVNULL)
+    while n_lines(folder / "trials.jsonl") < 3:
+        time.sleep(0.002)
+    process.send_signal(signal.SIGSTOP)
+    assert is_held(folder)
+    process.kill()
+    process.wait()
+    assert (folder / ".lock").exists()
+    assert not is_held(folder)
+    assert study(folder).returncode == 0
+    is_same_run(folder, whole)
+
+
+def test_looking_whether_a_folder_is_held_keeps_nobody_out(tmp_path: Path) -> None:
+    """A process that looks all the time, while others come and go."""
+    looking = (
+        "import sys; from pathlib import Path; from armwright.run_folder import is_held\n"
+        "while True: is_held(Path(sys.argv[1]))"
+    )
+    looks = [subprocess.Popen([sys.executable, "-c", looking, str(tmp_path)]) for _ in range(2)]
+    try:
+        for _ in range(100):
+            with RunFolder(tmp_path):
+                pass
+    finally:
+        for process in looks:
+            process.kill()
+            process.wait()
+
+
+# Gone while a run goes on.
+
+
+def test_a_folder_that_is_deleted_is_not_made_again_without_its_trials(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with pytest.raises(RunFolderError, match="was moved or deleted while the run went on; move it back"):
+        optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, lambda: shutil.rmtree(folder)))
+    assert not folder.exists()
+
+
+def test_a_folder_that_is_deleted_after_the_last_trial_is_not_made_again(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with pytest.raises(RunFolderError, match="was moved or deleted"):
+        optimize(PROBLEM, **SETTINGS, out=folder, watch=at(N_TRIALS - 1, lambda: shutil.rmtree(folder)))
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("number", [9, N_TRIALS - 1])
+def test_a_folder_that_is_moved_goes_on_where_it_is_now(tmp_path: Path, whole: Path, number: int) -> None:
+    folder, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
+    with pytest.raises(RunFolderError, match="was moved or deleted"):
+        optimize(PROBLEM, **SETTINGS, out=folder, watch=at(number, lambda: folder.rename(elsewhere)))
+    assert not folder.exists()
+    is_beginning(elsewhere, whole)
+    assert study(elsewhere).returncode == 0
+    is_same_run(elsewhere, whole)
+
+
+def test_another_folder_in_its_place_is_left_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with pytest.raises(RunFolderError, match="was moved or deleted"):
+        optimize(
+            PROBLEM, **SETTINGS, out=folder,
+            watch=at(9, lambda: (folder.rename(tmp_path / "elsewhere"), folder.mkdir())),
+        )  # fmt: skip
+    assert list(folder.iterdir()) == [] or {path.name for path in folder.iterdir()} == {"status.json"}
+
+
+def test_trials_that_are_deleted_end_the_run(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with pytest.raises(RunFolderError, match="the file was deleted while the run went on"):
+        optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, lambda: (folder / "trials.jsonl").unlink()))
+
+
+# Folders that cannot be written.
+
+
+@contextmanager
+def read_only(folder: Path) -> Iterator[None]:
+    modes = {path: path.stat().st_mode for path in (folder, *folder.rglob("*"))}
+    for path, mode in modes.items():
+        path.chmod(mode & ~0o222)
+    try:
+        yield
+    finally:
+        for path, mode in modes.items():
+            path.chmod(mode)
+
+
+def test_a_read_only_folder_is_read_and_not_written(tmp_path: Path, whole: Path) -> None:
+    run_, empty = tmp_path / "run", tmp_path / "empty"
+    shutil.copytree(whole, run_)
+    empty.mkdir()
+    with read_only(run_), read_only(empty):
+        for refused in (run_, empty, empty / "run"):
+            words = one_line(run(as_a_plain_user(command(refused, "--no-figures"))))
+            assert "cannot write" in words
+            assert "Permission denied" in words
+        for reader in (["runs", tmp_path], ["pick", run_], ["export", run_]):
+            done = run(as_a_plain_user([sys.executable, "-m", "armwright", *map(str, reader)]))
+            assert (done.returncode, done.stderr) == (0, "")
+        report = run(as_a_plain_user([sys.executable, "-m", "armwright", "report", str(run_)]))
+        assert "Permission denied; the trials are safe" in one_line(report)
+        assert not is_held(run_)
+    is_same_run(run_, whole)
+
+
+def test_a_folder_that_becomes_read_only_goes_on_when_it_is_not(tmp_path: Path, whole: Path) -> None:
+    folder = tmp_path / "run"
+    process = subprocess.Popen(
+        as_a_plain_user(command(folder, "--no-figures")), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    while n_lines(folder / "trials.jsonl") < 3:
+        time.sleep(0.002)
+    folder.chmod(0o555)
+    _, said = process.communicate()
+    folder.chmod(0o755)
+    assert process.returncode == 1
+    assert said.startswith(f"armwright: cannot write {folder}/")
+    assert "Permission denied. What was written before is safe" in said
+    assert said.count("\n") == 1
+    is_beginning(folder, whole)
+    assert study(folder).returncode == 0
+    is_same_run(folder, whole)
+
+
+NO_HOME: list[dict[str, str | None]] = [
+    {"HOME": None, "XDG_CONFIG_HOME": None, "XDG_CACHE_HOME": None},
+    {"HOME": "/proc/self/nowhere", "XDG_CONFIG_HOME": "/dev/null", "XDG_CACHE_HOME": "relative", "TMPDIR": "/proc"},
+]
+
+
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory: pytest.TempPathFactory, whole: Path) -> Path:
+    """A kernels' cache that has what the short study needs: a copy of the one that it was kept in."""
+    import warp
+
+    assert whole.exists()
+    PROBLEM.evaluate(PROBLEM.space.sample(1, seed=0))  # from here on Warp knows where its cache is
+    copied = tmp_path_factory.mktemp("kernels") / "cache"
+    shutil.copytree(Path(warp.config.kernel_cache_dir).parent, copied)
+    return copied
+
+
+@pytest.mark.parametrize("environment", NO_HOME, ids=["unset", "no folders at all"])
+def test_no_home(tmp_path: Path, whole: Path, cache: Path, environment: dict[str, str | None]) -> None:
+    folder = tmp_path / "run"
+    done = study(folder, environment={**environment, "WARP_CACHE_PATH": str(cache)}, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    is_same_run(folder, whole)
+
+
+@pytest.mark.slow
+def test_figures_without_a_home(tmp_path: Path, cache: Path) -> None:
+    """matplotlib makes do with a temporary folder, and says so."""
+    done = study(
+        tmp_path / "run", "--figures", environment={"HOME": "/proc/self/nowhere", "WARP_CACHE_PATH": str(cache)}
+    )
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    assert list((tmp_path / "run" / "figures").glob("*.png"))
+
+
+def test_no_cache_for_the_kernels(tmp_path: Path) -> None:
+    nowhere = {"HOME": "/proc/self/nowhere", "XDG_CACHE_HOME": None, "WARP_CACHE_PATH": None}
+    words = one_line(study(tmp_path / "run", environment=nowhere))
+    assert "the compiled kernels cannot be kept" in words
+    assert "set WARP_CACHE_PATH to a folder that can be written" in words
+
+
+def test_a_cache_that_is_full_and_read_only(tmp_path: Path, whole: Path, cache: Path) -> None:
+    with read_only(cache):
+        done = run(
+            as_a_plain_user(command(tmp_path / "run", "--no-figures")), environment={"WARP_CACHE_PATH": str(cache)}
+        )
+    assert (done.returncode, done.stderr) == (0, "")
+    is_same_run(tmp_path / "run", whole)
+
+
+@pytest.mark.parametrize("with_part", [True, False])
+def test_a_folder_that_is_replaced_is_whole_or_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_part: bool
+) -> None:
+    """Whatever step the process dies at: here when it takes away the files of the old one, one by one."""
+    place, part = tmp_path / "figures", tmp_path / "figures.part"
+    for folder, content in ((place, "old"), (part, "new")):
+        folder.mkdir()
+        for n in range(3):
+            (folder / f"{n}.png").write_text(content)
+
+    def dies(folder: Path) -> None:
+        next(folder.iterdir()).unlink()
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "rmtree", dies)
+        with pytest.raises(KeyboardInterrupt):
+            replace_folder(place, part if with_part else None)
+    assert [file.read_text() for file in place.glob("*")] == (["new"] * 3 if with_part else [])
+    replace_folder(place)
+    assert not place.exists()
+    assert not place.with_name("figures.old").exists()

@@ -1,0 +1,136 @@
+"""No room: for a file to grow, and on the whole disk. What was finished is kept, one line says why it ended."""
+
+import random
+import resource
+import subprocess
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from armwright.exceptions import RunFolderError
+from armwright.llm.transcript import Call, Transcript
+from tests.torture.lives import is_beginning, is_same_run
+from tests.torture.short import armwright, command, one_line, study
+
+Tell = Callable[[str, object], None]
+
+
+def limit(n: int) -> Callable[[], None]:
+    """For a process to come: no file of its may have more bytes."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (n, n))
+
+
+def largest(folder: Path) -> int:
+    return max(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def test_a_file_may_not_grow(tmp_path: Path, whole: Path, kills: int, record_property: Tell) -> None:
+    """At a random size, between nothing and more than is needed."""
+    chance = random.Random("limits")
+    ended: Counter[int] = Counter()
+    rounds = max(3, kills // 5)
+    for n in range(rounds):
+        folder = tmp_path / f"run{n}"
+        done = study(folder, preexec_fn=limit(chance.randint(0, largest(whole) * 11 // 10)))
+        ended[done.returncode] += 1
+        if done.returncode:
+            assert any(words in one_line(done) for words in ("File too large", "No space left on device"))
+            is_beginning(folder, whole)
+            again = study(folder)
+            assert again.returncode == 0, again.stderr
+        is_same_run(folder, whole)
+    record_property("no file may grow", f"{rounds} sizes, {ended[1]} of them too small; each resumed")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("thorough")
+def test_the_page_and_the_figures_find_no_room(tmp_path: Path, record_property: Tell, kills: int) -> None:
+    whole = tmp_path / "whole"
+    study(whole, "--figures")
+    chance = random.Random("figures")
+    rounds = max(1, kills // 40)
+    for n in range(rounds):
+        folder = tmp_path / f"run{n}"
+        done = study(folder, "--figures", preexec_fn=limit(chance.randint(30_000, largest(whole) - 1)))
+        assert "File too large; the trials are safe" in one_line(done)
+        assert study(folder, "--figures").returncode == 0
+        is_same_run(folder, whole)
+    record_property("no room for page and figures", f"{rounds} sizes; each made again")
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 64 kB."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place], capture_output=True, text=True)
+    if made.returncode:
+        pytest.skip(f"no disk may be mounted here: {made.stderr.strip()}")
+    yield place
+    subprocess.run(["umount", place], check=True)
+
+
+def test_a_disk_runs_full(disk: Path, whole: Path, kills: int, record_property: Tell) -> None:
+    """A real disk, full after a random number of pages; then it grows."""
+    chance = random.Random("disk")
+    rounds = max(1, kills // 10)
+    for n in range(rounds):
+        folder, other = disk / f"run{n}", disk / "other"
+        subprocess.run(["mount", "-o", "remount,size=64k", disk], check=True)
+        other.write_bytes(bytes(chance.randint(8, 15) * 4096))  # a disk counts in pages
+        assert "No space left on device" in one_line(study(folder))
+        if folder.exists():
+            is_beginning(folder, whole)
+        subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
+        again = study(folder)
+        assert again.returncode == 0, again.stderr
+        is_same_run(folder, whole)
+        subprocess.run(["rm", "-r", folder, other], check=True)
+    record_property("a full disk", f"{rounds} times; each resumed")
+
+
+def test_no_room_for_a_search(tmp_path: Path) -> None:
+    asked = ("front", "target-1", "--budget", "5000", "--no-figures", "--out")
+    assert armwright(*asked, tmp_path / "whole").returncode == 0
+    for n in (1000, 20_000):
+        folder = tmp_path / f"run{n}"
+        assert "File too large" in one_line(armwright(*asked, folder, preexec_fn=limit(n)))
+        assert armwright(*asked, folder).returncode == 0
+        assert (folder / "trials.jsonl").read_bytes() == (tmp_path / "whole" / "trials.jsonl").read_bytes()
+
+
+def test_no_room_for_an_answer(tmp_path: Path) -> None:
+    """Half a line is taken back: what another thread adds when there is room again stands on a line of its own."""
+    calls = [Call(f"p{n}", "answer", 0, "model", "m", "?", "x" * 1000, 1, 1, 1, None, 1.0) for n in range(3)]
+    transcript = Transcript(tmp_path / "transcripts.jsonl")
+    transcript.add(calls[0])
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
+    try:
+        with pytest.raises(RunFolderError, match=r"cannot write .*transcripts.jsonl"):
+            transcript.add(calls[1])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    transcript.add(calls[2])
+    assert Transcript(tmp_path / "transcripts.jsonl").calls == (calls[0], calls[2])
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("thorough")
+def test_no_room_for_the_kernels(tmp_path: Path, whole: Path) -> None:
+    cache = {"WARP_CACHE_PATH": str(tmp_path / "cache")}
+    words = one_line(study(tmp_path / "run", environment=cache, preexec_fn=limit(50_000)))
+    assert "the compiled kernels cannot be kept: File too large" in words
+    again = study(tmp_path / "run", environment=cache)
+    assert again.returncode == 0, again.stderr
+    is_same_run(tmp_path / "run", whole)
+
+
+def test_nowhere_to_say_it(tmp_path: Path, whole: Path) -> None:
+    """stdout and stderr on a full disk."""
+    with open("/dev/full", "w") as full:
+        code = subprocess.run(command(tmp_path / "run", "--no-figures"), stdout=full, stderr=full).returncode
+    assert code == 1
+    is_beginning(tmp_path / "run", whole)
