@@ -302,16 +302,10 @@ def worker(
     ] = None,
 ) -> None:
     """Evaluate designs of RUN until its search is over. Start as many as you like, on any machine."""
-    import signal
-
     from armwright.measuring import load_evaluator
     from armwright.workers.plan import STORAGE_VARIABLE
     from armwright.workers.worker import work
 
-    def stop(*_: object) -> NoReturn:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, stop)  # as Ctrl-C: what it evaluates goes to another worker at once
     measured = None if evaluator is None else load_evaluator(evaluator)
     url = storage or os.environ.get(STORAGE_VARIABLE)
     done = work(run, measured, url, lambda words: print(words, flush=True))
