@@ -18,7 +18,7 @@
         └── MissingExtraError   an optional dependency that is not installed
 
 A message is one line in the user's words: it names the value with its unit, what is allowed, and the
-way out.
+way out. What it repeats of files and answers cannot break the line, or speak to a terminal.
 """
 
 from collections.abc import Iterable
@@ -26,10 +26,16 @@ from difflib import get_close_matches
 from pathlib import Path
 
 
+LONGEST_MESSAGE = 3000  # characters
+
+
 class ArmwrightError(Exception):
     """The base of all errors that armwright raises on purpose."""
 
     exit_code = 1
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_line(message))
 
 
 class UsageError(ArmwrightError):
@@ -128,6 +134,15 @@ class StoppedError(ArmwrightError):
 
 class MissingExtraError(FailureError):
     """An optional dependency that is not installed."""
+
+
+def _line(text: str) -> str:
+    """A text on one line: characters that are not seen as their escapes, the middle of a long one left out."""
+    if len(text) > LONGEST_MESSAGE:
+        text = f"{text[: LONGEST_MESSAGE // 2]} […] {text[-LONGEST_MESSAGE // 3 :]}"
+    if text.isprintable():
+        return text
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

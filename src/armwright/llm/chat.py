@@ -23,6 +23,7 @@ from armwright.llm.speaker import CHECK, MOST_REQUESTS, CallError, Interrupted, 
 
 try:
     from genai_prices import Usage, calc_price
+    from httpx import InvalidURL
     from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
@@ -313,11 +314,14 @@ def _own_server(at: _Place) -> Model:
     place = base_url.partition("://")[2]
     if "@" in place.partition("/")[0] or "?" in place or "#" in place:
         raise SettingsError(f"--base-url holds more than an address; put the server's key into {SERVER_KEY}")
-    client = AsyncOpenAI(
-        base_url=base_url,
-        api_key=os.environ.get(at.key) or "no-key",
-        default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
-    )
+    try:
+        client = AsyncOpenAI(
+            base_url=base_url,
+            api_key=os.environ.get(at.key) or "no-key",
+            default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
+        )
+    except InvalidURL as fault:
+        raise SettingsError(f"--base-url {base_url} is no address: {fault}") from fault
     return OpenAIChatModel(at.name, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
 
 

@@ -62,7 +62,9 @@ class RunContent:
         is_other = self._reader.read_on() or len(self._reader.trials) < self._n
         if is_other:
             self._chunks, self._n = [], 0
-        self.summary = read_summary(self.folder)
+        summary = read_summary(self.folder)
+        # A summary of another kind of run is none of this one's.
+        self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
         self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
         self.history = History(
             self.config.problem, self._reader.trials, self.config.method.n_init, self.config.reference_point
