@@ -25,7 +25,6 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
-
 LONGEST_MESSAGE = 3000  # characters
 
 
@@ -138,11 +137,16 @@ class MissingExtraError(FailureError):
 
 def _line(text: str) -> str:
     """A text on one line: characters that are not seen as their escapes, the middle of a long one left out."""
-    if len(text) > LONGEST_MESSAGE:
-        text = f"{text[: LONGEST_MESSAGE // 2]} […] {text[-LONGEST_MESSAGE // 3 :]}"
+    text = _cut(text)
     if text.isprintable():
         return text
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+    return _cut("".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text))
+
+
+def _cut(text: str) -> str:
+    if len(text) <= LONGEST_MESSAGE:
+        return text
+    return f"{text[: LONGEST_MESSAGE // 2]} […] {text[-LONGEST_MESSAGE // 3 :]}"
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

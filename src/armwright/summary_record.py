@@ -1,13 +1,13 @@
 """What a summary.json has to hold, so that what reads it need not doubt it; more may stand there."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, Field, TypeAdapter
 
 Count = Annotated[int, Field(ge=0)]
 
 
-class _Record(BaseModel, frozen=True, extra="allow", strict=True, allow_inf_nan=False):
+class _Record(BaseModel, extra="allow", strict=True, allow_inf_nan=False):
     """Kept as it was read."""
 
 
@@ -140,4 +140,4 @@ def checked_summary(content: Any) -> dict[str, Any]:
     """The content of a summary.json, as it is; ValueError where it is none."""
     is_search = isinstance(content, dict) and "search" in content
     (_OF_SEARCH if is_search else _OF_STUDY).validate_python(content)
-    return content
+    return cast("dict[str, Any]", content)

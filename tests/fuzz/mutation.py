@@ -17,23 +17,29 @@ NUMBERS: tuple[Any, ...] = (
     1.0, 1000.0, 1001.0, 1e16, 1e38, 1e39, 1e308, -1e308, float("inf"), float("-inf"), float("nan"), True, False, None,
 )  # fmt: skip
 TEXTS = (
-    "", " ", "\n", "a\nb", "\0", "\x1b[2J", "\u202e", "\ufeff", "é\u0301", "\U0001f9be", "😀" * 50, "x" * 70, "x" * 5000,
+    "", " ", "\n", "a\nb", "\0", "\x1b[2J", "\u202e", "\ufeff", "é\u0301", "\U0001f9be", "😀" * 50, "x" * 70,
+    "x" * 5000,
     "\ud800", "\udc80", "../../x", "/etc/passwd", "C:\\x", "CON", "nul.yaml", "..", ".", "~", "a/b", "x\ny.yaml",
     "<script>alert(1)</script>", "</script>", "&lt;", '"', "'", "`id`", "$(id)", "; rm -rf x", "%s%n", "{0.__class__}",
     "{{ 7 * 7 }}", "{% for i in range(10**9) %}{% endfor %}", "${1+1}", "$(eval 1)", "__import__('os').system('id')",
-    "nan", "inf", "-inf", "1e309", "1e999999", "0x10", "1_0", "1:30", "1:1:1.0", "12e", "１２", "true", "no", "null", "~",
-    "2001-01-01", "2001-02-30", "=", "<<", "!!python/object/apply:os.system [id]", "&a", "*a", "mass <= 3", "mass<=1e999",
+    "nan", "inf", "-inf", "1e309", "1e999999", "0x10", "1_0", "1:30", "1:1:1.0", "12e", "１２", "true", "no", "null",
+    "~",
+    "2001-01-01", "2001-02-30", "=", "<<", "!!python/object/apply:os.system [id]", "&a", "*a", "mass <= 3",
+    "mass<=1e999",
     "replay:x", "manual:..", "http://127.0.0.1:1/", "openai-chat:x", "llm-0001", "llm-", "-", "--", "-1", "R", "YPRP",
 )  # fmt: skip
 # Spliced into the bytes of a document.
 TOKENS = (
-    b"\0", b"\xff", b"\xfe\xff", b"\xed\xa0\x80", b"\xef\xbb\xbf", b"\r", b"\n", b"\t", b"\x1b", b"{", b"}", b"[", b"]",
+    b"\0", b"\xff", b"\xfe\xff", b"\xed\xa0\x80", b"\xef\xbb\xbf", b"\r", b"\n", b"\t", b"\x1b", b"{", b"}", b"[",
+    b"]",
     b":", b",", b"-", b"- ", b"? ", b"&a ", b"*a", b"!!int ", b"!!float ", b"!!bool ", b"!!timestamp ", b"!!binary ",
-    b"!!set ", b"!!omap ", b"!!pairs ", b"!!null ", b"!!str ", b"!!python/tuple ", b"! ", b"!x ", b"%YAML 1.1\n", b"%TAG ! x\n",
+    b"!!set ", b"!!omap ", b"!!pairs ", b"!!null ", b"!!str ", b"!!python/tuple ", b"! ", b"!x ", b"%YAML 1.1\n",
+    b"%TAG ! x\n",
     b"---\n", b"...\n", b"<<: ", b"| ", b"> ", b"'", b'"', b"\\", b"\\u0000", b"\\ud800", b"#", b"=", b"0x", b"1e999",
     b"NaN", b"Infinity", b"-Infinity", b"null", b"true", b"9" * 400, b"9" * 5000, b"1:" * 300 + b"1.0", b"[" * 300,
     b"{" * 300, b"- " * 300, b'{"a":' * 300, b"a" * 2000, b"<", b">", b"&amp;", b"&#0;", b"&#xd800;", b"&x;",
-    b"<!DOCTYPE a [<!ENTITY x 'y'>]>", b"<!DOCTYPE a SYSTEM 'file:///etc/passwd'>", b"<![CDATA[", b"]]>", b"<!--", b"-->",
+    b"<!DOCTYPE a [<!ENTITY x 'y'>]>", b"<!DOCTYPE a SYSTEM 'file:///etc/passwd'>", b"<![CDATA[", b"]]>", b"<!--",
+    b"-->",
     b"<?xml version='1.0' encoding='utf-7'?>", b"<?xml version='1.1' encoding='x'?>", b"<a>" * 60, b"${", b"}", b"$(",
     b"{{", b"}}", b"{%", b"%}", b"```\n", b"TASK\n", b"SPACE\n", b"ORIGIN: ", b"JOINTS: ", b"LINKS: ", b"<think>",
     b"</think>",
@@ -127,7 +133,7 @@ def _places(content: Any) -> Any:
 def garbled(data: bytes, rng: Random) -> bytes:
     """Bytes with one to four of their places damaged."""
     for _ in range(rng.choice((1, 1, 2, 4))):
-        at, end = (sorted(rng.randrange(len(data) + 1) for _ in range(2)) if data else (0, 0))
+        at, end = sorted(rng.randrange(len(data) + 1) for _ in range(2)) if data else (0, 0)
         end = min(end, at + rng.choice((1, 2, 8, 64, 4096)))
         kind = rng.randrange(6)
         if kind < 3:
@@ -179,10 +185,9 @@ def changed(data: bytes, form: str, rng: Random) -> bytes:
     if form in _FORMS and rng.randrange(4):
         read, write = _FORMS[form]
         try:
-            content = read(data)
+            data = write(mutated(read(data), rng))[:LARGEST]
         except Exception:  # noqa: BLE001 (whatever an earlier change has made of it)
             return garbled(data, rng)
-        data = write(mutated(content, rng))[:LARGEST]
         return data if rng.randrange(4) else garbled(data, rng)
     return garbled(data, rng)
 

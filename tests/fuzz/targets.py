@@ -29,7 +29,7 @@ from armwright.space import DesignSpace, load_space
 from armwright.task import Task, load_task
 from tests.fuzz.mutation import changed
 
-LONGEST_REFUSAL = 6000  # characters
+LONGEST_REFUSAL = 3000  # characters
 MOST_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and is no other code
 ROOT = Path(__file__).parents[2]
 
@@ -213,11 +213,11 @@ def run_space(data: bytes) -> None:
 
 
 def run_experiment(data: bytes) -> None:
-    from armwright.experiment.plan import cells_of, load_experiment
+    from armwright.experiment.plan import MOST_CELLS, cells_of, load_experiment
 
     out = folder() / "out"
     plan, beside = load_experiment(str(file_of(data, "experiment.yaml")))
-    if len(plan.task_list) * len(plan.seed_list) * len(plan.methods) > 2000:
+    if 2000 < len(plan.task_list) * len(plan.seed_list) * len(plan.methods) <= MOST_CELLS:
         return
     cells, skipped = cells_of(plan, beside, out)
     for cell in [*cells, *(one.cell for one in skipped)]:
@@ -264,7 +264,9 @@ def answer_seeds() -> list[bytes]:
         found += [json.dumps(design) for design in designs]
         found.append(json.dumps({"reasoning": "so", "designs": [{**design, "reason": "why"} for design in designs]}))
         found.append(f"I think so.\n```json\n{json.dumps(designs[0], indent=2)}\n```\nThat is it.")
-    found.append("<think>hm</think>\nORIGIN: (0.1, -0.2, 0.0) m\nJOINTS: Y, P, R, P\nLINKS: 0.1 0.2 0.3 0.1 m\nREASON: x")
+    found.append(
+        "<think>hm</think>\nORIGIN: (0.1, -0.2, 0.0) m\nJOINTS: Y, P, R, P\nLINKS: 0.1 0.2 0.3 0.1 m\nREASON: x"
+    )
     found.append("**ORIGIN** = [0, 0, 0]; JOINTS = YPRP; LINKS = L1 = 0.1, L2 = 0.1, L3: .2, L4: 0.25\nEXPECTED: 1, 2")
     found.append('{"origin": [0, 0.1, 0], "joints": "YPRP", "links": ["0.1 m", 0.2, "0.3", 0.1], "expected": [1, 2]}')
     return [text.encode() for text in found]
@@ -414,7 +416,8 @@ def a_run() -> Path:
         json.dumps(
             [
                 {
-                    "name": "ur3", "joints": 6, "reach": 0.5, "mass": 11.0, "base": [0.0, 0.0, 0.0], "values": [1.0, 2.0],
+                    "name": "ur3", "joints": 6, "reach": 0.5, "mass": 11.0, "base": [0.0, 0.0, 0.0],
+                    "values": [1.0, 2.0],
                     "measures": {"torque": 2.0, "torque_use": None}, "dominates": 1, "dominated_by": 0, "breaks": [],
                     "notes": ["the tip is here"],
                 }
@@ -525,7 +528,7 @@ def run_trials(data: bytes) -> None:
         shutil.copy(a_run() / "config.yaml", place)
     (place / "trials.jsonl").write_bytes(data)
     _, history = read_run(place)
-    history.front, history.hypervolume  # noqa: B018 (made when asked for)
+    history.front, history.hypervolume
     with RunFolder(place) as run:
         if len(run.open_trials(a_problem().space)) != len(history):
             raise DefectError("a resumed run has other trials than its readers")
@@ -539,8 +542,9 @@ def urdf_seeds() -> list[bytes]:
 
     with_all = b"""<?xml version="1.0"?>
 <robot name="r"><link name="base"><inertial><mass value="1.5"/><origin xyz="0 0 0.1" rpy="0 0 0"/>
-<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial><visual><geometry><cylinder radius="0.1" length="1"/>
-</geometry></visual></link><link name="a"/><link name="b"><inertial><mass value="0.5"/></inertial></link><link name="tip"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial><visual><geometry>
+<cylinder radius="0.1" length="1"/></geometry></visual></link><link name="a"/>
+<link name="b"><inertial><mass value="0.5"/></inertial></link><link name="tip"/>
 <joint name="j1" type="revolute"><parent link="base"/><child link="a"/><origin xyz="0 0 0.2" rpy="0 0 1.5708"/>
 <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="2"/></joint>
 <joint name="j2" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/><limit lower="0" upper="0.3"
@@ -587,7 +591,7 @@ def run_words(data: bytes) -> None:
 
 
 def word_seeds() -> list[bytes]:
-    return [b"position_error<=0.05", b"torque > 1e3", b"position_error=2,torque=1", b"5s", b"2.5min", b"1e6", b"100_000",
+    return [b"position_error<=0.05", b"torque>1e3", b"position_error=2,torque=1", b"5s", b"2.5min", b"1e6", b"100_000",
             b"mass <= 3\nlength >= 0.2"]  # fmt: skip
 
 
@@ -597,7 +601,7 @@ def template_seeds() -> list[bytes]:
     return [
         whole_template("plus").encode(),
         b"{% for t in targets %}{{ t }}, {% endfor %}{{ task.name | upper }} {{ '%.2f' | format(tolerance) }}",
-        b"{% macro m(x) %}{{ x * 3 }}{% endmacro %}{{ m('ab') }}{% set ns = namespace(n=0) %}{{ objectives | map(attribute='name') | join(', ') }}",
+        b"{% macro m(x) %}{{ x * 3 }}{% endmacro %}{{ m('ab') }}{{ objectives | map(attribute='name') | join(', ') }}",
         b"{{ space.link }}{{ front | length }}{% if n_targets > 3 %}many{% else %}few{% endif %}{{ description[:20] }}",
     ]
 
@@ -647,7 +651,10 @@ class _Server:
 
     def ask(self, method: str, path: bytes, headers: Mapping[str, str], body: bytes = b"") -> tuple[int, Any]:
         """The status and the headers of an answer."""
-        given = [(name.lower().encode("latin-1", "replace"), value.encode("latin-1", "replace")) for name, value in headers.items()]
+        given = [
+            (name.lower().encode("latin-1", "replace"), value.encode("latin-1", "replace"))
+            for name, value in headers.items()
+        ]
         return asyncio.run(self._ask(method, path, given, body))
 
 
@@ -661,7 +668,12 @@ def a_server() -> _Server:
 def request_seeds() -> list[bytes]:
     right = {"Host": "127.0.0.1:9", "Origin": "http://127.0.0.1:9", "Content-Type": "application/json",
              "X-Armwright-Token": "the-token"}  # fmt: skip
-    wishes = ({"action": "pause"}, {"action": "stop"}, {"action": "resume"}, {"action": "hint", "text": "lower, please"})
+    wishes = (
+        {"action": "pause"},
+        {"action": "stop"},
+        {"action": "resume"},
+        {"action": "hint", "text": "lower, please"},
+    )
     posts = [{"method": "POST", "path": "/control", "headers": right, "body": json.dumps(wish)} for wish in wishes]
     paths = ("/run?designs=3&calls=1", "/file?design=2&format=mjcf", "/", "/control")
     gets = [{"method": "GET", "path": path, "headers": {"Host": "127.0.0.1:9"}, "body": ""} for path in paths]
@@ -678,12 +690,15 @@ def run_request(data: bytes) -> None:
         method, path, headers, body = "POST", "/control", json.loads(request_seeds()[0])["headers"], data
     if isinstance(method, str) and str(path).partition("?")[0] == "/events":
         return  # without an end
-    content = body if isinstance(body, bytes) else (body if isinstance(body, str) else json.dumps(body)).encode("utf-8", "replace")
+    if not isinstance(body, bytes):
+        body = (body if isinstance(body, str) else json.dumps(body)).encode("utf-8", "replace")
     before = {path.name for path in server.folder.iterdir()}
-    status, sent = server.ask(str(method)[:50], str(path).encode("utf-8", "replace"), headers, content)
+    status, sent = server.ask(str(method)[:50], str(path).encode("utf-8", "replace"), headers, body)
     if status >= 500 and not (status == 503):
         raise DefectError(f"{status} for {method} {path}")
-    if not {b"x-content-type-options", b"content-security-policy", b"cache-control"} <= {bytes(name).lower() for name, _ in sent}:
+    if not {b"x-content-type-options", b"content-security-policy", b"cache-control"} <= {
+        bytes(name).lower() for name, _ in sent
+    }:
         raise DefectError(f"headers are missing: {sent}")
     if {path.name for path in server.folder.iterdir()} - before - {"control.json", ".control.lock"}:
         raise DefectError("a request made a file")
@@ -720,7 +735,6 @@ def argument_seeds() -> list[bytes]:
     return [json.dumps(line).encode() for line in lines]
 
 
-LONG = ("--n-total", "--n-init", "--budget", "--evaluations", "--proposals", "--jobs", "--seeds")
 NEVER = ("live", "--live", "--call", "--scheduler")  # they wait for others
 
 
@@ -734,11 +748,20 @@ def run_arguments(data: bytes) -> None:
         content = ["tasks", data.decode("utf-8", "replace")]
     listed = content if isinstance(content, list) else [content]
     given = [_argument(one) for one in listed][:40]
-    if any(one.partition("=")[0] in NEVER for one in given) or (given and given[0] in ("report", "verify", "polish")):
+    if any(one.partition("=")[0] in NEVER or "--figures".startswith(one) for one in given if one) or (
+        given and given[0] in ("report", "verify", "polish")
+    ):
         return
+    if given and given[0] in ("optimize", "front", "experiment", "compare", "compare-arms"):
+        given[1:1] = ["--no-figures"]
     if given and given[0] in ("optimize", "front", "experiment"):
-        given += ["--no-figures"]
-        given += {"optimize": ["--n-init=1", "--n-total=2"], "front": ["--budget=50"], "experiment": ["--print-commands"]}[given[0]] if len(data) % 4 else ["--out=/dev/null/x"]
+        given += (
+            {"optimize": ["--n-init=1", "--n-total=2"], "front": ["--budget=50"], "experiment": ["--print-commands"]}[
+                given[0]
+            ]
+            if len(data) % 4
+            else ["--out=/dev/null/x"]
+        )
     place = folder() / "cli"
     place.mkdir(exist_ok=True)
     if not (place / "arm.urdf").exists():
@@ -769,7 +792,8 @@ def run_arguments(data: bytes) -> None:
                 shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
 
 
-EXPECTED = {"cli", "run", "rich-space.yaml", "damaged", "served", "drafts", "record", "trials", "task.yaml", "space.yaml",
+EXPECTED = {"cli", "run", "rich-space.yaml", "damaged", "served", "drafts", "record", "trials", "task.yaml",
+    "space.yaml",
             "kept.yaml", "experiment.yaml", "design.json", "arm.urdf", "points.csv", "mine.md.j2"}  # fmt: skip
 
 

@@ -111,7 +111,7 @@ class Prompt:
             _sandbox().from_string(self.template)  # filters and tests, too
         except TemplateSyntaxError as fault:
             raise SettingsError(f"prompt {self.name}, line {fault.lineno}: {fault.message}") from fault
-        except RecursionError as fault:
+        except (RecursionError, SyntaxError) as fault:  # the latter of the Python that jinja makes of it
             raise SettingsError(f"prompt {self.name} is nested too deeply") from fault
         known = {*VARIABLES, *_sandbox().globals, *_exported(tree)}
         for other in set(meta.find_referenced_templates(tree)) - {None}:

@@ -121,7 +121,7 @@ def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
             "breaks": list(arm.breaks),
             "standing": standing(arm.values, arm.breaks, history),
         }
-        for arm in read_bought(folder)
+        for arm in read_bought(folder, len(history.problem.objectives))
     ]
 
 

@@ -58,7 +58,7 @@ def write_figures(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     config, history = read_run(folder)
     summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
-    bought = read_bought(folder)
+    bought = read_bought(folder, len(config.objectives))
     if summary is None or "search" not in summary:
         drawn = _figures(history, bought)
     else:
