@@ -180,12 +180,12 @@ def read_bought(folder: Path, n_objectives: int) -> tuple[ComparedArm, ...]:
     path = folder / BOUGHT
     try:
         records = _RECORDS.validate_json(path.read_bytes())
+        if any(len(record.values) != n_objectives for record in records):
+            raise ValueError(f"not {n_objectives} values")
     except FileNotFoundError:
         return ()
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-        if any(len(record.values) != n_objectives for record in records):
-            raise ValueError(f"not {n_objectives} values")
     except ValueError as fault:  # pydantic's is one, too
         raise RunFolderError(f"{path} is damaged; remove it, and compare the arms again") from fault
     return tuple(ComparedArm(**dict(record)) for record in records)
