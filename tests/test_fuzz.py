@@ -255,3 +255,10 @@ def test_a_template_that_is_nested_too_deeply(tmp_path: Path, text: str) -> None
     (tmp_path / "mine.md.j2").write_text(text)
     with limited(), suppress(SettingsError):
         load_prompt(tmp_path / "mine.md.j2")
+
+
+def test_a_number_in_a_template_that_is_too_large(tmp_path: Path) -> None:
+    """Jinja wrote it as a name that does not exist."""
+    (tmp_path / "mine.md.j2").write_text("{{ 1e999 }}")
+    with pytest.raises(SettingsError, match="too large"):
+        load_prompt(tmp_path / "mine.md.j2")
