@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test torture check gp docs docs-serve format bench package clean
+.PHONY: demo test torture check gp docs docs-serve format bench package fuzz audit clean
 
 demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
 	$(BIN)/armwright optimize target-1 --seed 0
@@ -39,6 +39,14 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare environments of PYTHON
 	$(BIN)/python tools/package.py $(PYTHON)
 
+fuzz: .venv/.fuzz  ## over a million made-up inputs; an hour on two cores (docs/security.md)
+	$(BIN)/python -m tests.fuzz --share 0.1
+	$(BIN)/python -m tests.fuzz --engine atheris
+
+# What cannot be looked up is an error (--strict), not a package without known faults.
+audit: .venv/.audit  ## known faults of all that may be installed, extras included; asks PyPI
+	$(BIN)/pip-audit --strict --no-deps --disable-pip --requirement constraints.txt
+
 .venv/.python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "armwright needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) -V 2>&1). Try: make $(MAKECMDGOALS) PYTHON=python3.12"; exit 1; }
@@ -64,6 +72,14 @@ package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare 
 	$(PIP) --group docs
 	@touch $@
 
+.venv/.fuzz: .venv/.test
+	$(PIP) --group fuzz
+	@touch $@
+
+.venv/.audit: .venv/.python pyproject.toml constraints.txt
+	$(PIP) --group audit
+	@touch $@
+
 .venv/.gp: .venv/.run
 	$(PIP) --editable '.[gp,live,llm]'
 	@touch $@
@@ -73,4 +89,4 @@ package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare 
 	@touch $@
 
 clean:
-	rm -rf .venv build dist site .pytest_cache .ruff_cache
+	rm -rf .venv build dist site fuzz-found .pytest_cache .ruff_cache

@@ -140,7 +140,7 @@ def test_standing_beside_the_front(history: History) -> None:
 
 def test_the_run_keeps_the_arms_for_its_figures_and_its_page(run: Path, compared: ArmComparison, tab: Tab) -> None:
     comparison = compare_arms(TASK, [UR5, PANDA], run)
-    kept = read_bought(run)
+    kept = read_bought(run, 2)
     assert kept == comparison.arms == compared.arms
     assert {"front.png"} <= {path.name for path in write_figures(run)}
     history = read_run(run)[1]
@@ -177,7 +177,7 @@ def test_a_name_that_is_no_text_of_a_page(run: Path, tmp_path: Path, tab: Tab) -
 
 def test_without_arms_nothing_is_drawn(run: Path, history: History) -> None:
     (run / BOUGHT).unlink(missing_ok=True)
-    assert read_bought(run) == ()
+    assert read_bought(run, 2) == ()
     (run / BOUGHT).write_text('[{"name": "x"}]')
     with pytest.raises(RunFolderError, match=r"bought.json is damaged; remove it"):
         write_figures(run)

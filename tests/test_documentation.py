@@ -41,6 +41,7 @@ NOT_RUN = {
     r"armwright optimize .*--workers .*|armwright worker .*": "waits for other processes; test_workers.py starts them",
     r"optuna-dashboard .*": "serves until it is stopped",
     r"xargs .* < cells.txt": "minutes: all cells of the experiment; the lines of cells.txt are checked",
+    r"python -m (tests\.fuzz|pytest) .*": "minutes to hours; the suite has a short form of both",
     r"python benchmarks/.*": "half an hour of benchmark; docs/benchmarks.md has the figures",
 }
 # Experiments of minutes to hours: run with --print-commands, so that all of their cells are made and none is run.

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter
 
 from armwright.arm import Arm, Joint, Vector
 from armwright.constraints import Quantity
@@ -156,7 +156,7 @@ def compare_arms(
     return result
 
 
-class _BoughtRecord(BaseModel, frozen=True, extra="forbid"):
+class _BoughtRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """One arm of bought.json."""
 
     name: str
@@ -175,16 +175,18 @@ class _BoughtRecord(BaseModel, frozen=True, extra="forbid"):
 _RECORDS = TypeAdapter(tuple[_BoughtRecord, ...])
 
 
-def read_bought(folder: Path) -> tuple[ComparedArm, ...]:
-    """The arms that were last compared with a run; none where none were."""
+def read_bought(folder: Path, n_objectives: int) -> tuple[ComparedArm, ...]:
+    """The arms that were last compared with a run of so many objectives; none where none were."""
     path = folder / BOUGHT
     try:
         records = _RECORDS.validate_json(path.read_bytes())
+        if any(len(record.values) != n_objectives for record in records):
+            raise ValueError(f"not {n_objectives} values")
     except FileNotFoundError:
         return ()
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    except ValidationError as fault:
+    except ValueError as fault:  # pydantic's is one, too
         raise RunFolderError(f"{path} is damaged; remove it, and compare the arms again") from fault
     return tuple(ComparedArm(**dict(record)) for record in records)
 

@@ -6,24 +6,28 @@ from typing import Any, TypeVar, cast
 
 import yaml
 from pydantic import BaseModel, ValidationError
+from yaml.composer import Composer
 
 from armwright.exceptions import ArmwrightError, did_you_mean
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
 LARGEST_DOCUMENT = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has some 0.3 MB
+MOST_NODES = 400_000  # values in a document; of 10,000 targets that say all that a target can there are 240,000
 
 
 def read_document(path: Path, schema: type[Schema], error: type[ArmwrightError]) -> Schema:
     """The content of a YAML file as a value of `schema`; `error` in one line where it is not one."""
     try:
-        if path.stat().st_size > LARGEST_DOCUMENT:
-            raise error(f"{path} is larger than {LARGEST_DOCUMENT // 2**20} MiB; that is not a file for this purpose")
-        text = path.read_text(encoding="utf-8")
-    except OSError as fault:
-        raise error(f"cannot read {path}: {fault.strerror or fault}") from fault
+        with path.open("rb") as file:
+            data = file.read(LARGEST_DOCUMENT + 1)  # not its size, which a device does not have
+        text = data.decode("utf-8")
     except UnicodeDecodeError as fault:
         raise error(f"{path} is not a text file in UTF-8") from fault
+    except (OSError, ValueError) as fault:  # the latter of a name with a NUL
+        raise error(f"cannot read {path}: {getattr(fault, 'strerror', None) or fault}") from fault
+    if len(data) > LARGEST_DOCUMENT:
+        raise error(f"{path} is larger than {LARGEST_DOCUMENT // 2**20} MiB; that is not a file for this purpose")
     return parse_document(text, schema, error, str(path))
 
 
@@ -56,13 +60,44 @@ def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Armwr
         raise error(f"{where}: {at + ': ' if at else ''}{words}{got}") from fault
 
 
-class _DocumentLoader(yaml.SafeLoader):
-    """Safe YAML without aliases (no task needs them, and they are how a small file fills the memory)."""
+# libyaml, where PyYAML has it, reads five times as fast.
+_Loader: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+
+
+class _DocumentLoader(_Loader):
+    """Safe YAML without what no document needs, and by which a small file fills the memory, or does not end.
+
+    Aliases; tags (PyYAML fails at a `!!int` that is none); numbers in base 60, of which a long one takes hours.
+    """
+
+    # libyaml composes without asking anybody.
+    get_single_node = Composer.get_single_node
+    compose_document = Composer.compose_document
+    compose_scalar_node = Composer.compose_scalar_node
+    compose_sequence_node = Composer.compose_sequence_node
+    compose_mapping_node = Composer.compose_mapping_node
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.anchors: dict[str, Any] = {}
+        self._nodes = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
+        self._nodes += 1
+        if self._nodes > MOST_NODES:
+            raise yaml.YAMLError(f"more than {MOST_NODES:,} values; that is not a file for this purpose")
         if self.check_event(yaml.AliasEvent):
             raise yaml.YAMLError("anchors and aliases (&, *) are not allowed")
-        return super().compose_node(parent, index)
+        tag = getattr(self.peek_event(), "tag", None)
+        if tag is not None:
+            raise yaml.YAMLError(f"tags ({tag}) are not allowed; quote a text that begins with !")
+        return Composer.compose_node(cast("Any", self), parent, index)
+
+    def construct_scalar(self, node: Any) -> Any:
+        if node.tag in _NUMBER_TAGS and ":" in node.value:
+            raise yaml.YAMLError(f"{node.value[:20]} is a number in base 60; quote it where it is a text")
+        made: Any = super().construct_scalar(node)
+        return made
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         seen: set[str] = set()
@@ -70,7 +105,11 @@ class _DocumentLoader(yaml.SafeLoader):
             if key in seen:
                 raise yaml.YAMLError(f'the key "{key}" stands there twice')
             seen.add(key)
-        return super().construct_mapping(node, deep=deep)
+        made: Any = super().construct_mapping(node, deep=deep)
+        return made
+
+
+_NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
 def _scalar_keys(node: Any) -> Iterator[str]:
@@ -88,5 +127,8 @@ def _yaml_fault(fault: Exception) -> str:
 
 
 def _shorten(value: object) -> str:
-    text = str(value).replace("\n", " ")
+    try:
+        text = str(value).replace("\n", " ")
+    except ValueError:  # of more than 4300 digits
+        text = "a huge number"
     return text if len(text) <= 80 else text[:77] + "..."

@@ -20,18 +20,23 @@
         └── StorageError        the database that workers share does not answer, or holds no such study
 
 A message is one line in the user's words: it names the value with its unit, what is allowed, and the
-way out.
+way out. What it repeats of files and answers cannot break the line, or speak to a terminal.
 """
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
+LONGEST_MESSAGE = 3000  # characters
+
 
 class ArmwrightError(Exception):
     """The base of all errors that armwright raises on purpose."""
 
     exit_code = 1
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_line(message))
 
 
 class UsageError(ArmwrightError):
@@ -138,6 +143,20 @@ class StoppedError(ArmwrightError):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(f"stopped as asked; every finished trial is in {folder}/, and the same command goes on")
+
+
+def _line(text: str) -> str:
+    """A text on one line: characters that are not seen as their escapes, the middle of a long one left out."""
+    text = _cut(text)
+    if text.isprintable():
+        return text
+    return _cut("".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text))
+
+
+def _cut(text: str) -> str:
+    if len(text) <= LONGEST_MESSAGE:
+        return text
+    return f"{text[: LONGEST_MESSAGE // 2]} […] {text[-LONGEST_MESSAGE // 3 :]}"
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

@@ -1,8 +1,12 @@
-"""Files replaced in one step, and text that they can hold."""
+"""Files replaced in one step, text that they can hold, and names that they can have."""
 
 import os
+import re
 import shutil
 from pathlib import Path
+
+# What Windows takes for a device, whatever its ending; and a dot at the end, which it drops.
+_NO_FILE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?|.*\.", re.IGNORECASE)
 
 
 def replace_file(target: Path, content: bytes) -> None:
@@ -28,3 +32,10 @@ def replace_folder(target: Path, part: Path | None = None) -> None:
 def writable(text: str) -> str:
     """Without lone surrogates, which JSON and names of files can carry and UTF-8 cannot."""
     return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def check_name(name: str) -> str:
+    """A name of letters that any file can have; ValueError where a file of this name can be made on no Windows."""
+    if _NO_FILE.fullmatch(name):
+        raise ValueError(f'"{name}" cannot be the name of a file on Windows; choose another')
+    return name

@@ -269,7 +269,8 @@ class _Search:
             return FrontRun(history, self.config, summary, None, resumed)
         path = self.folder.path
         there = read_summary(path)
-        if there is None or not results_are_there(path, history) or there["search"]["ended_by"] != ended:
+        ended_before = None if there is None else there.get("search", {}).get("ended_by")
+        if there is None or not results_are_there(path, history) or ended_before != ended:
             self.folder.replace_trials(trials)
             verification = verify_front(history)
             there = summarize_front(history, self.config, found, searched, verification)

@@ -64,6 +64,7 @@ HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
+    "Content-Security-Policy": "frame-ancestors 'none'",  # beside the page's own
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
@@ -237,8 +238,8 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         return Response(data, media_type="application/octet-stream")
 
     async def file(request: Request) -> Response:
-        number, kind = _whole(request, "design"), request.query_params.get("format", "")
-        text = await asyncio.to_thread(run.file, number, kind)
+        said, kind = request.query_params.get("design", ""), request.query_params.get("format", "")
+        text = await asyncio.to_thread(run.file, int(said), kind) if _is_whole(said) else None
         if text is None:
             return PlainTextResponse("there is no such file", status_code=404)
         return Response(text, media_type="application/xml")
@@ -321,14 +322,14 @@ class _Guard:
             return
         from starlette.responses import PlainTextResponse
 
-        headers = dict(scope["headers"])
+        hosts: list[str] = [value.decode("latin-1") for name, value in scope["headers"] if name == b"host"]
 
         async def sent(message: Any) -> None:
             if message["type"] == "http.response.start":
                 message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in HEADERS.items())]
             await send(message)
 
-        if not self._is_allowed(headers.get(b"host", b"").decode("latin-1")):
+        if len(hosts) != 1 or not self._is_allowed(hosts[0]):  # of two, others might believe the other one
             await PlainTextResponse("this server answers on its own address only", 421)(scope, receive, sent)
             return
         await self._app(scope, receive, sent)
@@ -337,7 +338,11 @@ class _Guard:
 def _whole(request: "Request", name: str) -> int:
     """A whole number of the address, 0 where it is none."""
     said = request.query_params.get(name, "")
-    return int(said) if said.isascii() and said.isdigit() and len(said) < 10 else 0
+    return int(said) if _is_whole(said) else 0
+
+
+def _is_whole(said: str) -> bool:
+    return said.isascii() and said.isdigit() and len(said) < 10
 
 
 class Pages:

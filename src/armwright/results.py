@@ -33,6 +33,7 @@ from armwright.pareto import hypervolume
 from armwright.proposers.proposer import ProposerSummary
 from armwright.run_folder import FrontMethod, RunConfig, RunFolder, read_run
 from armwright.study_db import MOST_AT_END, discard_study, write_study
+from armwright.summary_record import checked_summary
 from armwright.verification import Verification, verify_front
 
 SUMMARY = "summary.json"
@@ -98,9 +99,8 @@ def discard_results(path: Path) -> None:
 def read_summary(path: Path) -> dict[str, Any] | None:
     """summary.json of a run folder, or None where the run has not ended (or the file is damaged)."""
     try:
-        summary: dict[str, Any] = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-        return summary if summary.keys() >= {"n_trials", "hypervolume", "best_known", "verification"} else None
-    except (OSError, ValueError, AttributeError, RecursionError):
+        return checked_summary(json.loads((path / SUMMARY).read_text(encoding="utf-8")))
+    except (OSError, ValueError, RecursionError):
         return None
 
 

@@ -27,7 +27,7 @@ from typing import Any, BinaryIO, Literal, Self, cast
 
 import yaml
 from filelock import FileLock, Timeout
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from armwright.control import CHANNEL_FILES
 from armwright.documents import parse_document
@@ -76,6 +76,19 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     in_flight: int | None = Field(default=None, ge=1)
     polish_every: int | None = Field(default=None, ge=1)
     start: tuple[dict[str, float | str], ...] = ()
+
+    @field_validator("proposer")
+    @classmethod
+    def _check_proposer(cls, settings: dict[str, Any] | None) -> dict[str, Any] | None:
+        """That what is asked again can be asked as before."""
+        kinds = {"name": str} | ({"prompt": str} if settings and "prompt" in settings else {})
+        if "prompt" in kinds:
+            kinds |= {"memory": str, "answer": str, "proposals": int}
+        kinds |= {"template": str} if settings and "template" in settings else {}
+        for key, kind in kinds.items():
+            if settings is not None and not isinstance(settings.get(key), kind):
+                raise ValueError(f"{key} = {settings.get(key)!r} is no {kind.__name__}")
+        return settings
 
     @property
     def n_trials(self) -> int:

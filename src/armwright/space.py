@@ -7,7 +7,7 @@ joint, one length for each link. Every number of it can be changed in a YAML fil
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, Self, cast
@@ -43,6 +43,7 @@ LEAST_STROKE = 3e-3  # [m]
 MOST_MODULES = 8
 MOST_ACTUATORS = 50
 LARGEST_LENGTH = 1000.0  # [m]; beyond it float32 kernels lose the millimetre
+MOST_KEPT = 64  # spaces whose parameters are at hand
 GRID_KINDS = ("origin", "link", "stroke", "limit")
 BUILT_IN = resources.files("armwright") / "spaces"
 
@@ -485,17 +486,17 @@ def _column(space: DesignSpace, name: str) -> _Column:
     return _by_name(space)[name]
 
 
-@cache
+@lru_cache(maxsize=MOST_KEPT)
 def _by_name(space: DesignSpace) -> dict[str, _Column]:
     return {column.parameter.name: column for column in _columns(space)}
 
 
-@cache
+@lru_cache(maxsize=MOST_KEPT)
 def _parameters(space: DesignSpace) -> tuple[Parameter, ...]:
     return tuple(column.parameter for column in _columns(space))
 
 
-@cache
+@lru_cache(maxsize=MOST_KEPT)
 def _columns(space: DesignSpace) -> tuple[_Column, ...]:
     # Not a cached property: a copy of the space with other ranges would take its value along.
     steps, to = dict(space.grid), dict(space.restrict)
@@ -511,7 +512,7 @@ def _columns(space: DesignSpace) -> tuple[_Column, ...]:
     return tuple(found)
 
 
-@cache
+@lru_cache(maxsize=MOST_KEPT)
 def _free_columns(space: DesignSpace) -> tuple[_Column, ...]:
     """Without restrictions and grids, in their fixed order."""
     ranges: dict[str, Range] = {"x": space.origin_x, "y": space.origin_y, "z": space.origin_z}
@@ -657,7 +658,7 @@ def _check_ties(space: DesignSpace) -> None:
             raise ValueError(f"tie: {of} may not be there where {name} is; tie it the other way round")
 
 
-@cache
+@lru_cache(maxsize=MOST_KEPT)
 def _arm_actuators(space: DesignSpace) -> tuple[Actuator, ...]:
     return tuple(record.actuator(space.actuator_torque, space.safety_factor) for record in space.actuators)
 

@@ -25,6 +25,7 @@ from pydantic import (
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
+from armwright.files import check_name
 from armwright.goals import Goals, plain_goals
 from armwright.moves import MOVE_STEP, Moves, check_moves, check_times
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
@@ -99,6 +100,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if any(kept):
             task._records = kept  # pyright: ignore[reportAttributeAccessIssue] - frozen are the fields alone
         return task
+
+    @field_validator("name")
+    @classmethod
+    def _check_name(cls, name: str) -> str:
+        return check_name(name)
 
     @field_serializer("targets")
     def _with_records(self, targets: tuple[Point, ...]) -> tuple[Point | Target, ...]:
@@ -413,7 +419,11 @@ def _is_pair(value: Any) -> bool:
 
 
 def _safe_name(stem: str) -> str:
-    return re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("._-")[:64] or "task"
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("._-")[:64].rstrip(".") or "task"
+    try:
+        return check_name(name)
+    except ValueError:
+        return f"task-{name}"
 
 
 def _holds_data(line: str) -> bool:

@@ -9,10 +9,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
 
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
+from armwright.files import check_name
 from armwright.llm.configuration import configured_model
 from armwright.llm.prompt import PROMPTS
 from armwright.llm.transcript import TRANSCRIPTS
@@ -27,7 +28,8 @@ _OF_WISHES = (
     "max_calls", "max_cost",
 )  # fmt: skip
 
-Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$")]
+MOST_CELLS = 100_000
+Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$"), AfterValidator(check_name)]
 Count = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
@@ -259,6 +261,9 @@ def cells_of(
     """
     if replay is not None and not replay.is_dir():
         raise SettingsError(f"--replay {replay}: there is no such folder of an earlier experiment")
+    n_cells = len(plan.task_list) * len(plan.seed_list) * len(plan.methods)
+    if n_cells > MOST_CELLS:
+        raise SettingsError(f"the experiment has {n_cells:,} cells; at most {MOST_CELLS:,} are allowed")
     space = None if plan.space is None else str((beside / plan.space).resolve())
     tasks = [_task(name, beside) for name in plan.task_list]
     names = [name for _, name in tasks]

@@ -312,12 +312,23 @@ def _own_server(at: _Place) -> Model:
     place = base_url.partition("://")[2]
     if "@" in place.partition("/")[0] or "?" in place or "#" in place:
         raise SettingsError(f"--base-url holds more than an address; put the server's key into {SERVER_KEY}")
+    if not _is_address(base_url):
+        raise SettingsError(f"--base-url {base_url} is no address, such as http://localhost:8080/v1")
     client = AsyncOpenAI(
         base_url=base_url,
         api_key=os.environ.get(at.key) or "no-key",
         default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
     )
     return OpenAIChatModel(at.name, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
+
+
+def _is_address(url: str) -> bool:
+    """Whether a host, and a port if there is one, can be told from it."""
+    try:
+        place = urlsplit(url)
+        return bool(place.hostname) and place.port != 0 and url.isascii() and url.isprintable() and " " not in url
+    except ValueError:  # of brackets or ports that are none
+        return False
 
 
 def _json_alone(response: ModelResponse) -> ModelResponse:

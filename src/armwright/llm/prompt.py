@@ -111,7 +111,7 @@ class Prompt:
             _sandbox().from_string(self.template)  # filters and tests, too
         except TemplateSyntaxError as fault:
             raise SettingsError(f"prompt {self.name}, line {fault.lineno}: {fault.message}") from fault
-        except RecursionError as fault:
+        except (RecursionError, SyntaxError) as fault:  # the latter of the Python that jinja makes of it
             raise SettingsError(f"prompt {self.name} is nested too deeply") from fault
         known = {*VARIABLES, *_sandbox().globals, *_exported(tree)}
         for other in set(meta.find_referenced_templates(tree)) - {None}:
@@ -191,7 +191,7 @@ _FAULTS = (
 def load_prompt(name: str | Path) -> Prompt:
     """The prompt `plus` or `minus`, or the one of a template file."""
     if str(name) in PROMPTS:
-        return Prompt(str(name), builtin_template(f"{name}.md.j2"))
+        return _builtin_prompt(str(name))
     path = Path(name)
     if os.path.isdir(path):
         raise SettingsError(f"prompt {path} is a folder, not a template file")
@@ -209,6 +209,11 @@ def load_prompt(name: str | Path) -> Prompt:
         raise SettingsError(f"{path} is not a text file in UTF-8") from fault
     # A file that is called as a prompt of ours must not pass for it.
     return Prompt(path.name if path.name not in PROMPTS else f"./{path.name}", text)
+
+
+@cache
+def _builtin_prompt(name: str) -> Prompt:
+    return Prompt(name, builtin_template(f"{name}.md.j2"))
 
 
 def builtin_template(name: str) -> str:

@@ -1,5 +1,6 @@
 """Where templates are rendered. They are files that people pass on: none may reach beyond its prompt, or not end."""
 
+import math
 import re
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -62,6 +63,11 @@ class _CountingGenerator(CodeGenerator):
             self.fail("a filter for a whole block is not possible here; write {{ text | filter }}", node.lineno)
         given = [nodes.Const(node.name), node.node, *node.args]
         self.visit(_call("filtered", node, given, node.kwargs, node.dyn_args, node.dyn_kwargs), frame)
+
+    def visit_Const(self, node: nodes.Const, frame: Frame) -> None:  # noqa: N802
+        if isinstance(node.value, float) and not math.isfinite(node.value):  # jinja would write the name inf
+            self.fail("a number is too large", node.lineno)
+        super().visit_Const(node, frame)
 
     def visit_Concat(self, node: nodes.Concat, frame: Frame) -> None:  # noqa: N802
         self.visit(_call("joined", node, node.nodes), frame)

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from armwright.control import Hint
 from armwright.exceptions import RunFolderError
@@ -19,12 +19,14 @@ TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
 FIRST_STEPS = ("reasoning", "answer")  # the steps whose questions are made from the history, and go with hints
 READ = (None, "answer", "limit", "refused", "rejected", "context")  # how calls end whose question was read
 
+Count = Annotated[int, Field(ge=0, lt=2**53)]
+
 
 @dataclass(frozen=True)
 class Call:
     """One call.
 
-    proposal: the id of the proposal that it belongs to; empty for a check.
+    proposal: the id of the proposal that it belongs to, its asker and its trial's number; empty for a check.
     step: check (may the model be used at all), reasoning (the free answer), parameters (that answer as values), or
         answer (both at once), draft (a task and a space from words).
     known: how many finished trials the question was made from.
@@ -34,18 +36,18 @@ class Call:
     hints: of the engineer who watches the run, that stand in the prompt.
     """
 
-    proposal: str
+    proposal: Annotated[str, Field(pattern=r"^(.*-\d{1,9})?$")]
     step: str
-    known: int
+    known: Count
     origin: str
     model: str
     prompt: str
     answer: str
-    requests: int
-    input_tokens: int
-    output_tokens: int
-    cost_usd: float | None
-    seconds: float
+    requests: Count
+    input_tokens: Count
+    output_tokens: Count
+    cost_usd: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None
+    seconds: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
     fault: str | None = None
     error: str | None = None
     hints: tuple[Hint, ...] = ()

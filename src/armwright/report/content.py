@@ -63,7 +63,9 @@ class RunContent:
         is_other = self._reader.read_on() or len(self._reader.trials) < self._n
         if is_other:
             self._chunks, self._n, self.history = [], 0, self._nothing()
-        self.summary = read_summary(self.folder)
+        summary = read_summary(self.folder)
+        # A summary of another kind of run is none of this one's.
+        self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
         self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
         self.history = self.history.grown(self._reader.trials, self.config.reference_point)
         if len(self.history) > self._n:
@@ -118,7 +120,7 @@ def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
             "breaks": list(arm.breaks),
             "standing": standing(arm.values, arm.breaks, history),
         }
-        for arm in read_bought(folder)
+        for arm in read_bought(folder, len(history.problem.objectives))
     ]
 
 

@@ -58,8 +58,11 @@ def write_figures(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     config, history = read_run(folder)
     summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
-    bought = read_bought(folder)
-    drawn = _figures(history, bought) if summary is None else _search_figures(history, summary, bought)
+    bought = read_bought(folder, len(config.objectives))
+    if summary is None or "search" not in summary:
+        drawn = _figures(history, bought)
+    else:
+        drawn = _search_figures(history, summary, bought)
     return write_drawn(folder / FIGURES, drawn)
 
 
