@@ -137,7 +137,7 @@ def test_what_is_said_in_passing_exists() -> None:
         name: {o for p in command.params for o in (*p.opts, *p.secondary_opts)} for name, command in cli().items()
     }
     scripts = "".join(file.read_text() for place in ("benchmarks", "tests") for file in (ROOT / place).rglob("*.py"))
-    ours = set(re.findall(r'add_argument\(\s*"(--[a-z-]+)"', scripts))
+    ours = set(re.findall(r'add(?:_argument|option)\(\s*"(--[a-z-]+)"', scripts))
     known = set[str]().union(*options.values()) | {"--version", "--help"} | ours
     for page in PAGES:
         for block in MarkdownIt().enable("table").parse((ROOT / page).read_text(encoding="utf-8")):

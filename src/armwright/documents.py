@@ -96,8 +96,7 @@ class _DocumentLoader(_Loader):
     def construct_scalar(self, node: Any) -> Any:
         if node.tag in _NUMBER_TAGS and ":" in node.value:
             raise yaml.YAMLError(f"{node.value[:20]} is a number in base 60; quote it where it is a text")
-        made: Any = super().construct_scalar(node)
-        return made
+        return super().construct_scalar(node)  # pyright: ignore[reportUnknownVariableType]
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         seen: set[str] = set()
@@ -105,8 +104,7 @@ class _DocumentLoader(_Loader):
             if key in seen:
                 raise yaml.YAMLError(f'the key "{key}" stands there twice')
             seen.add(key)
-        made: Any = super().construct_mapping(node, deep=deep)
-        return made
+        return super().construct_mapping(node, deep=deep)  # pyright: ignore[reportUnknownVariableType]
 
 
 _NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
