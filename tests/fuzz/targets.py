@@ -11,6 +11,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, field
 from functools import cache
@@ -655,7 +656,8 @@ class _Server:
             (name.lower().encode("latin-1", "replace"), value.encode("latin-1", "replace"))
             for name, value in headers.items()
         ]
-        return asyncio.run(self._ask(method, path, given, body))
+        with ThreadPoolExecutor(1) as elsewhere:  # this thread may have a loop already: Playwright's
+            return elsewhere.submit(lambda: asyncio.run(self._ask(method, path, given, body))).result()
 
 
 @cache
