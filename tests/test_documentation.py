@@ -70,6 +70,7 @@ FILES = {
                             "six-axis.yaml": "joints: 6\n"},
 }  # fmt: skip
 BEFORE = {
+    "README.md": ["armwright optimize target-1 --seed 0"],  # as `make demo` does
     "docs/exports.md": [f"armwright optimize target-1 {SHORT}"],
     "docs/page.md": [f"armwright optimize target-1 {SHORT} --out runs/{name}" for name in "ab"],
     "docs/language-models.md": [f"armwright optimize target-1 {SHORT} --out runs/mine"],

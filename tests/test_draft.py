@@ -199,7 +199,7 @@ REFUSED = {
     "long name": (ANSWER.replace("name: wall", f"name: {'w' * 300}"), "the task: name: String should match pattern"),
     "tag": (
         ANSWER.replace("payload: 0.5", 'payload: !!python/object/apply:os.system ["touch hacked"]'),
-        "could not determine a constructor for the tag",
+        "tags (tag:yaml.org,2002:python/object/apply:os.system) are not allowed",
     ),
     "bomb": (ANSWER.replace("payload: 0.5", LAUGHS), "anchors and aliases (&, *) are not allowed"),
     "deep": (ANSWER.replace("payload: 0.5", f"payload: {'[' * 20_000}"), "the task is not valid YAML"),

@@ -15,6 +15,7 @@ from typing import Any
 
 import optuna
 import pytest
+from optuna.storages import RDBStorage
 
 import armwright as aw
 from armwright.exceptions import EvaluatorError, MissingExtraError, RunConflictError, SettingsError, StorageError
@@ -79,6 +80,17 @@ def with_crew(run: Path, n: int, problem: aw.Problem = PROBLEM, **asked: Any) ->
     return found, crew
 
 
+@contextmanager
+def optunas(run: Path) -> Iterator[optuna.Study]:
+    """The study on the board, as Optuna itself opens it."""
+    record = read_config(run).workers
+    assert record is not None
+    storage = RDBStorage(record.storage)
+    yield optuna.load_study(storage=storage, study_name=record.study)
+    storage.remove_session()
+    storage.engine.dispose()
+
+
 def records(run: Path) -> list[dict[str, Any]]:
     lines = (run / "trials.jsonl").read_text().splitlines()
     return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in lines]
@@ -129,17 +141,16 @@ def test_optuna_sees_the_study(tmp_path: Path) -> None:
     """Its own front is the run's; constraints, sources and parameters are there."""
     task = TASK.model_copy(update={"constraints": ("length <= 0.6",)})
     found, _ = with_crew(tmp_path / "run", 2, aw.Problem(task), n_total=20)
-    record = found.config.workers
-    assert record is not None
-    study = optuna.load_study(storage=record.storage, study_name=record.study)
-    assert sorted(trial.user_attrs["number"] for trial in study.best_trials) == sorted(m.number for m in found.front)
-    by_number = {trial.user_attrs["number"]: trial for trial in study.trials}
+    with optunas(tmp_path / "run") as study:
+        best = sorted(trial.user_attrs["number"] for trial in study.best_trials)
+        by_number = {trial.user_attrs["number"]: trial for trial in study.trials}
+        assert study.metric_names == ["position_error", "torque"]
+    assert best == sorted(m.number for m in found.front)
     for trial in found.trials:
         if trial.same_as is None:
             theirs = by_number[trial.number]
             assert (tuple(theirs.values), theirs.user_attrs["source"]) == (trial.values, trial.source)
             assert theirs.params == dict(trial.design.params)
-    assert study.metric_names == ["position_error", "torque"]
 
 
 def test_a_run_that_was_left_goes_on_with_what_workers_did_meanwhile(tmp_path: Path) -> None:
@@ -315,6 +326,7 @@ class Place:
         self.run = folder / "run"
         (folder / "sim.py").write_text(EVALUATOR)
         self._storage = storage
+        self.search_: Future[aw.Run] | None = None
 
     def search(self, n_total: int = 10, at_a_time: int = 2) -> aw.Run:
         problem = aw.Problem(
@@ -333,7 +345,8 @@ class Place:
     def begin(self, n_total: int = 10, at_a_time: int = 2) -> Future[aw.Run]:
         self.heard: list[str] = []
         self.news = threading.Event()
-        return ThreadPoolExecutor(1).submit(self.search, n_total, at_a_time)
+        self.search_ = ThreadPoolExecutor(1).submit(self.search, n_total, at_a_time)
+        return self.search_
 
     def wait_for(self, there: Callable[[], bool]) -> None:
         """A bounded wait for something that other processes do."""
@@ -341,6 +354,8 @@ class Place:
         for _ in range(6000):
             if there():
                 return
+            if self.search_ is not None and self.search_.done():
+                self.search_.result()  # raises what ended it
             gone.wait(0.01)
         raise AssertionError(f"it did not come; heard: {self.heard}, evaluated: {self.evaluated}")
 
@@ -390,13 +405,12 @@ def test_the_trial_of_a_killed_worker_is_evaluated_by_another(place: Place) -> N
     (twice,) = [name for name, n in Counter(name for _, name in place.evaluated).items() if n > 1]
     assert {pid for pid, name in place.evaluated if name == twice} == {workers[0].pid, workers[1].pid}
     assert [trial.number for trial in found.trials] == list(range(15))
-    config = read_config(place.run)
-    assert config.workers is not None
-    study = optuna.load_study(storage=config.workers.storage, study_name=config.workers.study)
-    states = Counter(trial.state.name for trial in study.trials)
+    with optunas(place.run) as study:
+        trials = study.trials
+    states = Counter(trial.state.name for trial in trials)
     assert states == {"COMPLETE": 15 - found.summary["same_arms"], "FAIL": 1}
     retry = optuna.storages.RetryHeartbeatStaleTrialCallback
-    assert sum(retry.retried_trial_number(trial) is not None for trial in study.trials) == 1
+    assert sum(retry.retried_trial_number(trial) is not None for trial in trials) == 1
 
 
 def test_a_worker_that_is_stopped_gives_its_trial_back_at_once(place: Place) -> None:

@@ -1,5 +1,6 @@
 """Workspaces: scipy says whether points are spread evenly, closed forms which of them arms reach."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -134,9 +135,9 @@ def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> Non
     sizes: list[int] = []
     values_of = Problem.values
 
-    def counted(self: Problem, evaluation: Evaluation) -> Array:
+    def counted(self: Problem, evaluation: Evaluation, *measured: Mapping[str, Array]) -> Array:
         sizes.append(len(evaluation))
-        return values_of(self, evaluation)
+        return values_of(self, evaluation, *measured)
 
     monkeypatch.setattr("armwright.problem.POSTURES_AT_ONCE", {"cpu": 1000})
     monkeypatch.setattr(Problem, "values", counted)

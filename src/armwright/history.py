@@ -138,6 +138,8 @@ class History:
     @cached_property
     def counted(self) -> Array:
         """(N, M) `values`, infinite where a design is infeasible: what fronts and hypervolumes are made of."""
+        if not self.problem.constraints:
+            return self.values
         known, _ = self._known("counted", np.empty((0, len(self.problem.objectives))))
         n = len(known)
         return np.vstack([known, counted(self.values[n:], self.broken[n:])])

@@ -5,8 +5,10 @@ are made here as it makes them (optuna_storage.sql), and filled at once; a test 
 """
 
 import json
+import re
 import sqlite3
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from datetime import datetime
 from importlib import resources
@@ -84,6 +86,18 @@ def is_untouched(file: Path) -> bool:
         header = opened.read(HEADER)
     ours = header.startswith(MAGIC) and header[APPLICATION] == OURS
     return ours and header[CHANGES] == bytes(4)
+
+
+def artifact_ids(file: Path) -> set[str]:
+    """The ids of the artifacts that a file names, as far as they are ids; none of a damaged one."""
+    place = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
+    try:
+        with closing(sqlite3.connect(place, uri=True)) as connection:
+            query = "SELECT substr(key, 11) FROM trial_system_attributes WHERE key LIKE 'artifacts:%'"
+            found = [str(id_) for (id_,) in connection.execute(query)]
+    except sqlite3.Error:
+        return set()
+    return {id_ for id_ in found if re.fullmatch("[0-9a-f-]{36}", id_)}
 
 
 class _Tables:

@@ -22,7 +22,7 @@ from armwright.export.urdf import to_urdf
 from armwright.files import replace_file
 from armwright.history import FinishedTrial, History
 from armwright.llm.words import one_line
-from armwright.optuna_storage import StoredStudy, StoredTrial, as_sqlite, is_untouched, trial_id
+from armwright.optuna_storage import StoredStudy, StoredTrial, artifact_ids, as_sqlite, is_untouched, trial_id
 from armwright.run_folder import TRIALS, RunConfig, read_config
 
 STUDY_DB = "study.db"
@@ -66,9 +66,11 @@ def write_study(
         study = _RunAsStudy(run, read_config(run), history, _verdicts(history, summary))
         content = as_sqlite(study.stored())
         artifacts.mkdir(parents=True, exist_ok=True)
-        for name, urdf in study.urdfs.values():  # before the file that names them
-            replace_file(artifacts / _artifact_id(name, urdf), urdf.encode())
+        files = {_artifact_id(name, urdf): urdf for name, urdf in study.urdfs.values()}
+        for id_, urdf in files.items():  # before the file that names them
+            replace_file(artifacts / id_, urdf.encode())
         kept = _set_aside(target)
+        _remove_artifacts(target, set(files))
         replace_file(target, content)
     except OSError as fault:
         raise RunFolderError(f"cannot write {target}: {fault.strerror or fault}") from fault
@@ -79,7 +81,15 @@ def discard_study(run: Path) -> None:
     """Takes study.db away, as its run goes on; one that somebody changed is kept under another name."""
     target = run / STUDY_DB
     if _set_aside(target) is None:
+        _remove_artifacts(target, set())
         target.unlink(missing_ok=True)
+
+
+def _remove_artifacts(target: Path, needed: set[str]) -> None:
+    """Takes away what the study.db that is there names, but for what is needed."""
+    if target.exists():
+        for id_ in artifact_ids(target) - needed:
+            (target.with_name(ARTIFACTS) / id_).unlink(missing_ok=True)
 
 
 def _set_aside(target: Path) -> Path | None:

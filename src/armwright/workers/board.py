@@ -388,10 +388,10 @@ def _rank(posted: Posted) -> int:
 
 
 def _is_passing(fault: StorageInternalError) -> bool:
-    """Whether the database is away, locked or full; else it is damaged, and there is nothing to wait for."""
-    from sqlalchemy.exc import InterfaceError, OperationalError, TimeoutError
+    """Whether to wait: not where the database is none, or not one of Optuna's; it may be away, locked or full."""
+    from sqlalchemy.exc import DatabaseError, NotSupportedError, ProgrammingError
 
-    return isinstance(fault.__cause__, (OperationalError, InterfaceError, TimeoutError))
+    return type(fault.__cause__) not in (DatabaseError, NotSupportedError, ProgrammingError)
 
 
 def _cause(fault: BaseException) -> str:
