@@ -141,6 +141,20 @@ def test_an_experiment_of_too_many_cells(tmp_path: Path) -> None:
         cells_of(*load_experiment(str(file)), tmp_path)
 
 
+def test_an_experiment_whose_commands_are_no_lines(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text('name: x\ntasks: [target-1]\nseeds: 1\nmethods: {a: {label: A, proposer: llm, prompt: "a\\n"}}\n')
+    with pytest.raises(SettingsError, match="can stand on no line") as refusal:
+        cells_of(*load_experiment(str(file)), tmp_path)
+    assert str(refusal.value).isprintable()
+
+
+def test_a_range_from_zero_to_minus_zero(tmp_path: Path) -> None:
+    file = tmp_path / "space.yaml"
+    file.write_text("name: x\norigin_z: [0.0, -0.0]\n")
+    assert [design.origin[2] for design in load_space(file).sample(3, 0)] == [0.0] * 3
+
+
 def test_a_name_that_windows_takes_for_a_device_is_made_another() -> None:
     text = task_template(Path("con.yaml"))
     assert 'name: "task-con"' in text

@@ -25,6 +25,11 @@ class FloatParameter:
     unit: str
     step: float = 0.0
 
+    def __post_init__(self) -> None:
+        """0.0 for -0.0, which numpy takes for an end below 0."""
+        object.__setattr__(self, "low", self.low + 0.0)
+        object.__setattr__(self, "high", self.high + 0.0)
+
     def check(self, value: Any) -> float:
         """`value` as a float; DesignError where it is not a number within the range."""
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:

@@ -286,6 +286,8 @@ def cells_of(
             robust=plan.robust,
             folder=out.resolve() / RUNS / key / task_name / f"seed{seed}",
         )
+        if seed == plan.seed_list[0] and not cell.command.isprintable():
+            raise SettingsError(f"{cell.command}: a name in it has a character that can stand on no line of a script")
         cell, reason = _source_of_model(cell, replay)
         if reason:
             skipped.append(Skipped(cell, reason))
