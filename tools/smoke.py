@@ -128,7 +128,7 @@ def main(folder: Path) -> None:
     Path("gp.yaml").write_text(EXPERIMENT.replace("proposer: none", "proposer: none, sampler: gp"))
     for extra, *asked in NEEDS:
         done = armwright(*asked, code=2, OPENAI_API_KEY="sk-none")
-        (line,) = [line for line in done.stderr.splitlines() if line]
+        (line,) = [line for line in done.stderr.splitlines() if "Warning" not in line and not line.startswith("  ")]
         assert line.startswith("armwright: "), line
         assert f'pip install "armwright[{extra}]"' in line, line
 
