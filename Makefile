@@ -39,7 +39,7 @@ bench: .venv/.test  ## the main figures of docs/benchmarks.md; some 25 minutes o
 package: .venv/.test .venv/.package  ## sdist and wheel in dist/, tried in bare environments of PYTHON
 	$(BIN)/python tools/package.py $(PYTHON)
 
-fuzz: .venv/.fuzz  ## over a million made-up inputs; an hour on two cores (docs/security.md)
+fuzz: .venv/.fuzz  ## over a million made-up inputs (docs/security.md)
 	$(BIN)/python -m tests.fuzz --share 0.1
 	$(BIN)/python -m tests.fuzz --engine atheris
 
