@@ -16,7 +16,7 @@ from armwright.sampling import distributions
 from armwright.workers.board import SIGNS_MISSED, Board, Posted
 
 MOST_DEATHS = 3  # of workers over one trial in a session
-LOOK_EVERY = 0.2  # [s] between two looks at the board
+LOOK_EVERY = 0.05  # [s] between two looks at the board
 SILENT_EVERY = 1.0  # [s] between two looks for workers that show no sign of life
 LONELY = 10.0  # [s] after which the user is told that no worker is there
 

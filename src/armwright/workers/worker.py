@@ -11,7 +11,7 @@ from armwright.problem import Problem
 from armwright.run_folder import read_begun, read_config
 from armwright.workers.board import Board, Posted, shown_url
 
-LOOK_EVERY = 0.5  # [s] between two looks for a trial, where none waits
+LOOK_EVERY = 0.1  # [s] between two looks for a trial, where none waits
 
 
 def work(
