@@ -115,6 +115,28 @@ def test_a_proposer_that_fails_from_the_first_is_marked_counted_and_flagged() ->
     assert (proposer["failures"], proposer["fallback_share"], proposer["flagged"]) == ({"timeout": 2}, 1.0, True)
 
 
+class Repeating(Proposer):
+    """Proposes one design again and again, and keeps how many finished trials it was shown each time."""
+
+    name = "repeating"
+
+    def __init__(self) -> None:
+        self.shown: list[tuple[int, int]] = []
+
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
+        self.shown.append((number, len(history)))
+        return Proposal(history.problem.space.sample(1, 0)[0], f"repeating-{number}")
+
+
+def test_a_trial_that_repeats_an_arm_is_recorded_before_the_next_begins(tmp_path: Path) -> None:
+    """Else the next one would be drawn without it, and after a kill between the two with it."""
+    proposer = Repeating()
+    run = optimize(PROBLEM, proposer=proposer, n_init=2, n_step=1, n_total=5, out=tmp_path / "run")
+    assert proposer.shown == [(number, number) for number in range(2, 7)]
+    assert [trial.same_as for trial in run.trials[3:]] == [2] * 4
+    assert all(trial.feedback is None for trial in run.trials)
+
+
 class Odd(Proposer):
     """Gives no design at all, or one that no design space takes."""
 

@@ -241,6 +241,7 @@ class Study:
             for number in range(first, self.n_trials):
                 if number < len(self.trials) or number in self._under_way:
                     continue  # it was begun in an earlier session
+                self._record_ready(turns)  # one that is an earlier one's arm waits for nobody
                 while not self._may_begin(number):
                     self._hear()
                     self._record_ready(turns)
