@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from armwright.exceptions import ArmwrightError, RunFolderError
+from armwright.exceptions import ArmwrightError, RunConflictError, RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.problem import Problem
 from armwright.results import read_summary
@@ -202,7 +202,7 @@ def test_a_damaged_config_is_named(run: Run, tmp_path: Path) -> None:
 
 def test_results_without_their_trials_are_not_taken_over(run: Run, tmp_path: Path) -> None:
     (folder(run) / "trials.jsonl").unlink()
-    with pytest.raises(ArmwrightError, match="holds no run, but other files"):
+    with pytest.raises(RunConflictError, match=r"holds results of a run .* but no trial in trials.jsonl"):
         short(tmp_path / "run")
     assert (folder(run) / "summary.json").exists()
 

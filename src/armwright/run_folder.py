@@ -285,12 +285,17 @@ class RunFolder:
     def _check_free(self) -> None:
         """RunConflictError where the folder holds anything but what a run without trials leaves."""
         others = sorted({entry.name for entry in self.path.iterdir()} - BEFORE_TRIALS)
-        if others:
+        if (self.path / CONFIG).exists():
+            read_config(self.path)
+            if others:
+                raise RunConflictError(
+                    f"{self.path} holds results of a run ({others[0]}, …), but no trial in {TRIALS}; "
+                    "put that file back, or give another --out DIR"
+                )
+        elif others:
             raise RunConflictError(
                 f"{self.path} holds no run, but other files ({others[0]}, …); give another --out DIR"
             )
-        if (self.path / CONFIG).exists():
-            read_config(self.path)
 
     def write_config(self, config: RunConfig) -> None:
         """Replaces config.yaml in one step."""

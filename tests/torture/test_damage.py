@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from armwright.exceptions import ArmwrightError
+from armwright.exceptions import ArmwrightError, RunConflictError
 from armwright.front import find_front
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -108,7 +108,9 @@ def test_trials_cut_at_any_byte_are_made_again(tmp_path: Path, intact: Path, kil
         shutil.copytree(intact, folder)
         (folder / "trials.jsonl").write_bytes(content[: chance.randrange(1, len(content))])
         if b"\n" not in (folder / "trials.jsonl").read_bytes():
-            continue  # no trial is left, while results are: below
+            with pytest.raises(RunConflictError, match=r"no trial in trials.jsonl"):
+                short(folder)
+            continue
         short(folder)
         assert trials(folder) == trials(intact)
 
@@ -133,7 +135,7 @@ def test_a_folder_where_a_file_should_be(tmp_path: Path, intact: Path, name: str
     (folder / name).unlink()
     (folder / name).mkdir()
     if name in ("trials.jsonl", "config.yaml", ".lock"):
-        with pytest.raises(ArmwrightError, match=rf"{name}|holds no run, but other files"):
+        with pytest.raises(ArmwrightError, match=name):
             short(folder)
     else:
         with suppress(ArmwrightError):  # a name that is taken is said
