@@ -8,6 +8,7 @@ import subprocess
 import sys
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -131,6 +132,27 @@ def test_no_key_is_shown_where_the_first_call_repeats_it(chat_server: ChatServer
     assert done.returncode == 0, done.stderr
     assert '"Your key is <ANTHROPIC_API_KEY>' in done.stdout
     no_key_in(done.stdout + done.stderr)
+
+
+def test_no_key_is_on_a_command_line(chat_server: ChatServer, in_folder: Path) -> None:
+    """As every user of the machine sees them: of the study, and of the server of its page."""
+    seen: set[str] = set()
+
+    def answer(_request: Request) -> Answer:
+        for command in Path("/proc").glob("[0-9]*/cmdline"):
+            with suppress(OSError):  # it ended
+                seen.add(command.read_bytes().replace(b"\0", b" ").decode(errors="replace"))
+        return json.dumps(GOOD_DESIGN)
+
+    chat_server.answer = answer
+    how = (*model_of("openai", chat_server), "--answer", "one-step", "--live", "--out", "run")
+    done = armwright(chat_server, "optimize", "target-1", *SHORT, *how)
+    assert done.returncode == 0, done.stderr
+    own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]
+    assert any("armwright live" in command for command in own)
+    assert any("armwright optimize" in command for command in own)
+    assert sent_key(chat_server) in KEYS
+    no_key_in(" ".join(seen))
 
 
 KEY = "sk-proj-abcdefghijklmnopqrstuvwxyz0123"
