@@ -1,5 +1,6 @@
 """Fixtures shared by all tests, and a home that is not the user's."""
 
+import gc
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -58,6 +59,12 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def pytest_collection_finish() -> None:
+    """What all tests share lives to the end: the collector need not look at it again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

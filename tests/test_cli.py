@@ -20,7 +20,8 @@ from armwright.study import optimize
 from armwright.task import load_task
 from tests.chat_server import Answer, ChatServer, Request, designer
 
-SHORT = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
+DRAWN = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
+SHORT = ("--no-figures", *DRAWN)
 
 
 def armwright(*args: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -44,7 +45,7 @@ def refused(code: int, *args: str, **environment: str) -> str:
 
 
 def test_optimize_end_to_end(in_folder: Path) -> None:
-    done = armwright("optimize", "target-1", *SHORT)
+    done = armwright("optimize", "target-1", *DRAWN)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert done.stdout.splitlines()[0] == "proposer: rules (no language model is configured; --model names one)"
@@ -57,15 +58,15 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
         assert {f"{name}.png", f"{name}.pdf"} <= figures
     assert list((run / "designs").glob("*/arm.urdf"))
 
-    again = armwright("optimize", "target-1", *SHORT)
+    again = armwright("optimize", "target-1", *DRAWN)
     assert "is finished" in again.stdout
     assert (
         done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4]
         == (again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4])
     )
-    longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
+    longer = armwright("optimize", "target-1", *DRAWN[:-1], "9")
     assert "resumed at trial 10 of 13" in longer.stdout
-    message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
+    message = refused(2, "optimize", "target-1", *DRAWN[:-1], "9", "--seed", "0", "--proposer", "none")
     assert "proposer.name: rules there, None asked" in message
 
 
@@ -83,13 +84,13 @@ def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer
 
 
 def test_what_is_missing_of_a_finished_run_is_made_again(in_folder: Path) -> None:
-    armwright("optimize", "target-1", *SHORT, "--out", "run")
+    armwright("optimize", "target-1", *DRAWN, "--out", "run")
     run = in_folder / "run"
     before = {path.relative_to(run) for path in run.rglob("*")}
     shutil.rmtree(run / "figures")
     shutil.rmtree(run / "designs")
     (run / "front.csv").unlink()
-    assert "is finished" in armwright("optimize", "target-1", *SHORT, "--out", "run").stdout
+    assert "is finished" in armwright("optimize", "target-1", *DRAWN, "--out", "run").stdout
     assert {path.relative_to(run) for path in run.rglob("*")} == before
 
 
@@ -321,6 +322,7 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
         "none",
         "--n-total",
         "2000",
+        "--no-figures",
         "--out",
         "run",
     ]

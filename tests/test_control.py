@@ -229,7 +229,8 @@ def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in
         return designer(request)
 
     chat_server.answer = answer
-    settings = ["optimize", "target-1", "--model", "m", "--base-url", chat_server.url, "--n-total", "6", "--out", "run"]
+    settings = ["optimize", "target-1", "--model", "m", "--base-url", chat_server.url, "--n-total", "6", "--no-figures"]
+    settings += ["--out", "run"]
     command = [sys.executable, "-m", "armwright", *settings]
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
     assert (done.returncode, done.stderr) == (130, "")

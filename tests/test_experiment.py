@@ -208,7 +208,7 @@ def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
     lines = printed.stdout.splitlines()
     assert [line.split()[0] for line in lines] == ["armwright"] * 3
     for line in lines:
-        subprocess.run([sys.executable, "-m", *shlex.split(line)], check=True, capture_output=True)
+        subprocess.run([sys.executable, "-m", *shlex.split(line), "--no-figures"], check=True, capture_output=True)
     result = invoke("experiment", file, "--no-figures")
     assert result.exit_code == 0, result.output
     # A search is asked again whether its budget is spent; nothing is computed.

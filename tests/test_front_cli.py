@@ -16,7 +16,7 @@ def test_front_polish_and_verify_end_to_end(in_folder: Path) -> None:
         assert words in done.stdout
     run = in_folder / "runs" / "target-1-front-seed4"
     assert {"hypervolume.png", "front.png", "arms.pdf"} <= {path.name for path in (run / "figures").iterdir()}
-    more = armwright("front", "target-1", "--budget", "4000", "--seed", "4", "--json")
+    more = armwright("front", "target-1", "--budget", "4000", "--seed", "4", "--no-figures", "--json")
     summary = json.loads(more.stdout)
     assert summary["search"]["evaluations"] >= 4000
     assert summary["folder"] == "runs/target-1-front-seed4"
@@ -34,7 +34,7 @@ def test_front_polish_and_verify_end_to_end(in_folder: Path) -> None:
     again = armwright("optimize", "target-1", *SHORT, "--out", "mine")
     assert "is finished; nothing was computed again" in again.stdout
 
-    begun = armwright("front", "target-1", "--budget", "500", "--from", "mine", "--out", "begun")
+    begun = armwright("front", "target-1", "--budget", "500", "--from", "mine", "--no-figures", "--out", "begun")
     assert begun.returncode == 0, begun.stderr
 
 
@@ -76,7 +76,7 @@ def test_mistakes(in_folder: Path, code: int, args: tuple[str, ...], words: str)
 
 
 def test_a_search_is_not_polished_and_a_study_not_continued_as_a_search(in_folder: Path) -> None:
-    armwright("front", "target-1", "--budget", "300", "--out", "run")
+    armwright("front", "target-1", "--budget", "300", "--no-figures", "--out", "run")
     assert "not a study" in refused(1, "polish", "run")
     assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")
     assert "not a study" in refused(1, "prompt", "--after", "run")

@@ -49,7 +49,7 @@ def pending(folder: Path, out: Path, **how: str) -> AnswerPendingError:
 def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> None:
     command = (
         *(sys.executable, "-m", "armwright", "optimize", "target-1", "--proposer", "manual:ask", "--once"),
-        *("--n-init", "4", "--n-step", "3", "--n-total", "6", "--out", "run"),
+        *("--n-init", "4", "--n-step", "3", "--n-total", "6", "--no-figures", "--out", "run"),
     )
 
     def go(*more: str) -> subprocess.CompletedProcess[str]:

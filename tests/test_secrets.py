@@ -92,7 +92,7 @@ def parrot(server: ChatServer) -> Callable[[Request], Answer]:
 )
 def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wire: str, logs: dict[str, str]) -> None:
     chat_server.answer = parrot(chat_server)
-    how = ("--json",) if logs else ()
+    how = ("--json", "--no-figures") if logs else ()
     done = armwright(
         chat_server, "optimize", "target-1", *SHORT, *model_of(wire, chat_server), "--out", "run", *how, **logs
     )
@@ -145,7 +145,7 @@ def test_no_key_is_on_a_command_line(chat_server: ChatServer, in_folder: Path) -
         return json.dumps(GOOD_DESIGN)
 
     chat_server.answer = answer
-    how = (*model_of("openai", chat_server), "--answer", "one-step", "--live", "--out", "run")
+    how = (*model_of("openai", chat_server), "--answer", "one-step", "--no-figures", "--live", "--out", "run")
     done = armwright(chat_server, "optimize", "target-1", *SHORT, *how)
     assert done.returncode == 0, done.stderr
     own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]

@@ -1,31 +1,23 @@
 """Workers: designs evaluated by other processes, from one shared Optuna study."""
 
-import json
-import os
-import signal
-import subprocess
-import sys
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import optuna
 import pytest
-from optuna.storages import RDBStorage
 
 import armwright as aw
 from armwright.exceptions import EvaluatorError, MissingExtraError, RunConflictError, SettingsError, StorageError
 from armwright.history import History
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.run_folder import read_config, read_run
+from armwright.run_folder import read_run
 from armwright.study import Progress
 from armwright.workers import judging, worker
 from armwright.workers.board import shown_url
-from tests.postgres import PostgresServer
+from tests.boards import optunas
+from tests.torture.lives import trials
 
 TASK = aw.load_task("target-1")
 PROBLEM = aw.Problem(TASK)
@@ -80,28 +72,12 @@ def with_crew(run: Path, n: int, problem: aw.Problem = PROBLEM, **asked: Any) ->
     return found, crew
 
 
-@contextmanager
-def optunas(run: Path) -> Iterator[optuna.Study]:
-    """The study on the board, as Optuna itself opens it."""
-    record = read_config(run).workers
-    assert record is not None
-    storage = RDBStorage(record.storage)
-    yield optuna.load_study(storage=storage, study_name=record.study)
-    storage.remove_session()
-    storage.engine.dispose()
-
-
-def records(run: Path) -> list[dict[str, Any]]:
-    lines = (run / "trials.jsonl").read_text().splitlines()
-    return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in lines]
-
-
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
 def test_one_worker_makes_the_run_of_none(tmp_path: Path, sampler: str) -> None:
     """To the bit: where a design is evaluated changes nothing."""
     aw.optimize(PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=12, sampler=sampler, out=tmp_path / "here")
     found, crew = with_crew(tmp_path / "there", 1, sampler=sampler)
-    assert records(tmp_path / "there") == records(tmp_path / "here")
+    assert trials(tmp_path / "there") == trials(tmp_path / "here")
     assert crew.done == [17 - found.summary["same_arms"]]
 
 
@@ -188,7 +164,7 @@ def test_a_run_that_was_left_goes_on_with_what_workers_did_meanwhile(tmp_path: P
         with pytest.raises(KeyboardInterrupt):
             search(leave_later)
     assert left.is_set()
-    assert records(tmp_path / "run") == []
+    assert trials(tmp_path / "run") == []
     crew = Crew(tmp_path / "run", 1, evaluator=measured)
     crew.begin()
     found = search(lambda _: None)
@@ -289,7 +265,7 @@ def test_a_damaged_database_is_said_at_once(tmp_path: Path) -> None:
     ):
         with pytest.raises(StorageError, match="file is not a database"):
             use()
-    assert len(records(tmp_path / "run")) == 6  # the run itself is unharmed
+    assert len(trials(tmp_path / "run")) == 6  # the run itself is unharmed
 
 
 def test_a_password_is_written_nowhere(tmp_path: Path) -> None:
@@ -297,189 +273,3 @@ def test_a_password_is_written_nowhere(tmp_path: Path) -> None:
     record = aw.Workers(2, "postgresql://ada:secret@host:5432/db").record(tmp_path)
     assert record.storage == "postgresql://ada@host:5432/db"
     assert "secret" not in repr(aw.Workers(2, "postgresql://ada:secret@host/db"))
-
-
-# --- processes of their own on a real PostgreSQL ----------------------------------------------------------------------
-
-EVALUATOR = """
-import hashlib, os, pathlib, time
-import armwright as aw
-
-HERE = pathlib.Path(__file__).parent
-
-@aw.evaluator("reach [m]", "height [m]")
-def measured(arm, task):
-    name = hashlib.sha256(repr(arm).encode()).hexdigest()[:12]
-    with open(HERE / "evaluated", "a") as log:
-        log.write(f"{os.getpid()} {name}\\n")
-    while (HERE / "hold").exists():
-        time.sleep(0.01)
-    return sum(link.length for link in arm.links), 1.0 + arm.base[2]
-"""
-
-
-class Place:
-    """A folder with an evaluator that is held as long as the file `hold` is there."""
-
-    def __init__(self, folder: Path, storage: str) -> None:
-        self.folder = folder
-        self.run = folder / "run"
-        (folder / "sim.py").write_text(EVALUATOR)
-        self._storage = storage
-        self.search_: Future[aw.Run] | None = None
-
-    def search(self, n_total: int = 10, at_a_time: int = 2) -> aw.Run:
-        problem = aw.Problem(
-            TASK.model_copy(update={"reference_point": None}),
-            evaluator=aw.load_evaluator(f"{self.folder}/sim.py:measured"),
-        )
-        return aw.optimize(
-            problem, proposer="rules", n_init=5, n_step=5, n_total=n_total, out=self.run,
-            workers=aw.Workers(at_a_time, self._storage, heartbeat=1), watch=self._hear,
-        )  # fmt: skip
-
-    def _hear(self, progress: Any) -> None:
-        self.heard.append(progress.note)
-        self.news.set()
-
-    def begin(self, n_total: int = 10, at_a_time: int = 2) -> Future[aw.Run]:
-        self.heard: list[str] = []
-        self.news = threading.Event()
-        self.search_ = ThreadPoolExecutor(1).submit(self.search, n_total, at_a_time)
-        return self.search_
-
-    def wait_for(self, there: Callable[[], bool]) -> None:
-        """A bounded wait for something that other processes do."""
-        gone = threading.Event()
-        for _ in range(6000):
-            if there():
-                return
-            if self.search_ is not None and self.search_.done():
-                self.search_.result()  # raises what ended it
-            gone.wait(0.01)
-        raise AssertionError(f"it did not come; heard: {self.heard}, evaluated: {self.evaluated}")
-
-    @contextmanager
-    def workers(self, n: int) -> Iterator[list[subprocess.Popen[str]]]:
-        self.wait_for(lambda: any("armwright worker" in words for words in self.heard))
-        command = [sys.executable, "-m", "armwright", "worker", "run", "--evaluator", "sim.py:measured"]
-        started = [
-            subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-            for _ in range(n)
-        ]
-        try:
-            yield started
-        finally:
-            for process in started:
-                process.kill()
-                process.wait()
-                assert process.stdout is not None
-                process.stdout.close()
-
-    @property
-    def evaluated(self) -> list[tuple[int, str]]:
-        file = self.folder / "evaluated"
-        lines = file.read_text().splitlines() if file.exists() else []
-        return [(int(line.split()[0]), line.split()[1]) for line in lines]
-
-
-@pytest.fixture
-def place(tmp_path: Path, postgres: PostgresServer) -> Place:
-    return Place(tmp_path, postgres.database())
-
-
-@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_the_trial_of_a_killed_worker_is_evaluated_by_another(place: Place) -> None:
-    (place.folder / "hold").touch()
-    search = place.begin()
-    with place.workers(2) as workers:
-        place.wait_for(lambda: len(place.evaluated) == 2)
-        workers[0].kill()
-        workers[0].wait()
-        (place.folder / "hold").unlink()
-        found = search.result()
-        words, _ = workers[1].communicate()
-        assert workers[1].returncode == 0
-        assert "the search is over" in words
-    assert any("is not heard any more" in words for words in place.heard)
-    (twice,) = [name for name, n in Counter(name for _, name in place.evaluated).items() if n > 1]
-    assert {pid for pid, name in place.evaluated if name == twice} == {workers[0].pid, workers[1].pid}
-    assert [trial.number for trial in found.trials] == list(range(15))
-    with optunas(place.run) as study:
-        trials = study.trials
-    states = Counter(trial.state.name for trial in trials)
-    assert states == {"COMPLETE": 15 - found.summary["same_arms"], "FAIL": 1}
-    retry = optuna.storages.RetryHeartbeatStaleTrialCallback
-    assert sum(retry.retried_trial_number(trial) is not None for trial in trials) == 1
-
-
-def test_a_worker_that_is_stopped_gives_its_trial_back_at_once(place: Place) -> None:
-    (place.folder / "hold").touch()
-    search = place.begin()
-    with place.workers(2) as workers:
-        place.wait_for(lambda: len(place.evaluated) == 2)
-        workers[0].send_signal(signal.SIGTERM)
-        words, _ = workers[0].communicate()
-        assert workers[0].returncode == 130
-        assert "Traceback" not in words
-        (place.folder / "hold").unlink()
-        assert len(search.result().trials) == 15
-    assert not any("is not heard any more" in words for words in place.heard)
-
-
-def test_a_worker_that_wakes_too_late_changes_nothing(place: Place) -> None:
-    (place.folder / "hold").touch()
-    search = place.begin()
-    with place.workers(2) as workers:
-        place.wait_for(lambda: len(place.evaluated) == 2)
-        os.kill(workers[0].pid, signal.SIGSTOP)
-        (place.folder / "hold").unlink()
-        found = search.result()
-        os.kill(workers[0].pid, signal.SIGCONT)
-        words, _ = workers[0].communicate()
-        assert workers[0].returncode == 0
-        assert "too late" in words
-    assert [trial.number for trial in found.trials] == list(range(15))
-
-
-def test_a_database_that_is_away_for_a_while_is_waited_for(tmp_path: Path, postgres: PostgresServer) -> None:
-    place = Place(tmp_path, postgres.database())
-    (place.folder / "hold").touch()
-    search = place.begin()
-    with place.workers(2) as workers:
-        place.wait_for(lambda: len(place.evaluated) == 2)
-        postgres.stop("immediate")
-        try:
-            (place.folder / "hold").unlink()
-            place.wait_for(lambda: any("the database does not answer" in words for words in place.heard))
-        finally:
-            postgres.start()
-        found = search.result()
-        assert [process.wait() for process in workers] == [0, 0]
-    assert any("the database answers again" in words for words in place.heard)
-    assert [trial.number for trial in found.trials] == list(range(15))
-    assert set(Counter(name for _, name in place.evaluated).values()) == {1}
-
-
-def test_a_search_that_is_killed_goes_on_with_its_workers(place: Place) -> None:
-    """kill -9 of the search itself, at a moment when designs are under way."""
-    (place.folder / "hold").touch()
-    command = [
-        sys.executable, "-m", "armwright", "optimize", "target-1", "--evaluator", "sim.py:measured", "--workers", "2",
-        "--proposer", "rules", "--n-init", "5", "--n-step", "5", "--n-total", "10", "--no-figures", "--out", "run",
-    ]  # fmt: skip
-    environment = {**os.environ, "ARMWRIGHT_STORAGE": place._storage}
-    place.heard = ["armwright worker"]
-    with subprocess.Popen(command, cwd=place.folder, env=environment, stdout=subprocess.PIPE, text=True) as search:
-        assert search.stdout is not None
-        next(line for line in search.stdout if "start 2 of: armwright worker run" in line)
-        with place.workers(2) as workers:
-            place.wait_for(lambda: len(place.evaluated) == 2)
-            search.kill()
-            search.wait()
-            (place.folder / "hold").unlink()
-            again = subprocess.run(command, cwd=place.folder, env=environment, capture_output=True, text=True)
-            assert again.returncode == 0, again.stderr
-            assert [process.wait() for process in workers] == [0, 0]
-    assert [record["number"] for record in records(place.run)] == list(range(15))
-    assert set(Counter(name for _, name in place.evaluated).values()) == {1}

@@ -197,6 +197,6 @@ def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
     shown = CliRunner().invoke(app, ["tasks", "cover.yaml"]).output
     assert "workspace: box from (0.2, -0.3, 0.1) to (0.5, 0.3, 0.4), 60 points" in shown
     told = CliRunner().invoke(
-        app, ["optimize", "cover.yaml", "--objectives", "torque", "--n-total", "2", "--out", "other"]
+        app, ["optimize", "cover.yaml", "--objectives", "torque", "--n-total", "2", "--no-figures", "--out", "other"]
     )
     assert "the task's workspace counts in none of the objectives (unreached heeds it)" in told.output

@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats as untyped
 
-stats = cast(Any, untyped)  # scipy has no types of its own
 Array = NDArray[np.float64]
 
 LEVEL = 0.05  # of a test
@@ -49,7 +47,7 @@ def interval(values: Sequence[float] | Array, seed: int = 0) -> Interval:
     mean = float(sample.mean())
     if np.ptp(sample) == 0.0:
         return Interval(mean, mean, mean)
-    found = stats.bootstrap(
+    found = _stats().bootstrap(
         (sample,), np.mean, n_resamples=RESAMPLES, method="BCa", rng=np.random.default_rng(seed)
     ).confidence_interval
     return Interval(mean, float(found.low), float(found.high))
@@ -59,6 +57,7 @@ def paired_test(first: Sequence[float] | Array, second: Sequence[float] | Array)
     """Compares (N,) values of one method with those of another, seed by seed."""
     differences = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
     told = differences[differences != 0.0]
+    stats = _stats()
     ranks = stats.rankdata(np.abs(told))
     p = float(stats.wilcoxon(told).pvalue) if len(told) else 1.0
     effect = float(ranks[told > 0.0].sum() - ranks[told < 0.0].sum()) / float(ranks.sum()) if len(told) else 0.0
@@ -82,3 +81,10 @@ def least_p(n: int) -> float:
 def can_reject(n: int) -> bool:
     """Whether n pairs can ever show a difference at 5 %: from six on."""
     return least_p(n) <= LEVEL
+
+
+def _stats() -> Any:
+    """scipy.stats, which takes half a second to load; the page of a single run needs none of it."""
+    from scipy import stats
+
+    return stats

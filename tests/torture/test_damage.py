@@ -66,6 +66,7 @@ FILES = (
     "summary.json",
     "trials.csv",
     "front.csv",
+    "study.db",
     ".lock",
 )
 

@@ -8,7 +8,7 @@ heartbeat; the trial of one that does not is failed, and posted again. All clock
 import threading
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -132,7 +132,7 @@ class Board:
         def tried() -> None:
             nonlocal tries
             tries += 1
-            there = self.posted().get(number) if tries > 1 else None
+            there = self.posted({number}).get(number) if tries > 1 else None
             if there is None or there.state == TrialState.FAIL:
                 post()
 
@@ -143,11 +143,15 @@ class Board:
         if time.monotonic() >= self._stale_from:  # after an outage workers have to be heard first
             self._experimental(lambda: fail_stale_trials(self._study))
 
-    def posted(self) -> dict[int, Posted]:
-        """What has become of each of the search's trials: where one was posted several times, the best of it."""
+    def posted(self, wanted: Container[int] | None = None) -> dict[int, Posted]:
+        """What has become of those of the search's trials: where one was posted several times, the best of it.
+
+        wanted: their numbers; None: of all.
+        """
         found: dict[int, Posted] = {}
         for trial in self._patiently(lambda: self._study.get_trials(deepcopy=False)):
-            if NUMBER in trial.user_attrs:
+            number = trial.user_attrs.get(NUMBER)
+            if number is not None and (wanted is None or number in wanted):
                 posted = self._posted(trial)
                 before = found.get(posted.number)
                 if before is None or _rank(posted) >= _rank(before):

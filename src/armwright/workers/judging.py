@@ -59,8 +59,7 @@ class ByWorkers(Judging):
         if now - self._looked >= SILENT_EVERY:
             self._board.fail_silent()
             self._looked = now
-        posted = self._board.posted()
-        there = {number: posted[number] for number in self._waited_for if number in posted}
+        there = self._board.posted(self._waited_for)
         for trial in there.values():
             if trial.state == TrialState.FAIL:
                 self._again(trial)
