@@ -305,7 +305,7 @@ def test_whoever_is_killed_each_trial_is_recorded_once(
     chance = random.Random(at_a_time)
     crew = Killed(tmp_path, postgres.database(), at_a_time)
     fell: Counter[str] = Counter()
-    wanted = max(1, kills // 20)
+    wanted = max(1, kills // 10)
     for _ in range(wanted):
         goal = min(N_TOTAL, n_lines(tmp_path / "run" / "trials.jsonl") + chance.randint(0, 2 * N_TOTAL // wanted))
         if not crew.wait_for(lambda goal=goal: n_lines(tmp_path / "run" / "trials.jsonl") >= goal):
