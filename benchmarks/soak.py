@@ -4,7 +4,7 @@ A study with the random sampler, one with TPE and one with the rules, each in a 
 same trials on Optuna alone, in memory: ask, suggest, tell, with values that are known beforehand. Then a search for the
 whole front. Each part is a process of its own on one core; times are its processor's, so that others do not count.
 
-    python benchmarks/soak.py --figure docs/soak.png         # some 45 minutes
+    python benchmarks/soak.py --figure docs/soak.png         # some 15 minutes on a quiet machine
     python benchmarks/soak.py --only tpe                     # one part of it
 
 Memory is the resident set. A study keeps all its trials, so its memory grows by the trial, as Optuna's does; what is
