@@ -376,6 +376,32 @@ def test_ctrl_c_ends_the_calls_under_way(
     assert kept == [("check", 1, None), ("reasoning", 1, None), ("parameters", 1, "cancelled")][: 2 + refused]
 
 
+DROPPED = """
+import os, signal, threading
+import armwright.cli as cli
+
+class Finalised:
+    def __del__(self):
+        os.kill(os.getpid(), signal.{name})
+        threading.Event().wait(30)  # here the signal is heeded, and what it raises is dropped
+
+def app():
+    Finalised()
+    threading.Event().wait(30)
+    print("not heeded")
+
+cli.app = app
+cli.main()
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_wish_to_end_that_python_drops_is_heeded(name: str) -> None:
+    """As in finalisers and in callbacks of libraries, where no exception leads out."""
+    done = subprocess.run([sys.executable, "-c", DROPPED.format(name=name)], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
 @pytest.mark.parametrize("width", [60, 120])
 def test_progress_in_a_terminal(width: int) -> None:
     console = Console(file=io.StringIO(), force_terminal=True, width=width, markup=False, highlight=False)

@@ -4,6 +4,7 @@ import os
 import shlex
 import signal
 import sys
+import threading
 from contextlib import suppress
 from dataclasses import asdict
 from io import TextIOWrapper
@@ -41,6 +42,7 @@ def main() -> NoReturn:
     for number in _ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell sets it for what runs in its background
             signal.signal(number, _end)
+    sys.unraisablehook = _heed
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without "³" still shows the rest
@@ -83,6 +85,18 @@ def _end(*_: object) -> None:
     for number in _ENDING:
         signal.signal(number, signal.SIG_DFL)
     raise KeyboardInterrupt
+
+
+def _heed(unraisable: "sys.UnraisableHookArgs") -> None:
+    """A wish to end that fell into a moment when Python drops what is raised (a finaliser, a callback) comes again."""
+    if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+        return
+    for number in _ENDING:
+        signal.signal(number, _end)
+    again = threading.Timer(0.01, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT))
+    again.daemon = True
+    again.start()
 
 
 def _version(asked: bool) -> None:
