@@ -276,3 +276,9 @@ def test_a_number_in_a_template_that_is_too_large(tmp_path: Path) -> None:
     (tmp_path / "mine.md.j2").write_text("{{ 1e999 }}")
     with pytest.raises(SettingsError, match="too large"):
         load_prompt(tmp_path / "mine.md.j2")
+
+
+def test_a_number_in_a_template_of_too_many_digits(tmp_path: Path) -> None:
+    (tmp_path / "mine.md.j2").write_text("{{ " + "9" * 5000 + " }}")
+    with pytest.raises(SettingsError, match="cannot be read: Exceeds the limit"):
+        load_prompt(tmp_path / "mine.md.j2")

@@ -1,6 +1,7 @@
 """Evaluators of one's own."""
 
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from tests.arms import paper_arms
 
 SPACE = aw.paper_space(joints=3)
 TASK = aw.load_task("target-1")
+WHOLE = TASK.model_copy(update={"reference_point": None})  # which is for other objectives than ours
 ARM = paper_arms(1, 3, 0)[0]
 
 
@@ -24,7 +26,7 @@ def measured(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
     return sum(link.length for link in arm.links), len(arm.joints)
 
 
-def raising(fault: Exception) -> aw.Evaluator:
+def raising(fault: BaseException) -> aw.Evaluator:
     def measure(arm: aw.Arm, task: aw.Task) -> float:
         raise fault
 
@@ -32,13 +34,13 @@ def raising(fault: Exception) -> aw.Evaluator:
 
 
 def test_objectives_are_those_that_the_function_names() -> None:
-    problem = aw.Problem(TASK.model_copy(update={"reference_point": None}), SPACE, evaluator=measured)
+    problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
     assert [(o.name, o.unit, o.label, o.words) for o in problem.objectives] == [
         ("reach", "m", "Reach", "How far it reaches."),
         ("joints_used", "", "Joints used", "How far it reaches."),
     ]
     designs = SPACE.sample(4, 0)
-    ours = aw.Problem(TASK.model_copy(update={"reference_point": None}), SPACE, objectives=(LENGTH,))
+    ours = aw.Problem(WHOLE, SPACE, objectives=(LENGTH,))
     assert problem.evaluate(designs)[:, 0] == pytest.approx(ours.evaluate(designs)[:, 0], abs=1e-9)
     assert problem.judge_one(designs[1]).values == tuple(problem.evaluate(designs)[1])
 
@@ -63,6 +65,7 @@ def test_beside_our_objectives_and_constraints() -> None:
         (lambda arm, task: "much", "gave 'much'; 1 numbers are needed"),
         (lambda arm, task: math.nan, "gave energy = nan; it must be a finite number for every arm"),
         (lambda arm, task: np.array([np.inf]), "gave energy = inf; it must be a finite number"),
+        (lambda arm, task: 10**400, "gave energy = inf; it must be a finite number"),
         (lambda arm, task: 1 / 0, r"failed: ZeroDivisionError: division by zero \(test_measuring.py, line \d+\)"),
     ],
 )
@@ -71,19 +74,41 @@ def test_what_a_function_gives_is_checked(made: Callable[[aw.Arm, aw.Task], floa
         aw.evaluator("energy [J]")(made)(ARM, TASK)
 
 
+def test_the_end_of_the_process_is_a_failure_too() -> None:
+    with pytest.raises(EvaluatorError, match="failed: SystemExit: 3"):
+        raising(SystemExit(3))(ARM, TASK)
+    with pytest.raises(KeyboardInterrupt):
+        raising(KeyboardInterrupt())(ARM, TASK)
+
+
+def test_the_working_folder_is_that_of_before(in_folder: Path) -> None:
+    """Where a solver goes elsewhere, the folder of a run is still found by its name."""
+
+    @aw.evaluator("reach [m]", "joints_used", worst=(9.0, 9.0))
+    def elsewhere(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+        os.chdir("/")
+        if len(arm.joints) == 3:
+            raise ValueError
+        return measured.measure(arm, task)  # type: ignore[return-value]
+
+    problem = aw.Problem(WHOLE, SPACE, evaluator=elsewhere)
+    aw.optimize(problem, proposer="none", n_init=2, n_total=2, out="run")
+    assert (in_folder / "run" / "summary.json").is_file()
+    assert Path.cwd() == in_folder
+
+
 def test_one_number_needs_no_tuple() -> None:
     assert aw.evaluator("energy [J]")(lambda arm, task: np.float32(0.5))(ARM, TASK) == (0.5,)
 
 
 def test_a_function_that_fails_counts_the_worst_where_that_is_stated() -> None:
-    whole = TASK.model_copy(update={"reference_point": None})
     design = SPACE.sample(1, 0)[0]
     careful = aw.evaluator("energy [J]", worst=[50])(raising(OSError("no licence")).measure)
-    judged = aw.Problem(whole, SPACE, evaluator=careful).judge_one(design)
+    judged = aw.Problem(WHOLE, SPACE, evaluator=careful).judge_one(design)
     assert judged.values == (50.0,)
     assert "OSError: no licence" in judged.failure
     with pytest.raises(EvaluatorError, match="no licence"):
-        aw.Problem(whole, SPACE, evaluator=raising(OSError("no licence"))).judge_one(design)
+        aw.Problem(WHOLE, SPACE, evaluator=raising(OSError("no licence"))).judge_one(design)
 
 
 @pytest.mark.parametrize(
@@ -96,6 +121,10 @@ def test_a_function_that_fails_counts_the_worst_where_that_is_stated() -> None:
         (lambda: aw.evaluator("Energy")(len), "small letters"),
         (lambda: aw.evaluator("torque")(len), "one of armwright's own"),
         (lambda: aw.Problem(TASK, SPACE, tolerance=0.001, evaluator=measured), "a tolerance does not go with"),
+        (
+            lambda: aw.optimize(aw.Problem(WHOLE, SPACE, evaluator=measured), polish_every=5),
+            "--polish-every does not go with an evaluator",
+        ),
     ],
 )
 def test_what_is_asked_is_checked(make: Callable[[], object], words: str) -> None:
@@ -104,7 +133,7 @@ def test_what_is_asked_is_checked(make: Callable[[], object], words: str) -> Non
 
 
 def test_a_search_for_the_whole_front_needs_our_kernels(tmp_path: Path) -> None:
-    problem = aw.Problem(TASK.model_copy(update={"reference_point": None}), SPACE, evaluator=measured)
+    problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
     with pytest.raises(SettingsError, match="only in `armwright optimize`"):
         aw.find_front(problem, budget=100, out=tmp_path / "front")
 
@@ -146,11 +175,13 @@ def test_a_file_is_loaded_with_what_lies_beside_it(file: Path) -> None:
         ("sim.py:simulat", 'Did you mean "simulate"'),
         ("broken.py:f", r"cannot load broken.py: SyntaxError: .*\(broken.py, line 2\)"),
         ("raises.py:f", r"cannot load raises.py: RuntimeError: at once \(raises.py, line 1\)"),
+        ("exits.py:f", r"cannot load exits.py: SystemExit: 3 \(exits.py, line 1\)"),
     ],
 )
 def test_what_cannot_be_loaded_is_said_in_one_line(file: Path, place: str, words: str) -> None:
     (file.parent / "broken.py").write_text("x = 1\ndef f(:\n")
     (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n")
+    (file.parent / "exits.py").write_text("raise SystemExit(3)\n")
     with pytest.raises(SettingsError, match=words) as raised:
         aw.load_evaluator(place)
     assert "\n" not in str(raised.value)
@@ -158,7 +189,7 @@ def test_what_cannot_be_loaded_is_said_in_one_line(file: Path, place: str, words
 
 def test_a_run_is_resumed_with_its_evaluator_alone(file: Path) -> None:
     """The file may be mended; that is noted. The run folder names it, and never loads it."""
-    task = TASK.model_copy(update={"reference_point": None})
+    task = WHOLE
 
     def run(n_total: int, evaluator: aw.Evaluator | None) -> aw.Run:
         problem = aw.Problem(task, SPACE, evaluator=evaluator)

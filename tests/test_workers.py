@@ -1,21 +1,29 @@
 """Workers: designs evaluated by other processes, from one shared Optuna study."""
 
+import sqlite3
 import threading
+import time
+import types
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import optuna
 import pytest
+from optuna.trial import TrialState
 
 import armwright as aw
 from armwright.exceptions import EvaluatorError, MissingExtraError, RunConflictError, SettingsError, StorageError
-from armwright.history import History
+from armwright.history import FinishedTrial, History
+from armwright.judging import Judged, Judging, judged
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.run_folder import read_run
+from armwright.run_folder import WorkersRecord, read_run
 from armwright.study import Progress
+from armwright.workers import board as board_module
 from armwright.workers import judging, worker
-from armwright.workers.board import shown_url
+from armwright.workers.board import Board, shown_url, sqlite_url
 from tests.boards import optunas
 from tests.torture.lives import trials
 
@@ -174,13 +182,16 @@ def test_a_run_that_was_left_goes_on_with_what_workers_did_meanwhile(tmp_path: P
     assert len(found.trials) == 14
 
 
-def test_an_evaluator_that_fails_stops_the_search_and_its_trial_is_evaluated_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", [ValueError, SystemExit])
+def test_an_evaluator_that_fails_stops_the_search_and_its_trial_is_evaluated_again(
+    tmp_path: Path, kind: type[BaseException]
+) -> None:
     state = {"broken": True}
 
     @aw.evaluator("reach [m]", "height [m]")
     def measured(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
         if state["broken"] and arm.base[2] < 0.0:
-            raise ValueError("below the floor")
+            raise kind("below the floor")
         return sum(link.length for link in arm.links), 1.0 + arm.base[2]
 
     problem = aw.Problem(TASK.model_copy(update={"reference_point": None}), evaluator=measured)
@@ -192,7 +203,7 @@ def test_an_evaluator_that_fails_stops_the_search_and_its_trial_is_evaluated_aga
             workers=aw.Workers(2, heartbeat=1), watch=crew.hear,
         )  # fmt: skip
 
-    with pytest.raises(EvaluatorError, match=r"trial \d+: .* failed: ValueError: below the floor .* same command"):
+    with pytest.raises(EvaluatorError, match=r"trial \d+: .* failed: \w+: below the floor .* same command"):
         search()
     state["broken"] = False
     found = search()
@@ -273,3 +284,167 @@ def test_a_password_is_written_nowhere(tmp_path: Path) -> None:
     record = aw.Workers(2, "postgresql://ada:secret@host:5432/db").record(tmp_path)
     assert record.storage == "postgresql://ada@host:5432/db"
     assert "secret" not in repr(aw.Workers(2, "postgresql://ada:secret@host/db"))
+    assert shown_url("postgresql://ada@host/db?sslpassword=secret&sslmode=require").endswith("/db?sslmode=require")
+    assert shown_url("postgresql://ada:/se[cret@host/db") == "postgresql://ada@host/db"
+
+
+@pytest.mark.parametrize("password", ["s@cret", "p@ss:word"])
+def test_a_password_that_is_no_part_of_a_url_is_not_repeated(password: str) -> None:
+    url = f"postgresql://ada:{password}@host/db"
+    with pytest.raises(SettingsError, match="within the URL @ is %40") as raised:
+        shown_url(url)
+    assert "cret" not in str(raised.value)
+    assert "word@" not in str(raised.value)
+
+
+def test_refinements_come_as_often_as_they_are_due(tmp_path: Path) -> None:
+    """However many trials are under way, and unrecorded, when one is due."""
+    found, _ = with_crew(tmp_path / "run", 3, n_total=20, proposer="none", polish_every=5)
+    assert sum(trial.refines is not None for trial in found.trials) == 19 // 5
+
+
+class Later(Judging):
+    """Workers that were given a trial in an earlier session, and that judge the latest first."""
+
+    at_a_time = 2
+
+    def __init__(self, trials: Sequence[FinishedTrial]) -> None:
+        self._before = trials
+        self._waiting = list(trials)
+
+    def begun(self, recorded: int) -> Sequence[FinishedTrial]:
+        return self._before
+
+    def post(self, trial: FinishedTrial) -> None:
+        self._waiting.append(trial)
+
+    def results(self) -> dict[int, Judged]:
+        trial = self._waiting.pop()
+        return {trial.number: judged(PROBLEM, trial)}
+
+
+def test_an_arm_that_is_drawn_again_before_it_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A later trial, begun in an earlier session, is the arm that an earlier one is drawn with now."""
+    settings: dict[str, Any] = {"proposer": "none", "sampler": "random", "n_init": 2, "n_total": 3}
+    whole = aw.optimize(PROBLEM, **settings)
+    later = FinishedTrial(number=1, source="random", design=whole.trials[0].design, values=())
+    monkeypatch.setattr(aw.Workers, "begin", lambda *_: Later([later]))
+    found = aw.optimize(PROBLEM, **settings, workers=aw.Workers(2), out=tmp_path / "run")
+    assert [trial.number for trial in found.trials] == list(range(5))
+    assert found.trials[0].values == found.trials[1].values == whole.trials[0].values
+    assert found.trials[0].same_as is None
+
+
+def by_workers(file: Path, say: Callable[[str], None] = print) -> judging.ByWorkers:
+    record = WorkersRecord(storage=sqlite_url(file), study="shared", at_a_time=2, heartbeat=1)
+    return judging.ByWorkers(PROBLEM, record.storage, record, say)
+
+
+def begun(number: int, seed: int) -> FinishedTrial:
+    return FinishedTrial(number=number, source="random", design=PROBLEM.space.sample(1, seed)[0], values=())
+
+
+def board_of(file: Path) -> Board:
+    board = Board(sqlite_url(file), "shared", 1, [])
+    board.open()
+    return board
+
+
+def test_another_search_on_the_same_study_is_noticed(tmp_path: Path) -> None:
+    """As of two copies of a run folder."""
+    one, other = by_workers(tmp_path / "db"), by_workers(tmp_path / "db")
+    one.post(begun(0, seed=1))
+    other.post(begun(0, seed=2))
+    with pytest.raises(StorageError, match="trial 0 of the database's study is another design"):
+        one.results()
+    for search in (one, other):
+        search.close()
+
+
+def test_three_workers_that_die_over_a_design_end_the_search(tmp_path: Path) -> None:
+    heard: list[str] = []
+    search = by_workers(tmp_path / "db", heard.append)
+    search.post(begun(7, seed=1))
+    board = board_of(tmp_path / "db")
+
+    def die() -> None:
+        posted = board.claim()
+        assert posted is not None
+        board._storage.set_trial_state_values(board._id(posted.place), TrialState.FAIL)  # as for one that is silent
+
+    for _ in range(2):
+        die()
+        assert search.results() == {}
+    assert heard == ["the worker of trial 7 is not heard any more; another one evaluates it"] * 2
+    die()
+    with pytest.raises(EvaluatorError, match=r"3 workers died over trial 7, .*its design is \{'origin_x'"):
+        search.results()
+    board.close()
+    search.close()
+
+
+def test_nobody_is_dead_who_could_not_be_heard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sign of life of an hour ago: after an outage, at the begin of a search, where the machine slept."""
+    search = by_workers(tmp_path / "db")
+    search.post(begun(0, seed=1))
+    board = board_of(tmp_path / "db")
+    assert board.claim() is not None
+    with closing(sqlite3.connect(tmp_path / "db")) as database:
+        database.execute("UPDATE trial_heartbeats SET heartbeat = datetime('now', '-1 hour')")
+        database.commit()
+
+    def state() -> TrialState:
+        return board.posted()[0].state
+
+    clock = types.SimpleNamespace(monotonic=lambda: at, time=lambda: at, sleep=lambda _: None)
+    at = time.monotonic() + 1.0  # a search that has just begun
+    monkeypatch.setattr(board_module, "time", clock)
+    board.fail_silent()
+    assert state() == TrialState.RUNNING
+    at += 3600.0  # the machine slept
+    board.fail_silent()
+    assert state() == TrialState.RUNNING
+    at += 2.9
+    board.fail_silent()
+    assert state() == TrialState.RUNNING
+    at += 0.2  # in all this time there was no other sign
+    board.fail_silent()
+    assert state() == TrialState.FAIL
+    board.close()
+    search.close()
+
+
+def test_a_study_that_was_deleted_is_said(tmp_path: Path) -> None:
+    search = by_workers(tmp_path / "db")
+    search.post(begun(0, seed=1))
+    optuna.delete_study(study_name="shared", storage=sqlite_url(tmp_path / "db"))
+    with pytest.raises(StorageError, match="the database holds no study shared"):
+        search.results()
+    search.close()
+
+
+def test_a_run_that_goes_on_keeps_its_database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where none is named: it may have come from the environment."""
+    monkeypatch.setenv("ARMWRIGHT_STORAGE", sqlite_url(tmp_path / "shared.db"))
+    with_crew(tmp_path / "run", 1, n_total=1)
+    monkeypatch.delenv("ARMWRIGHT_STORAGE")
+    assert aw.Workers(2).record(tmp_path / "run").storage == sqlite_url(tmp_path / "shared.db")
+    found, _ = with_crew(tmp_path / "run", 1, n_total=3)
+    assert len(found.trials) == 8
+    assert not (tmp_path / "run" / "workers.db").exists()
+    with_crew(tmp_path / "own", 1, n_total=1)
+    (tmp_path / "own").rename(tmp_path / "moved")
+    assert aw.Workers(2).record(tmp_path / "moved").storage == sqlite_url(tmp_path / "moved" / "workers.db")
+
+
+@pytest.mark.parametrize("name", ["a?b", "a%20b", "a{b}"])
+def test_any_folder_may_hold_the_database(tmp_path: Path, name: str) -> None:
+    with_crew(tmp_path / name, 1, n_total=1)
+    assert (tmp_path / name / "workers.db").exists()
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_run_that_could_not_begin_leaves_its_folder_free(tmp_path: Path) -> None:
+    with pytest.raises(StorageError):
+        aw.optimize(PROBLEM, workers=aw.Workers(1, "postgresql://127.0.0.1:1/db"), out=tmp_path / "run")
+    assert len(aw.optimize(PROBLEM, proposer="none", n_init=2, n_total=1, out=tmp_path / "run").trials) == 3

@@ -1,6 +1,7 @@
 """The command line: parses, calls, prints. Heavy imports wait until a command needs them."""
 
 import os
+import re
 import shlex
 import signal
 import sys
@@ -986,10 +987,11 @@ def _problem(
 
 
 def _same_command() -> str:
-    """The command that was given, for a shell."""
-    program = sys.argv[0]
+    """The command that was given, for a shell; a database's password is not repeated."""
+    program, *given = sys.argv
     called = ["python", "-m", "armwright"] if Path(program).name == "__main__.py" else [program]
-    return shlex.join([*called, *sys.argv[1:]])
+    url = r"^((--storage=)?(?!https?:)[a-z0-9+]+://[^:/@]*):.*@"
+    return shlex.join([*called, *(re.sub(url, r"\1@", word) for word in given)])
 
 
 def _print_json(content: Any) -> None:

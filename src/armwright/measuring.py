@@ -10,9 +10,11 @@ import hashlib
 import importlib
 import importlib.util
 import math
+import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from numbers import Real
 from pathlib import Path
@@ -52,10 +54,11 @@ class Evaluator:
     place: str = field(default="", compare=False)
 
     def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
-        """The objectives of an arm; EvaluatorError where the function fails."""
+        """The objectives of an arm; EvaluatorError where the function fails, or asks for the end of its process."""
         try:
-            made = self.measure(arm, task)
-        except Exception as fault:
+            with _staying():
+                made = self.measure(arm, task)
+        except (Exception, SystemExit) as fault:
             raise EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
         names = [objective.name for objective in self.objectives]
         values = _numbers(made)
@@ -126,8 +129,29 @@ def _numbers(made: object) -> tuple[float, ...]:
     if isinstance(made, np.ndarray):
         made = cast("NDArray[Any]", made).tolist()
     several = list(cast("tuple[object, ...]", made)) if isinstance(made, (tuple, list)) else [made]
-    numbers = [float(one) for one in several if isinstance(one, Real)]
+    numbers = [_number(one) for one in several if isinstance(one, Real)]
     return tuple(numbers) if len(numbers) == len(several) else ()
+
+
+def _number(one: Real) -> float:
+    try:
+        return float(one)
+    except OverflowError:
+        return math.inf
+
+
+@contextmanager
+def _staying() -> Generator[None]:
+    """Solvers change the working folder, in which the run's folder may be named."""
+    try:
+        here = os.getcwd()
+    except FileNotFoundError:  # it was deleted, and there is nothing to come back to
+        here = None
+    try:
+        yield
+    finally:
+        if here is not None:
+            os.chdir(here)
 
 
 def _objective(given: str, words: str, name: str) -> Objective:
@@ -151,7 +175,7 @@ def _objective(given: str, words: str, name: str) -> Objective:
 def _module(name: str) -> ModuleType:
     try:
         return importlib.import_module(name)
-    except Exception as fault:
+    except (Exception, SystemExit) as fault:
         raise SettingsError(f"cannot import {name}: {type(fault).__name__}: {fault}") from fault
 
 
@@ -170,7 +194,7 @@ def _file_module(path: Path) -> ModuleType:
     sys.modules[name] = module  # as pickle and dataclasses expect
     try:
         spec.loader.exec_module(module)
-    except Exception as fault:
+    except (Exception, SystemExit) as fault:
         raise SettingsError(f"cannot load {path}: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
     return module
 

@@ -217,6 +217,7 @@ class RunFolder:
         self._lock = FileLock(path / LOCK)
         self._place: os.stat_result | None = None
         self._trials: BinaryIO | None = None
+        self._is_new = False
 
     def __enter__(self) -> Self:
         try:
@@ -247,6 +248,7 @@ class RunFolder:
         if not self._holds_run():
             self._check_free()
             self.write_config(config)
+            self._is_new = True
             return config
         there = read_config(self.path)
         check_same_run(self.path, there, config)
@@ -262,6 +264,11 @@ class RunFolder:
             there = there.model_copy(update={"method": config.method})
             self.write_config(there)
         return there
+
+    def forget(self) -> None:
+        """Takes the settings of a run away that could not begin; those of an earlier session stay."""
+        if self._is_new:
+            (self.path / CONFIG).unlink(missing_ok=True)
 
     def note_versions(self, config: RunConfig, evaluator: Evaluator | None = None) -> RunConfig:
         """The configuration of a run that goes on: where the versions are others now, those before are noted."""

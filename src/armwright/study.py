@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from armwright.canonical import SameArms
 from armwright.control import Channel
-from armwright.exceptions import ModelError, SettingsError, StoppedError
+from armwright.exceptions import ArmwrightError, ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMember, History
 from armwright.judging import Here, Judged, Judging
 from armwright.parameters import Design
@@ -153,6 +153,8 @@ def optimize(
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every, start)
     for design in method.start:
         problem.space.design(design)  # says what is wrong before anything is begun
+    if problem.evaluator is not None and method.polish_every is not None:
+        raise SettingsError("--polish-every does not go with an evaluator: a refinement takes a thousand evaluations")
     check_workers(workers, method, out)
     record = None if workers is None or out is None else workers.record(Path(out))
     config = study_config(problem, method, seed, record)
@@ -247,6 +249,8 @@ class Study:
                     self._record_ready(turns)
                 self._obey(number)
                 self._begin_trial(number, turns)
+                if self._n_waited_for and self._under_way[number].finished.same_as is not None:
+                    self._hear()  # else many such trials would be begun without what is known meanwhile
             while self._n_waited_for:
                 self._hear()
                 if self._n_waited_for:
@@ -261,10 +265,15 @@ class Study:
             self._report("beginning", len(self.trials), "", note=words)
 
         assert self.folder is not None
-        judging = workers.begin(self.problem, record, say)
+        try:
+            judging = workers.begin(self.problem, record, say)
+        except ArmwrightError:  # there is no such database
+            self.folder.forget()
+            raise
         for trial in judging.begun(len(self.trials)):
             optunas, design = self.black_box.inject(trial.design, trial.number, trial.source, trial.proposal)
             self._first_of.setdefault(self._same_arms.key(design), trial.number)
+            self._refined += trial.refines is not None
             self._under_way[trial.number] = _Begun(optunas, trial, None, None, 0.0, 0.0)
             if self._asker is not None and trial.proposal is not None:
                 self._asker.entered(trial.proposal)
@@ -363,7 +372,10 @@ class Study:
         refinement = self._refinement(number) if turn is None else None
         trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
-        same_as = self._first_of.setdefault(self._same_arms.key(design), number)
+        arm = self._same_arms.key(design)
+        same_as = self._first_of.setdefault(arm, number)
+        if same_as > number:  # one that workers were given in an earlier session, and that is recorded later
+            same_as = self._first_of[arm] = number
         finished = _begun(number, source, design, turn)
         if same_as != number:
             finished = replace(finished, same_as=same_as, evaluations=0)
@@ -421,7 +433,6 @@ class Study:
             self._tracker.add(trial.values)
         if trial.fault:
             self._faults[trial.fault] += 1
-        self._refined += trial.refines is not None
 
     def _refinement(self, number: int) -> Refinement | None:
         """A design of the front refined, where one is due."""
@@ -432,7 +443,10 @@ class Study:
         if self._refined >= due:
             return None
         history = self._history()
-        return refine_one(history, self.config.seed) if history.front else None  # else nothing is feasible yet
+        if not history.front:  # nothing is feasible yet
+            return None
+        self._refined += 1
+        return refine_one(history, self.config.seed)
 
     def _ask(self, number: int, turn: Turn | None, refinement: Refinement | None) -> tuple[Any, Design, str]:
         """Optuna's trial with the design to evaluate, and where it comes from."""

@@ -113,6 +113,8 @@ class Prompt:
             raise SettingsError(f"prompt {self.name}, line {fault.lineno}: {fault.message}") from fault
         except (RecursionError, SyntaxError) as fault:  # the latter of the Python that jinja makes of it
             raise SettingsError(f"prompt {self.name} is nested too deeply") from fault
+        except ValueError as fault:  # of Python, by a number of thousands of digits
+            raise SettingsError(f"prompt {self.name} cannot be read: {str(fault)[:80]}") from fault
         known = {*VARIABLES, *_sandbox().globals, *_exported(tree)}
         for other in set(meta.find_referenced_templates(tree)) - {None}:
             there = _sandbox().list_templates()

@@ -8,12 +8,12 @@ heartbeat; the trial of one that does not is failed, and posted again. All clock
 import threading
 import time
 import warnings
-from collections.abc import Callable, Container, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Container, Generator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import optuna
 from filelock import FileLock
@@ -28,6 +28,9 @@ from armwright.extras import command
 from armwright.files import writable
 from armwright.problem import Judgement
 from armwright.sampling import quietly
+
+if TYPE_CHECKING:
+    from sqlalchemy import Engine
 
 # Attributes of a posted trial.
 BEGUN = "armwright"  # the trial as it was begun (`run_folder.begun_record`)
@@ -76,7 +79,9 @@ class Board:
         self._constraints = tuple(constraints)
         self._heartbeat = heartbeat
         self._say = say
-        self._stale_from = 0.0  # [s, monotonic] from when on silent workers count as dead
+        self._looked = 0.0  # [s since 1970] for silent workers, the last time
+        self._stale_from = 0.0  # [s, monotonic] from when on they count as dead
+        self._hear_first()  # the database may just be back
         file = _sqlite_file(url)
         # SQLite has no row locks: two workers could claim one trial.
         self._claiming = nullcontext() if file is None else FileLock(file.with_name(f".{file.name}.claim"))
@@ -96,12 +101,7 @@ class Board:
 
     def open(self) -> None:
         """Finds the study; StorageError where there is none."""
-        try:
-            self._study = self._patiently(lambda: optuna.load_study(storage=self._storage, study_name=self._name))
-        except KeyError as fault:
-            raise StorageError(
-                f"the database holds no study {self._name}; begin it with armwright optimize ... --workers N"
-            ) from fault
+        self._study = self._patiently(lambda: optuna.load_study(storage=self._storage, study_name=self._name))
 
     def close(self) -> None:
         """Ends all connections."""
@@ -120,8 +120,7 @@ class Board:
 
     def post_again(self, posted: Posted) -> None:
         """Lets workers evaluate a failed trial once more, as Optuna does with the trial of a dead worker."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ExperimentalWarning)  # since Optuna 2.8
+        with _without_warnings():
             retry = RetryHeartbeatStaleTrialCallback()
         self._once(lambda: retry(self._study, _without_marks(self._study.trials[posted.place])), posted.number)
 
@@ -140,8 +139,20 @@ class Board:
 
     def fail_silent(self) -> None:
         """Fails the trials of workers that show no sign of life any more."""
-        if time.monotonic() >= self._stale_from:  # after an outage workers have to be heard first
-            self._experimental(lambda: fail_stale_trials(self._study))
+        before, self._looked = self._looked, time.time()
+        if not 0.0 <= self._looked - before <= SIGNS_MISSED * self._heartbeat:  # this machine slept, or all of it did
+            self._hear_first()
+        if time.monotonic() < self._stale_from:
+            return
+        try:
+            with _without_warnings():
+                fail_stale_trials(self._study)
+        except StorageInternalError:  # waited for by the next call, and then again
+            self._hear_first()
+
+    def _hear_first(self) -> None:
+        """Nobody counts as dead before there was time to be heard: after an outage, and where the clock leapt."""
+        self._stale_from = time.monotonic() + SIGNS_MISSED * self._heartbeat
 
     def posted(self, wanted: Container[int] | None = None) -> dict[int, Posted]:
         """What has become of those of the search's trials: where one was posted several times, the best of it.
@@ -252,9 +263,8 @@ class Board:
         )
 
     def _experimental(self, call: Callable[[], object]) -> None:
-        """The same for what Optuna warns of: metric names since 3.2, heartbeats since 2.9."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ExperimentalWarning)
+        """The same for what Optuna warns of."""
+        with _without_warnings():
             self._patiently(call)
 
     def _patiently(self, call: Callable[[], Made]) -> Made:
@@ -276,10 +286,15 @@ class Board:
                         "is safe there; the same command goes on"
                     ) from fault
                 time.sleep(BETWEEN_TRIES)
+            except KeyError as fault:  # Optuna's word for a study, or a trial of it, that is not there
+                raise StorageError(
+                    f"the database holds no study {self._name}, or not all of it; armwright optimize ... --workers N "
+                    "begins it"
+                ) from fault
             else:
                 if until is not None:
                     self._say("the database answers again")
-                    self._stale_from = time.monotonic() + SIGNS_MISSED * self._heartbeat
+                    self._hear_first()
                 return made
 
 
@@ -306,7 +321,7 @@ class Heartbeats:
         while not self._over.wait(self._interval):
             try:
                 self._beat()
-            except StorageInternalError:
+            except Exception:  # noqa: BLE001 whatever it is, who evaluates will meet it, too
                 continue  # the database is away; the next sign may reach it
 
 
@@ -317,19 +332,23 @@ def shown_url(url: str) -> str:
 
     try:
         parsed = make_url(url)
-    except ArgumentError:
+    except (ArgumentError, ValueError):
+        parsed = None
+    if parsed is None or "@" in (parsed.host or ""):  # the latter by an @ in a password
         raise SettingsError(
             '--storage: a URL such as "postgresql://user@host/database" is needed, with the password in PGPASSWORD or '
-            "~/.pgpass"
-        ) from None
-    query = {name: value for name, value in parsed.query.items() if name != "password"}
+            "~/.pgpass; within the URL @ is %40, : is %3A, / is %2F"
+        )
+    query = {name: value for name, value in parsed.query.items() if "password" not in name.lower()}
     shown = URL.create(parsed.drivername, parsed.username, None, parsed.host, parsed.port, parsed.database, query)
     return shown.render_as_string()
 
 
 def sqlite_url(file: Path) -> str:
     """Of a database that is a file, for workers on the same machine."""
-    return f"sqlite:///{file.resolve()}"
+    from sqlalchemy import URL
+
+    return URL.create("sqlite", database=str(file.resolve())).render_as_string()
 
 
 def _sqlite_file(url: str) -> Path | None:
@@ -351,14 +370,16 @@ def _storage(url: str, heartbeat: int) -> RDBStorage:
         raise SettingsError(f"--storage: there is no folder {file.parent}")
     connecting = {} if file is None else {"timeout": SQLITE_TIMEOUT}
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ExperimentalWarning)  # heartbeats
-            return RDBStorage(
-                _with_driver(url),
+        with _without_warnings():
+            storage = RDBStorage(
+                _with_driver(url).replace("{", "{{").replace("}", "}}"),  # Optuna has a word of its own in braces
                 engine_kwargs={"pool_pre_ping": True, "connect_args": connecting},
                 heartbeat_interval=heartbeat,
                 grace_period=SIGNS_MISSED * heartbeat,
             )
+        if storage.engine.dialect.name == "postgresql":
+            _keep_time_in_utc(storage.engine)
+        return storage
     except ImportError as fault:
         raise MissingExtraError(
             f"{shown_url(url)} needs a driver ({fault.__cause__ or fault}): {command('distributed')} brings that of "
@@ -366,8 +387,29 @@ def _storage(url: str, heartbeat: int) -> RDBStorage:
         ) from fault
     except ArgumentError as fault:  # a kind of database that SQLAlchemy does not know
         raise SettingsError(f"--storage {shown_url(url)}: {_cause(fault)}") from fault
-    except (SQLAlchemyError, StorageInternalError) as fault:
+    except (SQLAlchemyError, StorageInternalError, RuntimeError) as fault:  # the last for tables of another Optuna
         raise StorageError(f"cannot use {shown_url(url)}: {_cause(fault)}") from fault
+
+
+def _keep_time_in_utc(engine: "Engine") -> None:
+    """Signs of life are written without a time zone: the end of summer time must not look like an hour of silence."""
+    from sqlalchemy import event
+
+    def begin(connection: Any, _record: object) -> None:
+        with connection.cursor() as cursor:
+            cursor.execute("SET TIME ZONE 'UTC'")
+        connection.commit()
+
+    event.listen(engine, "connect", begin)
+    engine.dispose()  # what is connected already
+
+
+@contextmanager
+def _without_warnings() -> Generator[None]:
+    """Of what Optuna still calls experimental: heartbeats since 2.9, metric names since 3.2."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ExperimentalWarning)
+        yield
 
 
 def _with_driver(url: str) -> str:

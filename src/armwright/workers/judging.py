@@ -1,13 +1,15 @@
 """The search's side of the board: posts trials, and collects what workers make of them."""
 
+import json
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from optuna.study import StudyDirection
 from optuna.trial import TrialState
 
-from armwright.exceptions import EvaluatorError
+from armwright.exceptions import EvaluatorError, StorageError
 from armwright.history import FinishedTrial
 from armwright.judging import Judged, Judging
 from armwright.problem import Problem
@@ -30,7 +32,7 @@ class ByWorkers(Judging):
         self._distributions = distributions(problem.space)
         self._say = say
         self._deaths: Counter[int] = Counter()
-        self._waited_for: set[int] = set()
+        self._waited_for: dict[int, Any] = {}  # by number, as they were begun
         self._looked = self._heard = time.monotonic()
         self._told_lonely = False
         self._board = Board(url, record.study, record.heartbeat, [c.words for c in problem.constraints], say)
@@ -44,14 +46,15 @@ class ByWorkers(Judging):
         for number, posted in there.items():
             if posted.state == TrialState.FAIL:
                 self._board.post_again(posted)
-            self._waited_for.add(number)
+            self._waited_for[number] = posted.begun
         return trials
 
     def post(self, trial: FinishedTrial) -> None:
         """Posts it."""
         params = self._space.searched(trial.design)
-        self._board.post(begun_record(trial), params, {name: self._distributions[name] for name in params})
-        self._waited_for.add(trial.number)
+        record = json.loads(json.dumps(begun_record(trial)))  # as the database gives it back
+        self._board.post(record, params, {name: self._distributions[name] for name in params})
+        self._waited_for[trial.number] = record
 
     def results(self) -> dict[int, Judged]:
         """Those that have come; EvaluatorError where an evaluator failed, or workers die over a trial."""
@@ -60,11 +63,17 @@ class ByWorkers(Judging):
             self._board.fail_silent()
             self._looked = now
         there = self._board.posted(self._waited_for)
-        for trial in there.values():
+        for number, trial in there.items():
+            if trial.begun != self._waited_for[number]:
+                raise StorageError(
+                    f"trial {number} of the database's study is another design than this search's: another search "
+                    "uses the study, too. Copies of a run folder need one of their own: begin anew with another --out"
+                )
             if trial.state == TrialState.FAIL:
                 self._again(trial)
         found = {n: Judged(trial.judgement, trial.seconds) for n, trial in there.items() if trial.judgement is not None}
-        self._waited_for -= found.keys()
+        for number in found:
+            del self._waited_for[number]
         self._listen(bool(found) or any(trial.state == TrialState.RUNNING for trial in there.values()))
         if not found:
             time.sleep(LOOK_EVERY)

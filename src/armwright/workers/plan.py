@@ -11,7 +11,7 @@ from armwright.exceptions import SettingsError
 from armwright.judging import Judging
 from armwright.measuring import Evaluator
 from armwright.problem import Problem
-from armwright.run_folder import WorkersRecord
+from armwright.run_folder import CONFIG, WorkersRecord, read_config
 
 STORAGE_VARIABLE = "ARMWRIGHT_STORAGE"
 FILE = "workers.db"
@@ -39,13 +39,12 @@ class Workers:
             )
 
     def record(self, out: Path) -> WorkersRecord:
-        """What a new run's settings say of them; the database's password never."""
+        """What a run's settings say of them; the database's password never."""
         from armwright.workers.board import shown_url
 
         name = f"armwright-{out.resolve().name}-{secrets.token_hex(4)}"
-        return WorkersRecord(
-            storage=shown_url(self._url(out)), study=name, at_a_time=self.at_a_time, heartbeat=self.heartbeat
-        )
+        url = shown_url(self._url(out))
+        return WorkersRecord(storage=url, study=name, at_a_time=self.at_a_time, heartbeat=self.heartbeat)
 
     def begin(self, problem: Problem, record: WorkersRecord, say: Callable[[str], None]) -> Judging:
         """The search's side of them."""
@@ -61,6 +60,11 @@ class Workers:
         return f"designs wait for workers; start {self.at_a_time} of: {shlex.join(words)}"
 
     def _url(self, out: Path) -> str:
+        """As it is named, else as a run that goes on has it, else a file in its folder, wherever that is now."""
         from armwright.workers.board import sqlite_url
 
-        return self.storage or os.environ.get(STORAGE_VARIABLE) or sqlite_url(out / FILE)
+        named = self.storage or os.environ.get(STORAGE_VARIABLE)
+        if named is None and (out / CONFIG).is_file():
+            before = read_config(out).workers
+            named = None if before is None or before.storage.endswith(f"/{FILE}") else before.storage
+        return named or sqlite_url(out / FILE)

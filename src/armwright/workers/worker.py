@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from armwright.exceptions import EvaluatorError, SettingsError
+from armwright.exceptions import ArmwrightError, SettingsError
 from armwright.judging import judged
 from armwright.measuring import Evaluator
 from armwright.problem import Problem
@@ -60,14 +60,21 @@ def _evaluate(board: Board, posted: Posted, problem: Problem, say: Callable[[str
     try:
         with board.living(posted):
             found = judged(problem, read_begun(posted.begun, problem.space))
-    except EvaluatorError as failure:
+    except ArmwrightError as failure:
         board.fail(posted, str(failure))
         say(f"trial {posted.number}: {failure}")
         return False
-    except BaseException:
-        board.give_back(posted)  # stopped, or broken in a way that another worker may not be
+    except Exception as fault:
+        board.fail(posted, f"{type(fault).__name__}: {fault}")  # so that no other worker meets it, too
         raise
-    is_needed = board.tell(posted, found.judgement, found.seconds)
+    except BaseException:
+        board.give_back(posted)  # stopped
+        raise
+    try:
+        is_needed = board.tell(posted, found.judgement, found.seconds)
+    except KeyboardInterrupt:
+        board.tell(posted, found.judgement, found.seconds)  # what is evaluated is not evaluated again
+        raise
     values = ", ".join(f"{value:.4g}" for value in found.judgement.values)
     late = "" if is_needed else "; too late, another worker had told its values"
     say(f"trial {posted.number}: {values} ({found.seconds:.1f} s){late}")
