@@ -12,7 +12,7 @@ demo: .venv/.run  ## search an arm for the task target-1 and say where the resul
 test: .venv/.test  ## the whole suite
 	$(BIN)/python -m pytest
 
-torture: .venv/.test  ## faults by the hundred, among them 200 kills; a quarter of an hour on two cores (docs/reliability.md)
+torture: .venv/.test  ## faults by the hundred, among them 200 kills; some ten minutes on two cores (docs/reliability.md)
 	$(BIN)/python -m pytest tests/torture --kills 200 --dist load --maxschedchunk 1
 
 check: .venv/.test .venv/.check  ## format, lint, types, import staircase

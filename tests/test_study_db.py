@@ -31,6 +31,7 @@ from armwright.exceptions import RunFolderError
 from armwright.exporting import export_study
 from armwright.front import find_front
 from armwright.history import History
+from armwright.optuna_storage import artifact_ids
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.results import read_summary
@@ -288,6 +289,44 @@ def test_one_goes_on_with_it_and_loses_nothing_when_the_run_goes_on_too(tmp_path
     assert not (folder / "study-2.db").exists(), "nobody had changed that one"
     with opened(folder / STUDY_DB) as study:
         assert len(study.trials) == 25
+
+
+def test_nsga2_goes_on_from_the_parents_of_the_run(run: Path) -> None:
+    _, history = read_run(run)
+    noted = {name: ids for trial in history for name, ids in trial.sampler_notes.get("study", {}).items()}
+    assert noted
+    sampler = optuna.samplers.NSGAIISampler()
+    with opened(run / STUDY_DB) as study:
+        for name, numbers in noted.items():
+            assert ":parent:" in name
+            parents = sampler.get_parent_population(study, int(name.rpartition(":")[2]))
+            assert sorted(trial.number for trial in parents) == sorted(numbers)
+
+
+def test_one_that_is_kept_keeps_its_arms(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    optimize(Problem(load_task("target-1")), proposer="none", n_total=6, out=folder)
+    with opened(folder / STUDY_DB) as study:
+        save_note(study, "mine")
+    assert exported(folder).exit_code == 0
+    optimize(Problem(load_task("target-1")), proposer="none", n_total=20, out=folder)
+    named = {file.name: artifact_ids(file) for file in folder.glob("*.db")}
+    assert named["study-1.db"] - named[STUDY_DB], "the front has moved on"
+    assert {path.name for path in (folder / ARTIFACTS).iterdir()} == named["study-1.db"] | named[STUDY_DB]
+
+
+def test_a_journal_of_somebody_else_s_is_taken_for_no_part_of_it(plain: Path, tmp_path: Path) -> None:
+    _, history = read_run(plain)
+    (tmp_path / "a.db-journal").write_bytes(b"of a file that is gone")
+    assert write_study(plain, history, None, tmp_path / "a.db").kept is None
+    assert (tmp_path / "a-1.db-journal").exists()
+    assert not (tmp_path / "a.db-journal").exists()
+
+
+def test_a_name_that_is_no_text(tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"run-\xff")
+    optimize(Problem(load_task("target-1")), proposer="none", n_init=2, n_total=1, out=folder)
+    assert (folder / STUDY_DB).exists()
 
 
 def test_an_interrupted_run_that_goes_on_takes_it_away(tmp_path: Path) -> None:

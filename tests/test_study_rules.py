@@ -245,3 +245,43 @@ def test_after_one_trial_it_goes_far_from_it() -> None:
     assert (proposal.id, proposal.reason) == ("rules-0001-far", "far from all trials")
     assert proposal.params["depth"] > 5
     assert math.log10(proposal.params["lr"]) > -2
+
+
+def test_what_was_enqueued_need_not_be_in_the_space() -> None:
+    """Of another kind of design that no trial has shown yet, or of a name that nobody suggests."""
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+    study.enqueue_trial({"kind": "a", "x": 0.5, "old": 3})
+    study.enqueue_trial({"kind": "b", "y": 0.5})
+
+    def objective(trial: optuna.Trial) -> float:
+        return trial.suggest_float("x" if trial.suggest_categorical("kind", ["a", "b"]) == "a" else "y", 0.0, 1.0)
+
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=2)
+    study.optimize(objective, n_trials=8, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (4, {})
+
+
+@pytest.mark.parametrize("much", [math.inf, 1e300])
+def test_constraints_may_be_broken_without_end(much: float) -> None:
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+
+    def objective(trial: optuna.Trial) -> float:
+        x = trial.suggest_float("x", 0.0, 1.0)
+        trial.set_constraint("c", -1.0 if trial.number == 3 else much * (1.0 + x))
+        return x
+
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=2)
+    study.optimize(objective, n_trials=40, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (20, {})
+
+
+def test_choices_that_cannot_be_told_apart_are_none() -> None:
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+
+    def objective(trial: optuna.Trial) -> float:
+        trial.suggest_categorical("c", ["a", "a"])
+        return trial.suggest_float("x", 0.0, 1.0)
+
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=2)
+    study.optimize(objective, n_trials=40, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (20, {})

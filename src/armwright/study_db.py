@@ -9,17 +9,18 @@ import json
 import re
 import shlex
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from uuid import UUID, uuid5
 
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
-from armwright.files import replace_file
+from armwright.files import replace_file, writable
 from armwright.history import FinishedTrial, History
 from armwright.llm.words import one_line
 from armwright.optuna_storage import StoredStudy, StoredTrial, artifact_ids, as_sqlite, is_untouched, trial_id
@@ -86,21 +87,26 @@ def discard_study(run: Path) -> None:
 
 
 def _remove_artifacts(target: Path, needed: set[str]) -> None:
-    """Takes away what the study.db that is there names, but for what is needed."""
+    """Takes away what the study.db that is there names, but for what is needed, by others beside it, too."""
     if target.exists():
-        for id_ in artifact_ids(target) - needed:
+        others = [file for file in target.parent.glob(f"*{target.suffix}") if file != target and file.is_file()]
+        for id_ in artifact_ids(target).difference(needed, *map(artifact_ids, others)):
             (target.with_name(ARTIFACTS) / id_).unlink(missing_ok=True)
 
 
 def _set_aside(target: Path) -> Path | None:
-    """Renames a file that is there and is not as we wrote it; returns where it is then."""
+    """Renames a file that is there and is not as we wrote it; returns where it is then.
+
+    What SQLite keeps beside it goes first: else it could be taken for a part of the next file of that name.
+    """
     beside = [side for side in BESIDE if target.with_name(target.name + side).exists()]
-    if not target.exists() or (is_untouched(target) and not beside):
+    if not beside and (not target.exists() or is_untouched(target)):
         return None
     kept = next(p for n in count(1) if not (p := target.with_name(f"{target.stem}-{n}{target.suffix}")).exists())
-    for side in ("", *beside):
-        target.with_name(target.name + side).rename(kept.with_name(kept.name + side))
-    return kept
+    for side in (*beside, ""):
+        with suppress(FileNotFoundError):  # whoever wrote it has just ended
+            target.with_name(target.name + side).rename(kept.with_name(kept.name + side))
+    return kept if kept.exists() else None
 
 
 def _verdicts(history: History, summary: Mapping[str, Any] | None) -> dict[int, str]:
@@ -124,7 +130,7 @@ class _RunAsStudy:
         from optuna.distributions import distribution_to_json
 
         return StoredStudy(
-            name=self.run.resolve().name,
+            name=writable(self.run.resolve().name),
             metric_names=[objective.name for objective in self.history.problem.objectives],
             distributions={name: distribution_to_json(each) for name, each in self._distributions.items()},
             trials=self._trials(),
@@ -208,7 +214,7 @@ class _RunAsStudy:
         """What samplers noted on the study; notes of the study and of single trials for optuna-dashboard."""
         noted: dict[str, Any] = {}
         for trial in self.history:
-            noted |= trial.sampler_notes.get("study", {})
+            noted |= {name: _by_id(name, note) for name, note in trial.sampler_notes.get("study", {}).items()}
         noted |= _note("", self._words())
         for trial in self.history:
             words = self._trial_words(trial)
@@ -239,6 +245,14 @@ class _RunAsStudy:
             f"Why {trial.source} proposed it: {trial.reason}" if trial.reason else "",
         ]
         return "\n\n".join(_plain(part) for part in words if part)
+
+
+def _by_id(name: str, note: Any) -> Any:
+    """A sampler's note for this file: who the parents of a generation are, genetic samplers note by the trials' ids.
+
+    In the memory that a study runs in, these are the numbers.
+    """
+    return list(map(trial_id, cast("list[int]", note))) if ":parent:" in name else note
 
 
 def _duration(trial: FinishedTrial) -> timedelta:

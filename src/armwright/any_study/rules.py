@@ -64,8 +64,9 @@ class Standing:
 
     @property
     def choices(self) -> list[str]:
-        """The parameters that are choices, between two or more."""
-        return [n for n, d in self.space.items() if isinstance(d, CategoricalDistribution) and not d.single()]
+        """The parameters that are choices, between two or more that can be told apart."""
+        categories = {n: d for n, d in self.space.items() if isinstance(d, CategoricalDistribution)}
+        return [n for n, d in categories.items() if len({value_text(choice, d) for choice in d.choices}) > 1]
 
 
 class StudyRulesProposer(StudyProposer):
@@ -103,7 +104,7 @@ def standing_of(study: optuna.Study, space: Space, name: str) -> Standing:
     known = [(trial, params) for trial in finite if (params := held(trial.params, space))]
     complete = [trial for trial, _ in known]
     values = minimised(complete, study.directions)
-    broken = np.array([[violation(trial)] for trial in complete]).reshape(len(complete), 1)
+    broken = in_order([violation(trial) for trial in complete])[:, None]
     chosen = {trial.number for trial in best_trials(complete, study.directions)}
     rows = [i for i in by_rising(values[:, 0]) if complete[i].number in chosen]
     if len(rows) < 2:  # a lonely best one has no neighbour but the next best
@@ -113,6 +114,12 @@ def standing_of(study: optuna.Study, space: Space, name: str) -> Standing:
     return Standing(space, tuple(complete), params, ranked(values, broken), tuple(rows), tried, name)
 
 
+def in_order(violations: Sequence[float]) -> NDArray[np.float64]:
+    """(N,) 0 for what is feasible, 1 for the least violation, 2 for the next, ...: some are infinite, or nearly so."""
+    found = np.array(violations, dtype=np.float64)
+    return np.searchsorted(np.unique(found[found > 0.0]), found, side="right").astype(np.float64)
+
+
 def by_rising(values: NDArray[np.float64]) -> list[int]:
     """The rows of (N,) values, the least first."""
     order: list[int] = np.argsort(values, kind="stable").tolist()
@@ -120,11 +127,12 @@ def by_rising(values: NDArray[np.float64]) -> list[int]:
 
 
 def held(params: Mapping[str, Any], space: Space) -> Params:
-    """What of a trial's parameters lies in the space."""
+    """What of a trial's parameters lies in the space; one that was enqueued may name what no trial has had."""
     found: Params = {}
     for name, value in params.items():
         try:
-            found[name] = checked_value(name, value, space[name])
+            if name in space:
+                found[name] = checked_value(name, value, space[name])
         except DesignError:
             continue
     return found
