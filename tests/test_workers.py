@@ -289,12 +289,18 @@ def test_a_password_is_written_nowhere(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("password", ["s@cret", "p@ss:word"])
-def test_a_password_that_is_no_part_of_a_url_is_not_repeated(password: str) -> None:
+def test_a_password_that_is_no_part_of_a_url_is_not_repeated(tmp_path: Path, password: str) -> None:
     url = f"postgresql://ada:{password}@host/db"
-    with pytest.raises(SettingsError, match="within the URL @ is %40") as raised:
-        shown_url(url)
-    assert "cret" not in str(raised.value)
-    assert "word@" not in str(raised.value)
+    with_crew(tmp_path / "run", 1, n_total=1)
+    for use in (
+        lambda: shown_url(url),
+        lambda: aw.work(tmp_path / "run", storage=url),
+        lambda: aw.optimize(PROBLEM, workers=aw.Workers(1, url), out=tmp_path / "other"),
+    ):
+        with pytest.raises(SettingsError, match="within the URL @ is %40") as raised:
+            use()
+        assert "cret" not in str(raised.value)
+        assert "word@" not in str(raised.value)
 
 
 def test_refinements_come_as_often_as_they_are_due(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from armwright.problem import Judgement
 from armwright.sampling import quietly
 
 if TYPE_CHECKING:
-    from sqlalchemy import Engine
+    from sqlalchemy import URL, Engine
 
 # Attributes of a posted trial.
 BEGUN = "armwright"  # the trial as it was begun (`run_folder.begun_record`)
@@ -327,7 +327,17 @@ class Heartbeats:
 
 def shown_url(url: str) -> str:
     """The URL of a database without its password; SettingsError where it is none."""
-    from sqlalchemy import URL, make_url
+    from sqlalchemy import URL
+
+    parsed = _parsed(url)
+    query = {name: value for name, value in parsed.query.items() if "password" not in name.lower()}
+    shown = URL.create(parsed.drivername, parsed.username, None, parsed.host, parsed.port, parsed.database, query)
+    return shown.render_as_string()
+
+
+def _parsed(url: str) -> "URL":
+    """SettingsError, which does not repeat it, where it is none."""
+    from sqlalchemy import make_url
     from sqlalchemy.exc import ArgumentError
 
     try:
@@ -339,9 +349,7 @@ def shown_url(url: str) -> str:
             '--storage: a URL such as "postgresql://user@host/database" is needed, with the password in PGPASSWORD or '
             "~/.pgpass; within the URL @ is %40, : is %3A, / is %2F"
         )
-    query = {name: value for name, value in parsed.query.items() if "password" not in name.lower()}
-    shown = URL.create(parsed.drivername, parsed.username, None, parsed.host, parsed.port, parsed.database, query)
-    return shown.render_as_string()
+    return parsed
 
 
 def sqlite_url(file: Path) -> str:
@@ -352,9 +360,7 @@ def sqlite_url(file: Path) -> str:
 
 
 def _sqlite_file(url: str) -> Path | None:
-    from sqlalchemy import make_url
-
-    parsed = make_url(url)
+    parsed = _parsed(url)
     if not parsed.drivername.startswith("sqlite"):
         return None
     if not parsed.database or parsed.database == ":memory:":
