@@ -47,11 +47,8 @@ def interval(values: Sequence[float] | Array, seed: int = 0) -> Interval:
     mean = float(sample.mean())
     if np.ptp(sample) == 0.0:
         return Interval(mean, mean, mean)
-    found = (
-        _stats()
-        .bootstrap((sample,), np.mean, n_resamples=RESAMPLES, method="BCa", rng=np.random.default_rng(seed))
-        .confidence_interval
-    )
+    rng = np.random.default_rng(seed)
+    found = _stats().bootstrap((sample,), np.mean, n_resamples=RESAMPLES, method="BCa", rng=rng).confidence_interval
     return Interval(mean, float(found.low), float(found.high))
 
 

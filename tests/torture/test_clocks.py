@@ -77,7 +77,8 @@ def test_a_search_and_an_experiment_under_a_clock_that_jumps(
     tmp_path: Path, clock: dict[str, str], record_property: Tell
 ) -> None:
     asked = ("front", "target-1", "--budget", "5000", "--out")
-    assert armwright(*asked, tmp_path / "whole", "--no-figures").returncode == 0
+    done = armwright(*asked, tmp_path / "whole", "--no-figures")
+    assert (done.returncode, done.stderr) == (0, "")
     done = armwright(*asked, tmp_path / "run", environment=clock)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "run/trials.jsonl").read_bytes() == (tmp_path / "whole/trials.jsonl").read_bytes()
