@@ -49,7 +49,6 @@ LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/
 # Pages whose programs are run elsewhere, where what comes of them is looked at, too.
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 SAME_AS_README = {("docs/tasks.md", "armwright optimize my-task.yaml")}
-TRANSLATED = "README.ja.md"  # its commands are those of README.md, which are run there
 
 LONGEST_WAIT = 900.0  # [s] for a command: one that waits for something that never comes is a fault of the page
 
@@ -221,23 +220,7 @@ def file_of(block: Block) -> str | None:
     return found[1] if found else None
 
 
-def test_the_translation_shows_the_same() -> None:
-    """Commands of the original, nearly all of them, and the same program but for its comments."""
-
-    def without_comments(page: str, language: str) -> list[str]:
-        shown = [block.text for block in blocks(page) if block.language == language]
-        return [re.sub(r"\s+#.*", "", line) for text in shown for line in text.splitlines()]
-
-    here, there = ([command.text for command in commands(page)] for page in (TRANSLATED, "README.md"))
-    assert set(here) <= set(there)
-    assert len(here) > 0.9 * len(there)
-    assert without_comments(TRANSLATED, "python") == without_comments("README.md", "python")
-    assert set(without_comments(TRANSLATED, "yaml")) <= set(without_comments("README.md", "yaml"))
-    for page, other in ((TRANSLATED, "README.md"), ("README.md", TRANSLATED)):
-        assert f"]({other})" in (ROOT / page).read_text(encoding="utf-8").split("## ")[0]
-
-
-FOLLOWED = [page for page in PAGES if page != TRANSLATED and commands(page)]
+FOLLOWED = [page for page in PAGES if commands(page)]
 
 
 @pytest.mark.parametrize("page", [pytest.param(p, marks=pytest.mark.slow if p in SLOW else ()) for p in FOLLOWED])

@@ -6,10 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 # The files beside docs/ that are pages, and their paths there.
-PAGES = {file.name: file.name.lower() for file in ROOT.glob("*.md")} | {
-    "README.md": "index.md",
-    "README.ja.md": "ja.md",
-}
+PAGES = {file.name: file.name.lower() for file in ROOT.glob("*.md")} | {"README.md": "index.md"}
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".csv": "text", ".j2": "jinja", ".js": "javascript"}
 
 _LINK = re.compile(r"\]\((?P<to>[^)#:\s]+)(?P<anchor>#[^)\s]*)?\)")
