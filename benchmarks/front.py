@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from peers import Nsga2
 
+from armwright.arrays import Array
 from armwright.best_known import known_front
-from armwright.evaluation import Array
 from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem import Problem
 from armwright.search.front import FrontSearch

@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from armwright.evaluation import Array
+from armwright.arrays import Array
 from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer

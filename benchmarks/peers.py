@@ -12,7 +12,7 @@ from pymoo.core.problem import Problem as PymooProblem
 from pymoo.core.termination import Termination
 from pymoo.optimize import minimize
 
-from armwright.evaluation import Array
+from armwright.arrays import Array
 from armwright.parameters import FloatParameter
 from armwright.pareto import front_mask
 from armwright.problem import Problem

@@ -18,8 +18,8 @@ import numpy as np
 from peers import Nsga2
 
 import armwright
+from armwright.arrays import Array
 from armwright.best_known import known_front
-from armwright.evaluation import Array
 from armwright.parameters import FloatParameter
 from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem import Problem

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from armwright.evaluation import Array, Evaluation
+from armwright.arrays import Array
+from armwright.evaluation import Evaluation
 from armwright.history import FinishedTrial, History
 from armwright.kinematics.arrays import arrays_of
 from armwright.kinematics.paths import Paths

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from armwright.arrays import Array
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.history import POLISH
 from armwright.parameters import CategoricalParameter, FloatParameter
-from armwright.pareto import Array, hypervolume
+from armwright.pareto import hypervolume
 from armwright.polish import polish_run
 from armwright.problem import Problem
 from armwright.results import read_summary

@@ -11,7 +11,7 @@ from importlib import resources
 
 import numpy as np
 
-from armwright.evaluation import Array
+from armwright.arrays import Array
 from armwright.objectives import PAPER_OBJECTIVES
 from armwright.parameters import Design, FloatParameter
 from armwright.pareto import front_mask, hypervolume

@@ -14,8 +14,9 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
 from armwright.arm import Arm, Joint, Vector
+from armwright.arrays import Array
 from armwright.constraints import Quantity
-from armwright.evaluation import Array, Evaluation
+from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.history import FrontMember, History
 from armwright.kinematics.arrays import FIXED, stack_arms

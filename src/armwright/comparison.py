@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.best_known import known_front
 from armwright.credit import credit_by_source
-from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.history import History
 from armwright.pareto import hypervolume

@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, cast
 
-from armwright.evaluation import Array, Evaluation
+from armwright.arrays import Array
+from armwright.evaluation import Evaluation
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.objectives import OBJECTIVES, TO_BOUND
 

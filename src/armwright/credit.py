@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.history import History
-from armwright.pareto import Array, front_mask
+from armwright.pareto import front_mask
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.credit import front_by_source, masks_by_source
 from armwright.history import BBO, History
 from armwright.parameters import FloatParameter
-from armwright.pareto import Array
 from armwright.symmetry import TOLERANCE, distance_to_planes, symmetry_planes
 
 EXACT = 1e-9  # [m]; a length this near to a round one is round

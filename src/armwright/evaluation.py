@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.arm import Arm
+from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.goals import Goals, plain_goals
 from armwright.kinematics.arrays import FIXED, MOST_JOINTS, ArmArrays, stack_arms
@@ -20,8 +21,6 @@ from armwright.kinematics.solve import Postures, solve_postures
 from armwright.moves import NO_MOVES, Moves
 from armwright.obstacles import Obstacle
 from armwright.workspace import Region, points_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ better than any that is not, of two infeasible ones that of less violation, of t
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armwright.arrays import Array
 
 FAR = 1e100  # beyond any value of an objective
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from armwright.evaluation import Array
+from armwright.arrays import Array
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.feasibility import FAR
 from armwright.history import FRONT, FinishedTrial, FrontMember, History, found_reference_point

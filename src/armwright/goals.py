@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armwright.arrays import Array
 
 REACHED = 1e-3  # [m]; a target that is missed by less counts as reached
 ALIGNED = math.radians(1.0)  # [rad]; the same of a target's axis or orientation

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arm import Arm
-from armwright.evaluation import Array, Evaluation
+from armwright.arrays import Array
+from armwright.evaluation import Evaluation
 from armwright.feasibility import counted, feasible_mask, violation
 from armwright.parameters import Design
 from armwright.pareto import FrontTracker, default_reference_point, front_mask, front_numbers

@@ -25,7 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arm import Arm
-from armwright.evaluation import Array, Evaluation
+from armwright.arrays import Array
+from armwright.evaluation import Evaluation
 from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
 from armwright.objectives import MOST_OBJECTIVES, OBJECTIVES, Objective
 from armwright.task import Task

@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from armwright.arm import Arm
-from armwright.evaluation import Array, Evaluation
+from armwright.arrays import Array
+from armwright.evaluation import Evaluation
 
 AT_LIMIT = 1e-3  # [rad] or [m] from a limit, from which a joint counts as standing at it
 

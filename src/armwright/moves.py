@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armwright.arrays import Array
 
 MOVE_STEP = 0.02  # [m] from one sample of a line to the next, at most
 MOST_STEPS = 200  # of a move

@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from armwright.evaluation import Array, Evaluation
+from armwright.arrays import Array
+from armwright.evaluation import Evaluation
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.goals import REACHED
 from armwright.kinematics.arrays import FIXED, Actuation

@@ -6,7 +6,7 @@ import moocore
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armwright.arrays import Array
 
 
 def front_mask(values: Array) -> NDArray[np.bool_]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from armwright.arm import Arm
+from armwright.arrays import Array
 from armwright.constraints import Constraint, read_constraints
-from armwright.evaluation import Array, Evaluation, evaluate_arrays
+from armwright.evaluation import Evaluation, evaluate_arrays
 from armwright.exceptions import EvaluatorError, SettingsError, TaskError
 from armwright.feasibility import ranked
 from armwright.kinematics.arrays import ArmArrays, arrays_of

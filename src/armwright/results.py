@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.best_known import standing
 from armwright.credit import credit_by_source
 from armwright.diagnostics import diagnose
-from armwright.evaluation import Array
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.feasibility import violation

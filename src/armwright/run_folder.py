@@ -29,9 +29,10 @@ import yaml
 from filelock import FileLock, Timeout
 from pydantic import BaseModel, Field, ValidationError, field_validator
 
+from armwright.arrays import Array
 from armwright.control import CHANNEL_FILES
 from armwright.documents import parse_document
-from armwright.evaluation import Array, Evaluation
+from armwright.evaluation import Evaluation
 from armwright.exceptions import DesignError, RunConflictError, RunFolderError
 from armwright.files import replace_file, writable
 from armwright.history import FinishedTrial, History

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armwright.arrays import Array
 
 LEVEL = 0.05  # of a test
 RESAMPLES = 10_000

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from armwright.arrays import Array
 from armwright.canonical import SameArms
 from armwright.control import Channel
 from armwright.exceptions import ArmwrightError, ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMember, History
 from armwright.judging import Here, Judged, Judging
 from armwright.parameters import Design
-from armwright.pareto import Array, FrontTracker
+from armwright.pareto import FrontTracker
 from armwright.problem import Judgement, Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer

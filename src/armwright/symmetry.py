@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armwright.pareto import Array
+from armwright.arrays import Array
 
 TOLERANCE = 1e-6  # [m]
 ROUGH = 1e-5  # [m]; within which a plane is taken up, to be laid anew through all the pairs that it mirrors

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.evaluation import Array, evaluate_arrays
+from armwright.arrays import Array
+from armwright.evaluation import evaluate_arrays
 from armwright.feasibility import counted
 from armwright.history import History
 from armwright.kinematics.arrays import arrays_of

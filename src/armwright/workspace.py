@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
-Array = NDArray[np.float64]
+from armwright.arrays import Array
 
 LARGEST = 1000.0  # [m], of coordinates
 MOST_POINTS = 10_000

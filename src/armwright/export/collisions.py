@@ -15,11 +15,10 @@ import math
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Joint, Link
+from armwright.arrays import Array
 
-Array = NDArray[np.float64]
 Reason = Literal["Adjacent", "Never", "Always"]
 
 MARGIN = 1e-6  # [m]; files have ten digits, and float64 rounds

@@ -4,11 +4,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arm import Arm
+from armwright.arrays import Array
 
-Array = NDArray[np.float64]
 AXIS_WORDS = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Joint
+from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.modules import DIRECTIONS, MODULES, MOUNTS
 from armwright.parameters import CategoricalParameter
@@ -23,8 +24,6 @@ Motions = Literal["turning", "any"]  # what all joints of some arms do
 Rows = Literal["position", "mixed"]  # what targets ask for: points alone, or of some which way the tool points, too
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
-Array = NDArray[np.float64]
-
 _FLOATS = ("base", "lower", "upper", "offset", "com", "mass")
 TOOL = ("tool_axis", "tool_side")  # that only targets with an axis or an orientation need
 FLOATS = (*_FLOATS, *TOOL)

@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Axis
-
-Array = NDArray[np.float64]
+from armwright.arrays import Array
 
 
 def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armwright.arm import GRAVITY
+from armwright.arrays import Array
 from armwright.kinematics.arrays import FIXED, SLIDES, ArmArrays
 from armwright.kinematics.jacobian import Frames, frames_of, jacobian_of, jacobian_rate
 from armwright.kinematics.paths import Paths, largest_of
 from armwright.moves import Moves, Timing, timing_of
-
-Array = NDArray[np.float64]
 
 DAMPING = 0.005  # of an arm's size, docs/method.md §17
 AT_ONCE = 2**12  # postures, whose arrays stay in a core's cache

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.kinematics.arrays import FIXED, SLIDES, ArmArrays
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.kinematics.arrays import ArmArrays
 from armwright.kinematics.devices import Device
 from armwright.kinematics.solve import solve_postures
 from armwright.moves import Lines, Moves, lines_of
-
-Array = NDArray[np.float64]
 
 UPDATES_OF_STEP = 10  # of the inverse kinematics from one sample to the next, docs/method.md §14
 

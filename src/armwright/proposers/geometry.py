@@ -6,7 +6,7 @@ Nothing here evaluates a design; it is what a designer knows before the first tr
 import numpy as np
 
 from armwright.arm import GRAVITY
-from armwright.evaluation import Array
+from armwright.arrays import Array
 from armwright.objectives import TORQUE_SCALE
 from armwright.space import DesignSpace
 

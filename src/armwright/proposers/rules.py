@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armwright.evaluation import Array
+from armwright.arrays import Array
 from armwright.history import FrontMember, History
 from armwright.objectives import PAPER_OBJECTIVES, TORQUE
 from armwright.parameters import Design

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armwright.evaluation import Array
+from armwright.arrays import Array
 from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.proposers.geometry import affordable_length, needed_length, shoulder

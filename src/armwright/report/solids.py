@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.obstacles import Obstacle, Solid
 from armwright.report.style import OBSTACLE
-
-Array = NDArray[np.float64]
 
 EDGE = 0.5  # [pt]
 AROUND, UPWARDS = 32, 12  # faces of what is round

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.parameters import GRID_DIGITS, CategoricalParameter, FloatParameter, Parameter
-
-Array = NDArray[np.float64]
 
 
 class Columns:

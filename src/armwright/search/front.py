@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.parameters import Parameter
 from armwright.pareto import hypervolume
-from armwright.search.columns import Array, Columns
+from armwright.search.columns import Columns
 from armwright.search.survival import Rows, front, leaders, nearest, survivors, thinned
 from armwright.search.variation import offspring
 from armwright.seeding import derived_seed

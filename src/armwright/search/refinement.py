@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.parameters import Parameter
-from armwright.search.columns import Array, Columns
+from armwright.search.columns import Columns
 
 POPULATION = 12  # samples a design and generation
 FIRST_STEP = 0.05  # of a parameter's range

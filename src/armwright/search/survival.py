@@ -4,7 +4,8 @@ import moocore
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.pareto import Array, front_mask
+from armwright.arrays import Array
+from armwright.pareto import front_mask
 
 Rows = NDArray[np.intp]
 

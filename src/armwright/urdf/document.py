@@ -11,15 +11,13 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.exceptions import ArmError
 
 LARGEST_FILE = 4 * 1024 * 1024  # [bytes]; of 60 robots that are often used the largest has 0.2 MB
 DEEPEST = 50  # elements within each other; a URDF needs 6
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from armwright.arm import AXES, Actuator, Arm, Joint, Link, Vector
+from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
-from armwright.urdf.document import Array, Document, Pose, UrdfJoint, read_document, rotation
+from armwright.urdf.document import Document, Pose, UrdfJoint, read_document, rotation
 
 SNAP = 1e-3  # [rad]; an axis that is off by less is taken to lie along x, y or z
 LARGEST_ANGLE = 2 * math.pi  # [rad]
