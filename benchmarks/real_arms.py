@@ -25,7 +25,7 @@ REAL = Task.model_validate(
             {"kind": "box", "center": [0.5, 0.0, 0.2], "size": [0.3, 0.7, 0.02], "yaw": 0.3},
             {"kind": "cylinder", "center": [0.3, 0.3, 0.0], "radius": 0.03, "height": 1.2},
         ],
-        "objectives": ["position_error", "orientation_error", "collision", "torque_use"],
+        "objectives": ["position_error", "orientation_error", "collision", "torque_utilisation"],
     }
 )
 SPACE = DesignSpace.model_validate(

@@ -92,7 +92,7 @@ def test_the_first_actuator_stands_with_the_base() -> None:
 
 
 def test_torque_use_is_the_worst_share_of_the_allowed_torque() -> None:
-    problem = Problem(TASK, SPACE, objectives=named_objectives(["torque_use"]))
+    problem = Problem(TASK, SPACE, objectives=named_objectives(["torque_utilisation"]))
     designs = SPACE.sample(30, 5)
     torques = np.abs(problem.evaluation(designs).joint_torques)
     allowed = {"big": 5.3, "mid": 2.05, "small": 0.75}
@@ -127,7 +127,7 @@ def test_what_cannot_be_built_is_refused(tmp_path: Path, space: dict, words: str
 
 
 def test_objectives_that_need_actuators_say_so() -> None:
-    for name in ("torque_use", "price"):
+    for name in ("torque_utilisation", "price"):
         problem = Problem(TASK, objectives=named_objectives([name]))
         with pytest.raises(SettingsError, match=f"objective {name} needs actuators"):
             problem.evaluate(problem.space.sample(1, 0))
@@ -156,7 +156,7 @@ def test_the_catalogue_names_a_source_for_each() -> None:
 
 def test_actuators_through_the_whole_house(tmp_path: Path) -> None:
     """Space file, run, rules, prompt, folder, page, URDF limits, build sheet, command."""
-    task = TASK.model_copy(update={"objectives": ("worst_error", "torque_use", "price")})
+    task = TASK.model_copy(update={"objectives": ("worst_error", "torque_utilisation", "price")})
     run = optimize(Problem(task, SPACE), proposer="rules", n_init=6, n_step=3, n_total=18, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")
     assert config.space == SPACE
@@ -216,5 +216,5 @@ def test_open_manipulator_x_carries_what_its_maker_says_and_not_twice_that(paylo
     reached = (0.012 + 0.378, 0.0, 0.017 + 0.0595)  # the shoulder's height, 2 mm short of the stretched arm
     evaluation = evaluate([open_manipulator_x()], [reached], payload=payload)
     assert evaluation.position_error[0, 0] < 0.01  # the stretched arm is singular
-    (use,) = named_objectives(["torque_use"])[0](evaluation)
+    (use,) = named_objectives(["torque_utilisation"])[0](evaluation)
     assert (use <= 1.0) == holds

@@ -90,9 +90,9 @@ def test_numbers_are_those_of_the_arm_where_it_stands(compared: ArmComparison) -
         assert arm.measures["position_error"] == pytest.approx(error.sum())
         assert arm.measures["torque"] == pytest.approx(40 * np.linalg.norm(torque, axis=1).sum())
         assert arm.measures["worst_error"] == pytest.approx(error.max())
-        assert arm.measures["missed"] == (error >= 1e-3).sum()
+        assert arm.measures["unreached_targets"] == (error >= 1e-3).sum()
         assert arm.measures["peak_torque"] == pytest.approx(np.abs(torque).max())
-        assert arm.measures["torque_use"] == pytest.approx((np.abs(torque) / efforts).max())
+        assert arm.measures["torque_utilisation"] == pytest.approx((np.abs(torque) / efforts).max())
         without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
         lighter = without.evaluate_arrays(stack_arms([placed])).joint_torques[0]
         assert not np.allclose(lighter[:2], torque[:2])
@@ -117,7 +117,7 @@ def test_the_base_is_searched_within_the_spaces_ranges(compared: ArmComparison) 
         evaluation = compared.problem.evaluate_arrays(stack_arms(moved))
         missed = np.maximum(evaluation.position_error - 1e-3, 0.0).sum(axis=1)
         torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
-        assert arm.measures["missed"] == 0
+        assert arm.measures["unreached_targets"] == 0
         assert arm.measures["torque"] <= 1.01 * torque[missed == 0.0].min()  # type: ignore[operator]
     assert compare_arms(TASK, [PANDA], space=SPACE).arms[0].base == compared.arms[1].base
     assert compare_arms(TASK, [PANDA], space=SPACE, seed=1).arms[0].base != compared.arms[1].base
@@ -188,14 +188,16 @@ def test_without_arms_nothing_is_drawn(run: Path, history: History) -> None:
 
 def test_what_is_not_known_of_an_arm_is_not_compared(tmp_path: Path) -> None:
     space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
-    problem = aw.Problem(TASK, space, objectives=named_objectives(["position_error", "mass", "price", "torque_use"]))
+    problem = aw.Problem(
+        TASK, space, objectives=named_objectives(["position_error", "mass", "price", "torque_utilisation"])
+    )
     aw.optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path / "run")
     silent = tmp_path / "silent.urdf"
     silent.write_text(UR5.read_text().replace('effort="', 'effort="0" was="'))
     ur5, without = compare_arms(TASK, [UR5, silent], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
     assert (ur5.values[2], without.values[2]) == (None, None)
-    assert ur5.values[3] == ur5.measures["torque_use"] != None  # noqa: E711
-    assert (without.values[3], without.measures["torque_use"]) == (None, None)
+    assert ur5.values[3] == ur5.measures["torque_utilisation"] != None  # noqa: E711
+    assert (without.values[3], without.measures["torque_utilisation"]) == (None, None)
     assert (ur5.dominates, ur5.dominated_by) == (None, None)
     assert any("its price is not known" in note for note in ur5.notes)
     assert any("not every joint states an effort" in note for note in without.notes)

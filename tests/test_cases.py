@@ -16,7 +16,9 @@ from armwright.verification import verify
 
 NAMES = ["position_error", "torque", "worst_error"]
 PLAIN = Task(name="plain", targets=((0.4, 0.1, 0.3), (0.2, -0.3, 0.5), (-0.1, 0.4, 0.2)), payload=(0.1, 0.2, 0.0))
-ROBUST = PLAIN.model_copy(update={"payload_factors": (0.0, 1.5), "jitter": 0.004, "constraints": ("peak_torque <= 2",)})
+ROBUST = PLAIN.model_copy(
+    update={"payload_factors": (0.0, 1.5), "target_noise": 0.004, "constraints": ("peak_torque <= 2",)}
+)
 
 
 def alone() -> list[Task]:
@@ -54,10 +56,12 @@ def test_it_goes_with_a_workshop_s_tolerance() -> None:
 
 def test_a_run_keeps_it(tmp_path: Path) -> None:
     file = tmp_path / "robust.yaml"
-    file.write_text(yaml.safe_dump({"name": "robust", "targets": [[0.4, 0.1, 0.3]], "payload": 0.2, "jitter": 0.01}))
+    file.write_text(
+        yaml.safe_dump({"name": "robust", "targets": [[0.4, 0.1, 0.3]], "payload": 0.2, "target_noise": 0.01})
+    )
     run = optimize(Problem(load_task(file)), proposer="rules", n_total=10, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")
-    assert config.task.jitter == 0.01
+    assert config.task.target_noise == 0.01
     assert np.array_equal(history.problem.evaluate([t.design for t in history]), history.values)
     assert run.summary["n_trials"] == 20
 
@@ -74,7 +78,9 @@ def test_the_model_is_told() -> None:
     assert "may come otherwise" not in load_prompt("plus").render(fixed_history(FixedProblem(PLAIN), n=12), 0)
 
 
-@pytest.mark.parametrize("given", [{"jitter": -0.1}, {"jitter": 5.0}, {"payload_factors": [-1.0]}, {"jitter": ".nan"}])
+@pytest.mark.parametrize(
+    "given", [{"target_noise": -0.1}, {"target_noise": 5.0}, {"payload_factors": [-1.0]}, {"target_noise": ".nan"}]
+)
 def test_cases_that_cannot_be_are_refused(given: dict[str, object], tmp_path: Path) -> None:
     file = tmp_path / "bad.yaml"
     file.write_text(yaml.safe_dump({"name": "bad", "targets": [[0.4, 0.1, 0.3]], **given}))

@@ -55,7 +55,7 @@ def task(*constraints: str, **update: Any) -> Task:
 def told(values: np.ndarray, broken: np.ndarray) -> History:
     """A history of these objectives (N, 2) and constraints (N, C)."""
     problem = FixedProblem(
-        task(*("length >= 0.1", "mass <= 3", "missed <= 4")[: broken.shape[1]], reference_point=(10.0, 10.0))
+        task(*("length >= 0.1", "mass <= 3", "unreached_targets <= 4")[: broken.shape[1]], reference_point=(10.0, 10.0))
     )
     designs = SPACE.sample(len(values), 0)
     rows = zip(designs, values.tolist(), broken.tolist(), strict=True)
@@ -112,7 +112,7 @@ def test_the_template_shows_constraints_that_are_some(tmp_path: Path) -> None:
 
 def test_values_are_how_far_a_bound_is_broken() -> None:
     """Against plain formulas of the physics; of a bound of 0, in the quantity's own unit."""
-    problem = Problem(task("worst_error <= 0.4", "length >= 0.5", "missed <= 0", "peak_torque <= 0.06"))
+    problem = Problem(task("worst_error <= 0.4", "length >= 0.5", "unreached_targets <= 0", "peak_torque <= 0.06"))
     designs = SPACE.sample(50, 3)
     values, broken = problem.judge(designs)
     evaluation = problem.evaluation(designs)

@@ -82,9 +82,9 @@ def test_two_links_in_a_plane_have_a_closed_form_and_cannot_leave_it() -> None:
     elbow, reached = evaluation.q[0, :, 2], evaluation.reached[0]
     expected = a * b * np.abs(np.sin(elbow)) * np.hypot(reached[:, 0], reached[:, 1])
     assert evaluation.manipulability[0] == pytest.approx(expected, abs=1e-6)
-    (clumsiness,) = named_objectives(["clumsiness"])
-    assert clumsiness(evaluation)[0] > 0.95, "a stretched arm, which misses its target, cannot go farther"
-    assert clumsiness(evaluate([planar], [[0.2, 0.0, 0.3]]))[0] == pytest.approx(1.0, abs=1e-3)
+    (anisotropy,) = named_objectives(["anisotropy"])
+    assert anisotropy(evaluation)[0] > 0.95, "a stretched arm, which misses its target, cannot go farther"
+    assert anisotropy(evaluate([planar], [[0.2, 0.0, 0.3]]))[0] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_three_rails_are_as_dexterous_as_can_be() -> None:
@@ -113,7 +113,7 @@ def test_a_larger_arm_is_as_dexterous_and_moves_more() -> None:
 
 def test_clumsiness_is_of_the_worst_target_and_costs_nothing_where_nobody_asks() -> None:
     space, task = paper_space(5), load_task("shelf").model_copy(update={"reference_point": None})
-    problem = Problem(task, space, objectives=named_objectives(["clumsiness", "position_error"]))
+    problem = Problem(task, space, objectives=named_objectives(["anisotropy", "position_error"]))
     designs = space.sample(20, 3)
     evaluation = problem.evaluation(designs)
     assert problem.evaluate(designs)[:, 0] == pytest.approx((1.0 - evaluation.dexterity).max(axis=1))

@@ -40,7 +40,7 @@ targets:
   - [0.6, 0.0, 1.4]
   - [0.6, 1.0, 1.4]
 payload: 0.5
-objectives: [worst_error, torque_use, price]
+objectives: [worst_error, torque_utilisation, price]
 """
 SPACE = """\
 name: cart-arm
@@ -55,7 +55,7 @@ ASSUMED = """\
   as a skirting board is lower
 """
 ANSWER = f"The wall is wide.\n\nTASK\n```yaml\n{TASK}```\nSPACE\n```yaml\n{SPACE}```\nASSUMED\n{ASSUMED}"
-ALONE = f"TASK\n```yaml\n{TASK.replace('[worst_error, torque_use, price]', '[worst_error, torque]')}```\n"
+ALONE = f"TASK\n```yaml\n{TASK.replace('[worst_error, torque_utilisation, price]', '[worst_error, torque]')}```\n"
 
 
 def drafted(server: ChatServer, answer: Answer | Iterable[Answer], out: Path | None = None, **settings: Any) -> Draft:
@@ -179,13 +179,13 @@ REFUSED = {
     "not finite": (ANSWER.replace("0.6, 0.0, 0.4", ".nan, 0, 0.4"), "targets[1][0]: Input should be a finite number"),
     "no name": (ANSWER.replace("name: wall\n", ""), "the task: name: Field required"),
     "payloads": (ANSWER.replace("payload: 0.5", "payload: [0.5, 0.5]"), "payload has 2 values for 6 targets"),
-    "unknown objective": (ANSWER.replace("torque_use", "torque_used"), 'unknown objective "torque_used"'),
+    "unknown objective": (ANSWER.replace("torque_utilisation", "torque_used"), 'unknown objective "torque_used"'),
     "reference point": (
         ANSWER.replace("payload:", "reference_point: [1.0, 1.0]\npayload:"),
-        "the problem minimises 3: worst_error, torque_use, price",
+        "the problem minimises 3: worst_error, torque_utilisation, price",
     ),
     "unknown actuator": (ANSWER.replace("XM430-W350", "XM430-W351"), 'unknown actuator "XM430-W351"'),
-    "actuators missing": (ANSWER[: ANSWER.index("SPACE")], "objective torque_use needs actuators"),
+    "actuators missing": (ANSWER[: ANSWER.index("SPACE")], "objective torque_utilisation needs actuators"),
     "price missing": (ANSWER.replace("XM430-W350", "MG996R"), "objective price needs the price of every actuator"),
     "torque missing": (ANSWER.replace("XM430-W350", "AK60-6"), "actuator AK60-6 has no stall torque"),
     "range": (ANSWER.replace("[0.1, 0.4]", "[0.4, 0.1]"), "is upside down"),

@@ -314,19 +314,19 @@ def test_uses_are_of_what_actuators_can() -> None:
     assert {joint.kind for arm in arms for joint in arm.joints} == {"revolute", "prismatic"}
     evaluation = timed(arms, 0.5, 0.5)
     travel = np.array([[joint.travel for joint in arm.joints] for arm in arms])[:, None]
-    use, speed = named_objectives(["dynamic_use", "speed_use"])
+    use, speed = named_objectives(["dynamic_utilisation", "speed_utilisation"])
     torques, speeds = evaluation.drives.torques * travel, evaluation.drives.speeds / travel
     assert use(evaluation) == pytest.approx(np.abs(torques / [4.0, 9.0, 9.0, 4.0]).max(axis=(1, 2)))
     assert speed(evaluation) == pytest.approx(np.abs(speeds / [5.0, 2.0, 2.0, 5.0]).max(axis=(1, 2)))
     unknown = replace(arms[0], joints=tuple(replace(j, actuator=replace(motor, speed=None)) for j in arms[0].joints))
-    with pytest.raises(SettingsError, match="speed_use needs the speed of every actuator"):
+    with pytest.raises(SettingsError, match="speed_utilisation needs the speed of every actuator"):
         speed(timed([unknown], 0.5, 0.5))
     assert np.isfinite(use(timed([unknown], 0.5, 0.5))).all()
 
 
 def test_constraints_bound_them() -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"]})
-    names = ("dynamic_torque", "dynamic_use", "speed_use")
+    names = ("dynamic_torque", "dynamic_utilisation", "speed_utilisation")
     designs = space.sample(30, 0)
     values = Problem(task(move_time=0.5, objectives=names), space).evaluate(designs)
     sentences = [f"{name} <= {np.median(column):.6g}" for name, column in zip(names, values.T, strict=True)]

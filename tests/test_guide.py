@@ -126,7 +126,7 @@ def test_the_bounds_that_validators_hold_are_told(at: tuple[type[BaseModel], str
 
 
 def test_there_are_many_such_bounds() -> None:
-    assert {key.name for _, key in numbers()} >= {"payload", "jitter", "restarts", "yaw", "radius", "mass"}
+    assert {key.name for _, key in numbers()} >= {"payload", "target_noise", "restarts", "yaw", "radius", "mass"}
 
 
 def test_defaults_and_needs_are_those_of_the_models() -> None:
@@ -144,8 +144,8 @@ def test_every_key_has_words_and_every_length_its_unit() -> None:
     for model, of_model in told.items():
         plain = {"kind", "width", "height", "depth", "price"} if model is not Cylinder else {"kind"}
         assert {name for name, key in of_model.items() if not key.words} <= plain, model
-    units = {name: told[Task][name].unit for name in ("payload", "jitter", "move_step", "move_time", "restarts")}
-    assert units == {"payload": "kg", "jitter": "m", "move_step": "m", "move_time": "s", "restarts": ""}
+    units = {name: told[Task][name].unit for name in ("payload", "target_noise", "move_step", "move_time", "restarts")}
+    assert units == {"payload": "kg", "target_noise": "m", "move_step": "m", "move_time": "s", "restarts": ""}
     assert told[Box]["center"].unit == told[Region]["low"].unit == told[DesignSpace]["link"].unit == "m"
     assert told[Box]["yaw"].unit == told[DesignSpace]["joint_range"].unit == "rad"
 

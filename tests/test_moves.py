@@ -226,10 +226,10 @@ def test_a_target_s_share_counts_the_moves_that_end_there() -> None:
     assert collision(moving).sum() > collision(still).sum() + 0.1
     torque = np.abs(paths.joint_torques).max(axis=-1)
     assert peak(moving) == pytest.approx(np.maximum(peak(still), torque.max(axis=1)))
-    error, jump = named_objectives(["path_error", "joint_jump"])
+    error, jump = named_objectives(["path_error", "max_joint_step"])
     assert error(moving) == pytest.approx(paths.error.max(axis=1))
     assert jump(moving) == pytest.approx(np.abs(paths.jumps).max(axis=1))
-    for name in ("position_error", "torque", "rms_torque", "missed", "worst_error"):
+    for name in ("position_error", "torque", "rms_torque", "unreached_targets", "worst_error"):
         (objective,) = named_objectives([name])
         assert np.array_equal(objective(moving), objective(still)), name
 
@@ -237,8 +237,8 @@ def test_a_target_s_share_counts_the_moves_that_end_there() -> None:
 def test_torque_use_counts_the_way() -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"], "safety_factor": 2.0})
     designs = space.sample(40, 0)
-    still = Problem(task(objectives=["torque_use"]), space)
-    moving = Problem(task(objectives=["torque_use"], moves="in_order"), space)
+    still = Problem(task(objectives=["torque_utilisation"]), space)
+    moving = Problem(task(objectives=["torque_utilisation"], moves="in_order"), space)
     effort = designs and space.arm(designs[0]).joints[0].actuator.effort  # type: ignore[union-attr]
     expected = np.abs(moving.evaluation(designs).paths.joint_torques).max(axis=(1, 2)) / effort
     assert moving.evaluate(designs)[:, 0] == pytest.approx(np.maximum(still.evaluate(designs)[:, 0], expected))
@@ -337,10 +337,10 @@ def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
 
 
 def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:
-    sentences = ["path_error <= 0.01", "joint_jump <= 0.5", "unreached <= 0.4", "manipulability >= 0.001"]
+    sentences = ["path_error <= 0.01", "max_joint_step <= 0.5", "uncovered_fraction <= 0.4", "manipulability >= 0.001"]
     box = {"low": (0.2, -0.2, 0.1), "high": (0.5, 0.2, 0.3), "points": 30}
     problem = Problem(
-        task(moves="in_order", workspace=box, constraints=[*sentences, "clumsiness <= 0.99"]), paper_space(6)
+        task(moves="in_order", workspace=box, constraints=[*sentences, "anisotropy <= 0.99"]), paper_space(6)
     )
     designs = problem.space.sample(40, 1)
     evaluation, broken = problem.evaluation(designs), problem.judge(designs)[1]

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from armwright.arm import Arm, Joint, Link
 from armwright.cli import app
 from armwright.evaluation import evaluate
-from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError
+from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError, UsageError
 from armwright.export.urdf import to_urdf
 from armwright.front import find_front
-from armwright.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, Objective, named_objectives
+from armwright.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, RENAMED, Objective, named_objectives
 from armwright.problem import Problem
 from armwright.report.content import RunContent
 from armwright.report.figures import chosen_members, write_figures
@@ -146,7 +146,7 @@ def test_the_named_objectives_are_what_they_say() -> None:
         "position_error",
         "torque",
         "worst_error",
-        "missed",
+        "unreached_targets",
         "peak_torque",
         "rms_torque",
         "mass",
@@ -165,7 +165,7 @@ def test_the_named_objectives_are_what_they_say() -> None:
         assert told["position_error"][row] == pytest.approx(sum(error[row]))
         assert told["torque"][row] == pytest.approx(40.0 * sum(norms[row]))
         assert told["worst_error"][row] == max(error[row])
-        assert told["missed"][row] == sum(e >= 1e-3 for e in error[row])
+        assert told["unreached_targets"][row] == sum(e >= 1e-3 for e in error[row])
         assert told["peak_torque"][row] == max(map(abs, torque[row].ravel()))
         assert told["rms_torque"][row] == pytest.approx((sum(n**2 for n in norms[row]) / 3) ** 0.5)
         assert told["mass"][row] == pytest.approx(sum(link.mass for link in arm.links), rel=1e-6)
@@ -187,9 +187,25 @@ def test_names_that_cannot_be_are_refused(names: list[str], words: str) -> None:
         named_objectives(names)
 
 
+@pytest.mark.parametrize(("old", "new"), RENAMED.items())
+def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path, old: str, new: str) -> None:
+    assert new in OBJECTIVES
+    assert new not in RENAMED, "no current name is a former name of another objective"
+    file = tmp_path / "old.yaml"
+    for key, value in (("objectives", old), ("constraints", f"{old} <= 1")):
+        file.write_text(yaml.safe_dump({"name": "old", "targets": [[0.4, 0.1, 0.3]], key: [value]}))
+        with pytest.raises(UsageError, match=f'"{old}".*It is now called "{new}".') as refusal:
+            Problem(load_task(file))
+        assert str(refusal.value).count("now called") == 1
+
+
 @pytest.mark.parametrize(
     "names",
-    [("worst_error",), ("worst_error", "peak_torque", "mass"), ("missed", "mass", "length", "rms_torque", "torque")],
+    [
+        ("worst_error",),
+        ("worst_error", "peak_torque", "mass"),
+        ("unreached_targets", "mass", "length", "rms_torque", "torque"),
+    ],
 )
 def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: tuple[str, ...]) -> None:
     """From the task file to the folder, the prompt, the figures, the page and the search for the whole front."""

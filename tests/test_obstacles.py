@@ -118,7 +118,7 @@ def test_a_cylinder_stands_along_its_axis(axis: tuple[float, float, float]) -> N
 
 
 def test_objectives_of_clearance() -> None:
-    task = task_of(RECORDS, objectives=["collision", "closeness"])
+    task = task_of(RECORDS, objectives=["collision", "clearance_shortfall"])
     problem = Problem(task)
     designs = problem.space.sample(40, 3)
     evaluation, values = problem.evaluation(designs), problem.evaluate(designs)
@@ -133,7 +133,9 @@ def test_objectives_of_clearance() -> None:
         least = getattr(evaluation, quantity.name).min(axis=1)
         assert np.array_equal(quantity(evaluation), np.minimum(least, FAR))
     assert np.any(verify(problem, designs, values, (1.0, 1.0)).solid)
-    alone = Problem(Task(name="alone", targets=task.targets), objectives=named_objectives(["collision", "closeness"]))
+    alone = Problem(
+        Task(name="alone", targets=task.targets), objectives=named_objectives(["collision", "clearance_shortfall"])
+    )
     assert np.all(np.isfinite(alone.evaluate(designs)))
     assert np.all(alone.evaluate(designs) <= values)
 
@@ -202,7 +204,7 @@ def test_faces_are_cut_off_at_the_cube() -> None:
 
 
 def test_the_page_draws_them_where_they_are(tmp_path: Path, browser: Browser) -> None:
-    task = task_of(RECORDS, objectives=["worst_error", "closeness"])
+    task = task_of(RECORDS, objectives=["worst_error", "clearance_shortfall"])
     optimize(Problem(task), proposer="none", n_init=4, n_total=6, out=tmp_path, verify=False)
     write_report(tmp_path)
     tab = Tab(browser, offline=True)

@@ -63,14 +63,14 @@ IN_THE_WAY = Task.model_validate(
             {"kind": "sphere", "center": (0.1, 0.3, 0.1), "radius": 0.05},
             {"kind": "cylinder", "center": (0.3, 0.3, 0.1), "radius": 0.02, "height": 1.0, "axis": (1.0, 1.0, 0.0)},
         ],
-        "objectives": ("position_error", "closeness"),
+        "objectives": ("position_error", "clearance_shortfall"),
         "reference_point": (2.0, 0.5),
     }
 )
 ON_LINES = IN_THE_WAY.model_copy(
     update={
         "moves": ((1, 2), (2, 1)),
-        "objectives": ("position_error", "closeness", "path_error"),
+        "objectives": ("position_error", "clearance_shortfall", "path_error"),
         "reference_point": None,
     }
 )
@@ -81,7 +81,7 @@ COVERING = Task.model_validate(
             {"low": (0.2, -0.3, 0.0), "high": (0.6, 0.3, 0.5)},
             {"low": (0, 0, 1), "high": (0, 0, 1.5), "points": 20},
         ],
-        "objectives": ("unreached", "torque"),
+        "objectives": ("uncovered_fraction", "torque"),
     }
 )
 DESIGNS = paper_space().sample(30, seed=9)

@@ -14,7 +14,7 @@ from armwright.exceptions import ArmError, SettingsError, TaskError
 from armwright.goals import turned
 from armwright.llm.prompt import load_prompt
 from armwright.misses import why_missed
-from armwright.objectives import MISSED, OBJECTIVES, named_objectives
+from armwright.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
 from armwright.problem import Problem
 from armwright.run_folder import read_config
 from armwright.space import paper_space
@@ -119,13 +119,13 @@ def test_objectives_heed_weights_and_tolerances() -> None:
     assert np.array_equal(OBJECTIVES["worst_error"](found), found.position_error.max(axis=1))
     assert not found.angle_error[:, [1, 3]].any()
     missed = (found.position_error >= [1e-3, 1e-3, 2e-3, 1e-3]) | (found.angle_error >= found.goals.angle_tolerance)
-    assert np.array_equal(MISSED(found), missed.sum(axis=1))
+    assert np.array_equal(UNREACHED_TARGETS(found), missed.sum(axis=1))
     anywhere = Task(name="a", targets=(Target(position=(0.3, 0.0, 0.3), axis=(0, 0, -1), tolerance=100.0),))
     found = evaluate(
         [problem.arm(design) for design in problem.space.sample(50, 0)], anywhere.points, goals=anywhere.goals
     )
     assert found.position_error.max() > 0.1
-    assert 0.5 < 1.0 - MISSED(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
+    assert 0.5 < 1.0 - UNREACHED_TARGETS(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
 
 
 def test_verification_uses_the_same_goals() -> None:

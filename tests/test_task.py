@@ -56,6 +56,7 @@ def test_the_least_task_file(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("name: a\ntargets: []", "targets is empty"),
+        ("name: a\ntargets: [[0, 0, 0]]\njitter: 0.01", 'It is now called "target_noise".'),
         ("name: a\ntargets: [[0, 0, .nan]]", "targets[0][2]"),
         ("name: a\ntargets: [[0, 0]]", "targets[0]"),
         ("name: a\ntargets: [[0, 0, 1, 2]]", "targets[0]"),

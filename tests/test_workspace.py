@@ -15,7 +15,7 @@ from armwright.cli import app
 from armwright.documents import parse_document
 from armwright.evaluation import Evaluation, evaluate
 from armwright.exceptions import SettingsError, TaskError
-from armwright.objectives import OBJECTIVES, UNREACHED
+from armwright.objectives import OBJECTIVES, UNCOVERED_FRACTION
 from armwright.problem import Problem
 from armwright.space import paper_space
 from armwright.task import Task, load_task, random_task
@@ -75,11 +75,11 @@ def test_a_ball_joint_reaches_a_shell() -> None:
     assert not np.any(reached[(far > a + b + 2e-3) | (far < a - b - 2e-3)])
     assert reached[inside].mean() > 0.97, "but for some that the straight start does not lead to"
     volume = 4 / 3 * np.pi * ((a + b) ** 3 - (a - b) ** 3) / 1.6**3
-    assert 1.0 - UNREACHED(evaluation)[0] == pytest.approx(volume, abs=0.03)
+    assert 1.0 - UNCOVERED_FRACTION(evaluation)[0] == pytest.approx(volume, abs=0.03)
 
 
 def test_points_are_tried_like_targets() -> None:
-    problem = Problem(task(objectives=["unreached"]))
+    problem = Problem(task(objectives=["uncovered_fraction"]))
     designs = problem.space.sample(30, 2)
     arms = [problem.arm(design) for design in designs]
     as_targets = evaluate(arms, points_of(problem.task.workspace))
@@ -108,7 +108,7 @@ def test_longer_arms_cover_no_less() -> None:
     beyond = np.linalg.norm(points - np.array([arm.base for arm in small])[:, None], axis=-1) > reach[:, None] + 1e-3
     for evaluation in (one, other):
         assert np.all(evaluation.workspace_error[beyond] >= 1e-3)
-    assert UNREACHED(one).mean() == pytest.approx(UNREACHED(other).mean(), abs=0.02)
+    assert UNCOVERED_FRACTION(one).mean() == pytest.approx(UNCOVERED_FRACTION(other).mean(), abs=0.02)
 
 
 def test_a_workspace_costs_nothing_where_nothing_asks_for_it() -> None:
@@ -118,18 +118,21 @@ def test_a_workspace_costs_nothing_where_nothing_asks_for_it() -> None:
     evaluation = Problem(with_).evaluation(designs)
     assert np.array_equal(Problem(with_).values(evaluation), Problem(target_1).evaluate(designs))
     assert "workspace_error" not in vars(evaluation)
-    assert [Problem(with_).heeds_workspace, Problem(task(), objectives=(UNREACHED,)).heeds_workspace] == [False, True]
+    assert [Problem(with_).heeds_workspace, Problem(task(), objectives=(UNCOVERED_FRACTION,)).heeds_workspace] == [
+        False,
+        True,
+    ]
 
 
 def test_without_a_workspace_nothing_is_unreached() -> None:
-    with pytest.raises(SettingsError, match="unreached needs a workspace in the task: workspace: "):
+    with pytest.raises(SettingsError, match="uncovered_fraction needs a workspace in the task: workspace: "):
         Problem(
-            random_task(1).model_copy(update={"reference_point": None}), objectives=(OBJECTIVES["unreached"],)
+            random_task(1).model_copy(update={"reference_point": None}), objectives=(OBJECTIVES["uncovered_fraction"],)
         ).evaluate(paper_space().sample(1, 0))
 
 
 def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = Problem(task(objectives=["unreached", "torque"]))
+    problem = Problem(task(objectives=["uncovered_fraction", "torque"]))
     designs = problem.space.sample(30, 5)
     values = problem.evaluate(designs)
     sizes: list[int] = []
@@ -190,7 +193,7 @@ def test_too_many_boxes_are_refused() -> None:
 def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
     (in_folder / "cover.yaml").write_text(
         "name: cover\nworkspace: {low: [0.2, -0.3, 0.1], high: [0.5, 0.3, 0.4], points: 60}\n"
-        "objectives: [unreached, torque]\n"
+        "objectives: [uncovered_fraction, torque]\n"
     )
     told = CliRunner().invoke(app, ["optimize", "cover.yaml", "--n-total", "20", "--out", "run"])
     assert told.exit_code == 0, told.output
@@ -199,4 +202,4 @@ def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
     told = CliRunner().invoke(
         app, ["optimize", "cover.yaml", "--objectives", "torque", "--n-total", "2", "--no-figures", "--out", "other"]
     )
-    assert "the task's workspace counts in none of the objectives (unreached heeds it)" in told.output
+    assert "the task's workspace counts in none of the objectives (uncovered_fraction heeds it)" in told.output

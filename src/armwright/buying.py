@@ -21,14 +21,14 @@ from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.history import FrontMember, History
 from armwright.kinematics.arrays import FIXED, stack_arms
 from armwright.objectives import (
-    MISSED,
     OF_CLEARANCE,
     PEAK_TORQUE,
     POSITION_ERROR,
     PRICE,
     REACHED,
     TORQUE,
-    TORQUE_USE,
+    TORQUE_UTILISATION,
+    UNREACHED_TARGETS,
     WORST_ERROR,
     Objective,
 )
@@ -48,7 +48,14 @@ BOUGHT = "bought.json"  # of a run folder: the arms that were compared with it l
 POSITIONS = 300  # of the base, at random
 REFINED = 4  # of these, the best ones,
 REFINEMENT = 300  # by so many evaluations each
-MEASURES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE, WORST_ERROR, MISSED, PEAK_TORQUE, TORQUE_USE)
+MEASURES: tuple[Objective, ...] = (
+    POSITION_ERROR,
+    TORQUE,
+    WORST_ERROR,
+    UNREACHED_TARGETS,
+    PEAK_TORQUE,
+    TORQUE_UTILISATION,
+)
 
 
 @dataclass(frozen=True)
@@ -282,7 +289,7 @@ def _compared(
 def _known(quantity: Quantity, evaluation: Evaluation) -> float | None:
     """None where it needs efforts or prices that the arm does not state, or its shape, of which only lines are read."""
     actuation = evaluation.arms.actuation
-    if quantity.name == TORQUE_USE.name and actuation is None:
+    if quantity.name == TORQUE_UTILISATION.name and actuation is None:
         return None
     if quantity.name == PRICE.name and (actuation is None or np.isnan(actuation.price).any()):
         return None

@@ -24,7 +24,7 @@ from armwright.task import Task
 
 DIGITS = 9  # decimals [m], [rad] to which designs are compared
 BLIND = {  # objectives and bounds that see no more than where the tip is, what holds it, and how long the arm is
-    "position_error", "torque", "worst_error", "missed", "peak_torque", "rms_torque", "mass", "length",
+    "position_error", "torque", "worst_error", "unreached_targets", "peak_torque", "rms_torque", "mass", "length",
 }  # fmt: skip
 TOLD = {"name", "targets", "payload", "objectives", "constraints", "reference_point", "description", "provenance"}
 UPRIGHT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "xy": (1.0, -1.0, 0.0)}  # normals of mirrors, by what they swap

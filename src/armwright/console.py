@@ -361,8 +361,8 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
         table.add_row(arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *told)
     console.print(table)
     console.print(
-        f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; use = the "
-        "largest share of a joint's effort limit"
+        f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
+        "util. = the largest share of a joint's effort limit"
     )
     if comparison.designs and space.is_toy:
         console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
@@ -389,9 +389,9 @@ _ARM_COLUMNS = {
     "position_error": "error\nm",
     "torque": "\ntorque",
     "worst_error": "worst\nm",
-    "missed": "\nmissed",
+    "unreached_targets": "targets\nunreached",
     "peak_torque": "peak\nN m",
-    "torque_use": "\nuse",
+    "torque_utilisation": "torque\nutil.",
 }
 
 
@@ -426,7 +426,7 @@ def _obstacle_note(problem: Problem) -> str:
     """That a task's obstacles count for nothing, where that is so."""
     if not problem.task.obstacles or problem.heeds_clearance:
         return ""
-    return "; the task's obstacles count in none of the objectives (collision and closeness heed them)"
+    return "; the task's obstacles count in none of the objectives (collision and clearance_shortfall heed them)"
 
 
 def _move_note(problem: Problem) -> str:
@@ -441,7 +441,7 @@ def _workspace_note(problem: Problem) -> str:
     """That a task's workspace counts for nothing, where that is so."""
     if not problem.task.workspace or problem.heeds_workspace:
         return ""
-    return "; the task's workspace counts in none of the objectives (unreached heeds it)"
+    return "; the task's workspace counts in none of the objectives (uncovered_fraction heeds it)"
 
 
 def _payload_note(task: DesignTask) -> str:

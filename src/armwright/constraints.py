@@ -1,4 +1,4 @@
-"""Constraints: bounds that a design has to keep, as plain sentences such as `torque_use <= 0.8`.
+"""Constraints: bounds that a design has to keep, as plain sentences such as `torque_utilisation <= 0.8`.
 
 What `armwright.feasibility` says holds here, too: a constraint's value is how far it is broken, feasible is <= 0.
 """
@@ -12,7 +12,7 @@ from typing import Literal, Protocol, cast
 from armwright.arrays import Array
 from armwright.evaluation import Evaluation
 from armwright.exceptions import TaskError, did_you_mean
-from armwright.objectives import OBJECTIVES, TO_BOUND
+from armwright.objectives import OBJECTIVES, RENAMED, TO_BOUND
 
 Relation = Literal["<=", ">="]
 
@@ -102,7 +102,7 @@ def _read(sentence: str) -> Constraint:
     name, relation, number = found.groups()
     if name not in QUANTITIES:
         raise TaskError(
-            f'constraint "{sentence}": unknown quantity "{name}".{did_you_mean(name, QUANTITIES)} '
+            f'constraint "{sentence}": unknown quantity "{name}".{did_you_mean(name, QUANTITIES, RENAMED)} '
             f"Quantities: {', '.join(QUANTITIES)}"
         )
     bound = float(number) if _NUMBER.fullmatch(number) else math.nan

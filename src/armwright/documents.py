@@ -13,6 +13,7 @@ from armwright.exceptions import ArmwrightError, did_you_mean
 Schema = TypeVar("Schema", bound=BaseModel)
 
 LARGEST_DOCUMENT = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has some 0.3 MB
+RENAMED = {"jitter": "target_noise"}  # keys of files
 MOST_NODES = 400_000  # values in a document; of 10,000 targets that say all that a target can there are 240,000
 
 
@@ -47,9 +48,8 @@ def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Armwr
     for key in data:
         if key not in schema.model_fields:
             allowed = ", ".join(schema.model_fields)
-            raise error(
-                f'{where}: unknown key "{key}". Allowed: {allowed}.{did_you_mean(str(key), schema.model_fields)}'
-            )
+            hint = did_you_mean(str(key), schema.model_fields, RENAMED)
+            raise error(f'{where}: unknown key "{key}". Allowed: {allowed}.{hint}')
     try:
         return schema.model_validate(data)
     except ValidationError as fault:

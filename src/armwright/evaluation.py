@@ -68,7 +68,7 @@ class Evaluation:
         """The arms along the moves; SettingsError where there are none."""
         if not self.moves:
             raise SettingsError(
-                "path_error, joint_jump and all else of moves need some in the task: moves: in_order, or "
+                "path_error, max_joint_step and all else of moves need some in the task: moves: in_order, or "
                 "moves: [[1, 2], [2, 3]]"
             )
         return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
@@ -79,8 +79,8 @@ class Evaluation:
         paths = self.paths
         if not self.moves.times:
             raise SettingsError(
-                "dynamic_torque, dynamic_use and speed_use need to know how long the task's moves take: move_time: 1.5 "
-                "[s], or one for each move"
+                "dynamic_torque, dynamic_utilisation and speed_utilisation need the duration of the task's moves: "
+                "move_time: 1.5 [s], or one for each move"
             )
         return driven(self.arms, paths)
 
@@ -114,7 +114,8 @@ class Evaluation:
         """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
         if not self.workspace:
             raise SettingsError(
-                "unreached needs a workspace in the task: workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
+                "uncovered_fraction needs a workspace in the task: "
+                "workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
             )
         points = points_of(self.workspace)
         reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached

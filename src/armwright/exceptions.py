@@ -23,9 +23,10 @@ A message is one line in the user's words: it names the value with its unit, wha
 way out. What it repeats of files and answers cannot break the line, or speak to a terminal.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 
 LONGEST_MESSAGE = 3000  # characters
 
@@ -159,7 +160,16 @@ def _cut(text: str) -> str:
     return f"{text[: LONGEST_MESSAGE // 2]} […] {text[-LONGEST_MESSAGE // 3 :]}"
 
 
-def did_you_mean(name: str, allowed: Iterable[str]) -> str:
-    """' Did you mean "x"?' for the nearest allowed name, or nothing where none is near."""
-    near = get_close_matches(name, list(allowed), n=1, cutoff=0.6)
+def did_you_mean(name: str, allowed: Iterable[str], renamed: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Return ' Did you mean "x"?' for the closest allowed name, or '' if none is close.
+
+    Args:
+        name: The unknown name.
+        allowed: The names that would be accepted.
+        renamed: Former names and what they are called now.
+    """
+    allowed = list(allowed)
+    if renamed.get(name) in allowed:
+        return f' It is now called "{renamed[name]}".'
+    near = get_close_matches(name, allowed, n=1, cutoff=0.6)
     return f' Did you mean "{near[0]}"?' if near else ""

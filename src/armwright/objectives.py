@@ -78,8 +78,8 @@ def _actuation(evaluation: Evaluation, name: str) -> Actuation:
     return actuation
 
 
-def _torque_use(evaluation: Evaluation) -> Array:
-    effort = _actuation(evaluation, "torque_use").effort
+def _torque_utilisation(evaluation: Evaluation) -> Array:
+    effort = _actuation(evaluation, "torque_utilisation").effort
     return evaluation.worst_torques(lambda torques: np.abs(torques / effort[:, None]).max(axis=-1))
 
 
@@ -87,17 +87,17 @@ def _dynamic_torque(evaluation: Evaluation) -> Array:
     return evaluation.worst_drives(lambda torques, _: np.abs(torques).max(axis=-1))
 
 
-def _dynamic_use(evaluation: Evaluation) -> Array:
-    effort = _actuation(evaluation, "dynamic_use").effort
+def _dynamic_utilisation(evaluation: Evaluation) -> Array:
+    effort = _actuation(evaluation, "dynamic_utilisation").effort
     return evaluation.worst_drives(lambda torques, _: np.abs(torques / effort[:, None]).max(axis=-1))
 
 
-def _speed_use(evaluation: Evaluation) -> Array:
-    speed = _actuation(evaluation, "speed_use").speed
+def _speed_utilisation(evaluation: Evaluation) -> Array:
+    speed = _actuation(evaluation, "speed_utilisation").speed
     if np.isnan(speed).any():
         raise SettingsError(
-            "objective speed_use needs the speed of every actuator; the space names one without (speed [rad/s] in its "
-            "record)"
+            "objective speed_utilisation needs the speed of every actuator; the space names one without "
+            "(speed [rad/s] in its record)"
         )
     return evaluation.worst_drives(lambda _, speeds: np.abs(speeds / speed[:, None]).max(axis=-1))
 
@@ -106,7 +106,7 @@ def _path_error(evaluation: Evaluation) -> Array:
     return evaluation.paths.with_largest(np.zeros(evaluation.position_error.shape), evaluation.paths.error)
 
 
-def _joint_jump(evaluation: Evaluation) -> Array:
+def _max_joint_step(evaluation: Evaluation) -> Array:
     return evaluation.paths.with_largest(np.zeros(evaluation.position_error.shape), evaluation.paths.jumps)
 
 
@@ -147,11 +147,11 @@ WORST_ERROR = Objective(
     each=lambda evaluation: evaluation.position_error,
     over="max",
 )
-MISSED = Objective(
-    name="missed",
-    label="Targets missed",
+UNREACHED_TARGETS = Objective(
+    name="unreached_targets",
+    label="Unreached targets",
     unit="targets",
-    symbol="E_missed",
+    symbol="E_unreached",
     words=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
     each=lambda evaluation: evaluation.missed.astype(np.float64),
 )
@@ -199,14 +199,14 @@ MASS = Objective(
     each=_mass,
     over="arm",
 )
-TORQUE_USE = Objective(
-    name="torque_use",
-    label="Torque use",
+TORQUE_UTILISATION = Objective(
+    name="torque_utilisation",
+    label="Torque utilisation",
     unit="of allowed",
-    symbol="E_use",
+    symbol="E_util",
     words="the largest share of its actuator's torque that any joint needs to hold the kept posture up against "
     "gravity; above 1 the arm cannot hold it",
-    each=_torque_use,
+    each=_torque_utilisation,
     over="max",
 )
 PRICE = Objective(
@@ -244,11 +244,11 @@ COLLISION = Objective(
     words="how deep the arm in the kept posture is in an obstacle or in itself, at the worst place; 0 where it is free",
     each=lambda evaluation: np.maximum(0.0, -evaluation.clearance),
 )
-CLOSENESS = Objective(
-    name="closeness",
-    label="Closeness",
+CLEARANCE_SHORTFALL = Objective(
+    name="clearance_shortfall",
+    label="Clearance shortfall",
     unit="m",
-    symbol="E_closeness",
+    symbol="E_shortfall",
     words=f"by how much the arm in the kept posture comes nearer than {COMFORTABLE:g} m to an obstacle or to itself; "
     f"above {COMFORTABLE:g} it is in it",
     each=lambda evaluation: np.maximum(0.0, COMFORTABLE - evaluation.clearance),
@@ -264,30 +264,30 @@ PATH_ERROR = Objective(
     each=_path_error,
     over="max",
 )
-JOINT_JUMP = Objective(
-    name="joint_jump",
-    label="Joint jump",
+MAX_JOINT_STEP = Objective(
+    name="max_joint_step",
+    label="Largest joint step",
     unit="rad",
-    symbol="E_jump",
+    symbol="E_step",
     words="the largest change of any joint [rad, of sliding ones m] from one step of the moves that end at the target "
     "to the next, large where the arm flips into another posture on the way; 0 where no move ends there",
-    each=_joint_jump,
+    each=_max_joint_step,
     over="max",
 )
-UNREACHED = Objective(
-    name="unreached",
-    label="Unreached",
-    unit="share",
-    symbol="E_unreached",
+UNCOVERED_FRACTION = Objective(
+    name="uncovered_fraction",
+    label="Uncovered fraction",
+    unit="fraction",
+    symbol="E_uncovered",
     words=f"the share of the workspace's points that the tip misses by {1e3 * REACHED:g} mm or more",
     each=lambda evaluation: (evaluation.workspace_error >= REACHED).mean(axis=1),
     over="arm",
 )
-CLUMSINESS = Objective(
-    name="clumsiness",
-    label="Clumsiness",
-    unit="share",
-    symbol="E_clumsy",
+ANISOTROPY = Objective(
+    name="anisotropy",
+    label="Anisotropy",
+    unit="fraction",
+    symbol="E_anisotropy",
     words="1 less the tip's speed in the direction in which the joints move it worst over that in the best, in the "
     "kept posture: 0 where all directions are alike, 1 where there is one in which the tip cannot move at all",
     each=lambda evaluation: 1.0 - evaluation.dexterity,
@@ -303,33 +303,43 @@ DYNAMIC_TORQUE = Objective(
     each=_dynamic_torque,
     over="max",
 )
-DYNAMIC_USE = Objective(
-    name="dynamic_use",
-    label="Dynamic use",
+DYNAMIC_UTILISATION = Objective(
+    name="dynamic_utilisation",
+    label="Dynamic utilisation",
     unit="of allowed",
-    symbol="E_dynuse",
+    symbol="E_dynutil",
     words="the largest share of any actuator's torque along the timed moves that end at the target; above 1 it cannot",
-    each=_dynamic_use,
+    each=_dynamic_utilisation,
     over="max",
 )
-SPEED_USE = Objective(
-    name="speed_use",
-    label="Speed use",
+SPEED_UTILISATION = Objective(
+    name="speed_utilisation",
+    label="Speed utilisation",
     unit="of allowed",
     symbol="E_speed",
     words="the largest share of any actuator's no-load speed along the timed moves that end at the target; above 1 it "
     "cannot",
-    each=_speed_use,
+    each=_speed_utilisation,
     over="max",
 )
 PAPER_OBJECTIVES: tuple[Objective, ...] = (POSITION_ERROR, TORQUE)
 OF_ORIENTATION = (ORIENTATION_ERROR, WORST_ANGLE)
 _ALL = (
-    *PAPER_OBJECTIVES, WORST_ERROR, MISSED, PEAK_TORQUE, RMS_TORQUE, TORQUE_USE, MASS, LENGTH, PRICE, JOINTS,
-    *OF_ORIENTATION, COLLISION, CLOSENESS, PATH_ERROR, JOINT_JUMP, DYNAMIC_TORQUE, DYNAMIC_USE, SPEED_USE, UNREACHED,
-    CLUMSINESS,
+    *PAPER_OBJECTIVES, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, RMS_TORQUE, TORQUE_UTILISATION, MASS, LENGTH,
+    PRICE, JOINTS, *OF_ORIENTATION, COLLISION, CLEARANCE_SHORTFALL, PATH_ERROR, MAX_JOINT_STEP, DYNAMIC_TORQUE,
+    DYNAMIC_UTILISATION, SPEED_UTILISATION, UNCOVERED_FRACTION, ANISOTROPY,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
+RENAMED = {
+    "missed": "unreached_targets",
+    "unreached": "uncovered_fraction",
+    "clumsiness": "anisotropy",
+    "closeness": "clearance_shortfall",
+    "joint_jump": "max_joint_step",
+    "torque_use": "torque_utilisation",
+    "dynamic_use": "dynamic_utilisation",
+    "speed_use": "speed_utilisation",
+}
 
 
 def _clearance(name: str, words: str, each: Callable[[Evaluation], Array]) -> Objective:
@@ -353,10 +363,11 @@ CLEARANCES: tuple[Objective, ...] = (
     _clearance("obstacle_clearance", "how far the arm in the kept posture is from obstacles",
                lambda e: e.obstacle_clearance),
 )  # fmt: skip
-OF_CLEARANCE = (COLLISION, CLOSENESS, *CLEARANCES)
-OF_THE_WAY = (*OF_CLEARANCE, PEAK_TORQUE, TORQUE_USE)  # a target's share is the worst of it and of the moves there
-OF_TIME = (DYNAMIC_TORQUE, DYNAMIC_USE, SPEED_USE)
-OF_MOVES = (*OF_THE_WAY, PATH_ERROR, JOINT_JUMP, *OF_TIME)
+OF_CLEARANCE = (COLLISION, CLEARANCE_SHORTFALL, *CLEARANCES)
+# A target's share is the worst of it and of the moves there.
+OF_THE_WAY = (*OF_CLEARANCE, PEAK_TORQUE, TORQUE_UTILISATION)
+OF_TIME = (DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION)
+OF_MOVES = (*OF_THE_WAY, PATH_ERROR, MAX_JOINT_STEP, *OF_TIME)
 MANIPULABILITY = Objective(
     name="manipulability",
     label="Manipulability",
@@ -378,7 +389,7 @@ def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> 
     for name in names:
         if name not in known:
             raise SettingsError(
-                f'unknown objective "{name}".{did_you_mean(name, known)} Objectives: {", ".join(known)}'
+                f'unknown objective "{name}".{did_you_mean(name, known, RENAMED)} Objectives: {", ".join(known)}'
             )
     if not 1 <= len(names) <= MOST_OBJECTIVES or len(set(names)) < len(names):
         raise SettingsError(

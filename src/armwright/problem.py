@@ -21,7 +21,7 @@ from armwright.objectives import (
     OF_TIME,
     ORIENTATION_ERROR,
     PAPER_OBJECTIVES,
-    UNREACHED,
+    UNCOVERED_FRACTION,
     Objective,
     named_objectives,
 )  # fmt: skip
@@ -137,7 +137,7 @@ class Problem:
     @property
     def heeds_workspace(self) -> bool:
         """Whether it counts how much of the workspace is covered."""
-        return self.counts(UNREACHED)
+        return self.counts(UNCOVERED_FRACTION)
 
     @property
     def _postures(self) -> int:

@@ -54,7 +54,7 @@ BEFORE_TRIALS = {
 }  # fmt: skip
 # Of a task; its words may change.
 IDENTITY = (
-    "name", "targets", "payload", "payload_factors", "jitter", "restarts", "obstacles", "moves", "move_step",
+    "name", "targets", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step",
     "move_time", "workspace", "constraints", "reference_point",
 )  # fmt: skip
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")

@@ -34,7 +34,7 @@ from armwright.workspace import MOST_POINTS, MOST_REGIONS, Region
 
 LARGEST_PAYLOAD = 1e4  # [kg]
 MOST_TIMES_PAYLOAD = 100.0
-LARGEST_JITTER = 1.0  # [m]
+LARGEST_NOISE = 1.0  # [m]
 MOST_TARGETS = 10_000
 MOST_RESTARTS = 100
 IN_ORDER = "in_order"  # of moves: from each target to the next
@@ -49,7 +49,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     targets: points; where records are given that say more (`Target`), that is in `goals` and `entries`.
     payload: what the tip carries at all targets, or at each [kg].
     payload_factors: the payload may also be so many times as heavy; the worst case counts, in each objective.
-    jitter: the targets may also be off by so much along x, y or z, all together; likewise [m].
+    target_noise: the targets may also be off by so much along x, y or z, all together; likewise [m].
     restarts: further starts of the inverse kinematics at each target, of which the best posture counts.
     obstacles: what the arm should keep away from; they count where an objective is of clearance.
     moves: straight lines that the tip goes along, as pairs of targets counted from 1, or from each target to the next.
@@ -58,7 +58,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     workspace: boxes that the tip should cover; where targets are left out, these are the boxes' corners.
     objectives: names of what is minimised (`armwright.objectives`); without them, the paper's two, and where a target
         says which way the tool points, orientation_error.
-    constraints: sentences that a design has to keep, such as "torque_use <= 0.8" (`armwright.constraints`).
+    constraints: sentences that a design has to keep, such as "torque_utilisation <= 0.8" (`armwright.constraints`).
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # of run folders, too
@@ -67,7 +67,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MOST_TIMES_PAYLOAD)], ...] = Field(
         default=(), max_length=10
     )
-    jitter: float = Field(default=0.0, ge=0.0, le=LARGEST_JITTER)
+    target_noise: float = Field(default=0.0, ge=0.0, le=LARGEST_NOISE)
     obstacles: tuple[Obstacle, ...] = ()
     restarts: int = Field(default=0, ge=0, le=MOST_RESTARTS)
     moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
@@ -206,7 +206,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @property
     def cases(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """(T, 3) points [m] and (T,) payloads [kg]: as the task stands, then each by itself that it may come to."""
-        shifts = [sign * self.jitter * axis for axis in np.eye(3) for sign in (-1.0, 1.0)] if self.jitter > 0.0 else []
+        noise = self.target_noise
+        shifts = [sign * noise * axis for axis in np.eye(3) for sign in (-1.0, 1.0)] if noise > 0.0 else []
         heavier = [(self.points, factor * self.payloads) for factor in self.payload_factors]
         return [(self.points, self.payloads), *heavier, *((self.points + shift, self.payloads) for shift in shifts)]
 
@@ -215,7 +216,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """What the task may come to beside what it says; empty for nothing."""
         factors = ", ".join(f"{factor:g}" for factor in self.payload_factors)
         found = [f"of payloads {factors} times as heavy"] if factors else []
-        found += [f"of targets that are all {1e3 * self.jitter:g} mm off along x, y or z"] if self.jitter > 0.0 else []
+        if self.target_noise > 0.0:
+            found.append(f"of targets that are all {1e3 * self.target_noise:g} mm off along x, y or z")
         return ", and ".join(found)
 
     @property
@@ -362,9 +364,9 @@ targets:
 # The worst case counts, in each objective, of these payloads (0: empty-handed; 1.2: a fifth more), and of targets that
 # are all off by so many metres along x, y or z.
 # payload_factors: [0.0, 1.2]
-# jitter: 0.005
+# target_noise: 0.005
 
-# What the arm should keep away from, in metres; it counts with the objective collision or closeness.
+# What the arm should keep away from, in metres; it counts with the objective collision or clearance_shortfall.
 # obstacles:
 #   - {{kind: ground, z: 0.0}}
 #   - {{kind: box, name: shelf, center: [0.4, 0.0, 0.2], size: [0.3, 0.6, 0.02], yaw: 0.0}}
@@ -372,18 +374,18 @@ targets:
 #   - {{kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}}
 
 # Straight lines that the tip goes along: from each target to the next, or pairs of targets counted from 1. They count
-# in path_error, joint_jump, peak_torque, torque_use, collision and closeness.
+# in path_error, max_joint_step, peak_torque, torque_utilisation, collision and clearance_shortfall.
 # moves: in_order    # or [[1, 2], [2, 1]]
 # move_step: 0.02    # m between two samples of a line
-# move_time: 1.5     # s, or a list with a value for each; for dynamic_torque, dynamic_use and speed_use
+# move_time: 1.5     # s, or a list with a value for each; for dynamic_torque, dynamic_utilisation, speed_utilisation
 
-# A box that the tip should cover, in metres, or a list of boxes; it counts with the objective unreached. Where targets
-# are left out, they are its corners.
+# A box that the tip should cover, in metres, or a list of boxes; it counts with the objective uncovered_fraction. Where
+# targets are left out, they are its corners.
 # workspace: {{low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 200}}
 
-# What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, missed, peak_torque,
-# rms_torque, mass, length, collision, closeness, orientation_error, worst_angle, path_error, joint_jump,
-# dynamic_torque, unreached, clumsiness.
+# What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, unreached_targets,
+# peak_torque, rms_torque, mass, length, collision, clearance_shortfall, orientation_error, worst_angle, path_error,
+# max_joint_step, dynamic_torque, uncovered_fraction, anisotropy.
 # objectives: [worst_error, peak_torque, mass]
 
 # What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number

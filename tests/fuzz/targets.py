@@ -118,7 +118,7 @@ targets:
   - [0.1, 0.35, 0.5]
 payload: [0.5, 0.5, 0.0]
 payload_factors: [0.0, 1.2]
-jitter: 0.005
+target_noise: 0.005
 restarts: 2
 obstacles:
   - {kind: ground, name: table, z: -0.2}
@@ -131,7 +131,7 @@ move_step: 0.05
 move_time: [1.5, 2]
 workspace: {low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 20}
 objectives: [worst_error, torque, collision, path_error, dynamic_torque]
-constraints: [mass <= 3, length >= 0.2, unreached <= 0.9]
+constraints: [mass <= 3, length >= 0.2, uncovered_fraction <= 0.9]
 reference_point: [1.0, 5.0, 2.0, 3.0, 4.0]
 description: What the arm has to do there.
 provenance: Measured.
@@ -419,8 +419,8 @@ def a_run() -> Path:
                 {
                     "name": "ur3", "joints": 6, "reach": 0.5, "mass": 11.0, "base": [0.0, 0.0, 0.0],
                     "values": [1.0, 2.0],
-                    "measures": {"torque": 2.0, "torque_use": None}, "dominates": 1, "dominated_by": 0, "breaks": [],
-                    "notes": ["the tip is here"],
+                    "measures": {"torque": 2.0, "torque_utilisation": None}, "dominates": 1, "dominated_by": 0,
+                    "breaks": [], "notes": ["the tip is here"],
                 }
             ]
         )

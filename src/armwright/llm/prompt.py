@@ -24,7 +24,7 @@ from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
-from armwright.objectives import MISSED, OF_THE_WAY, ORIENTATION_ERROR, POSITION_ERROR, Objective
+from armwright.objectives import OF_THE_WAY, ORIENTATION_ERROR, POSITION_ERROR, UNREACHED_TARGETS, Objective
 from armwright.problem import Problem
 from armwright.targets import target_words
 from armwright.task import IN_ORDER, Task
@@ -323,7 +323,7 @@ def _lines(hints: Sequence[str]) -> list[str]:
 def _spoken(objective: Objective, task: Task) -> Objective:
     """An objective whose words say what this task's tolerances and weights make of it."""
     goals = task.goals
-    if objective == MISSED and (goals.oriented or np.any(goals.tolerance != REACHED)):
+    if objective == UNREACHED_TARGETS and (goals.oriented or np.any(goals.tolerance != REACHED)):
         angle = " or the tool's direction by its angle tolerance" if goals.oriented else ""
         return replace(objective, words=f"1 where the tip misses the target by its tolerance{angle} or more, else 0")
     if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(goals.weight != 1.0):

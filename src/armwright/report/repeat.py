@@ -20,7 +20,7 @@ USUAL = {
     "answer": "two-step", "proposals": 1, "output": "auto",
 }  # fmt: skip
 AS_TOLD = (  # of a task: what makes it another
-    "entries", "payload", "payload_factors", "jitter", "restarts", "obstacles", "moves", "move_step", "move_time",
+    "entries", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step", "move_time",
     "workspace", "constraints", "objectives", "reference_point",
 )  # fmt: skip
 
