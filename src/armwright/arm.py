@@ -142,12 +142,13 @@ class Arm:
     tool_axis, tool_side: the world's directions of the tool's own z and x when all joints are at 0.
     base_mass: of what stands with the base, such as the first joint's actuator [kg].
 
-    >>> import armwright as aw
-    >>> joints = aw.Joint("revolute", "z", -2.4, 2.4), aw.Joint("revolute", "y", -2.4, 2.4)
-    >>> upright = aw.uniform_link((0.0, 0.0, 0.25), mass=0.1, radius=0.015)
-    >>> arm = aw.Arm((0.0, 0.0, 0.0), joints, (upright, upright))
-    >>> arm.length, arm.mass
-    (0.5, 0.2)
+    Examples:
+        >>> import armwright as aw
+        >>> joints = aw.Joint("revolute", "z", -2.4, 2.4), aw.Joint("revolute", "y", -2.4, 2.4)
+        >>> upright = aw.uniform_link((0.0, 0.0, 0.25), mass=0.1, radius=0.015)
+        >>> arm = aw.Arm((0.0, 0.0, 0.0), joints, (upright, upright))
+        >>> arm.length, arm.mass
+        (0.5, 0.2)
     """
 
     base: Vector

@@ -90,11 +90,12 @@ def pick(
     numbers: only these trials, such as the solid ones.
     FailureError where none meets the conditions; SettingsError for a name that does not exist.
 
-    >>> import armwright as aw
-    >>> run = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=20)
-    >>> lightest = pick(run.history, [read_condition("length<=1.2")], by="torque")[0]
-    >>> lightest.values[1] == min(member.values[1] for member in run.front if member.arm.length <= 1.2)
-    True
+    Examples:
+        >>> import armwright as aw
+        >>> run = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=20)
+        >>> lightest = pick(run.history, [read_condition("length<=1.2")], by="torque")[0]
+        >>> lightest.values[1] == min(member.values[1] for member in run.front if member.arm.length <= 1.2)
+        True
     """
     if by is not None and weights is not None:
         raise SettingsError("choose by one number or by weights, not by both")

@@ -173,11 +173,12 @@ def evaluate(
     moves: lines between targets that the tip goes along.
     workspace: boxes to cover.
 
-    >>> import armwright as aw
-    >>> space = aw.paper_space()
-    >>> arms = [space.arm(design) for design in space.sample(3, seed=0)]
-    >>> aw.evaluate(arms, [[0.3, 0.0, 0.2], [0.0, 0.3, 0.2]]).position_error.shape
-    (3, 2)
+    Examples:
+        >>> import armwright as aw
+        >>> space = aw.paper_space()
+        >>> arms = [space.arm(design) for design in space.sample(3, seed=0)]
+        >>> aw.evaluate(arms, [[0.3, 0.0, 0.2], [0.0, 0.3, 0.2]]).position_error.shape
+        (3, 2)
     """
     return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, goals, moves, workspace)
 

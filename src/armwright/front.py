@@ -122,12 +122,13 @@ def find_front(
     begin_with: a run folder, all of whose designs are taken, or a proposer, who gives the first designs.
     stop_at_stall: whether to end early when the hypervolume hardly grows any more.
 
-    >>> import armwright as aw
-    >>> problem = aw.Problem(aw.load_task("target-2"))
-    >>> run = aw.find_front(problem, budget=2000, seed=0)
-    >>> volume = aw.hypervolume([member.values for member in run.front], problem.reference_point)
-    >>> round(volume, 6) == round(run.summary["hypervolume"]["final"], 6)
-    True
+    Examples:
+        >>> import armwright as aw
+        >>> problem = aw.Problem(aw.load_task("target-2"))
+        >>> run = aw.find_front(problem, budget=2000, seed=0)
+        >>> volume = aw.hypervolume([member.values for member in run.front], problem.reference_point)
+        >>> round(volume, 6) == round(run.summary["hypervolume"]["final"], 6)
+        True
     """
     budget = budget if isinstance(budget, Budget) else Budget.of(str(budget))
     seed = whole("seed", seed, 0)

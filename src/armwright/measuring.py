@@ -80,11 +80,12 @@ def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callabl
     objectives: their names, each with its unit in brackets where it has one: "energy [J]".
     worst: what an arm counts for which the function fails, one number for each; without it, the run stops there.
 
-    >>> @evaluator("reach [m]")
-    ... def shortest(arm, task):
-    ...     return sum(link.length for link in arm.links)
-    >>> shortest.objectives[0].unit
-    'm'
+    Examples:
+        >>> @evaluator("reach [m]")
+        ... def shortest(arm, task):
+        ...     return sum(link.length for link in arm.links)
+        >>> shortest.objectives[0].unit
+        'm'
     """
     if not 1 <= len(objectives) <= MOST_OBJECTIVES or len(set(objectives)) < len(objectives):
         raise SettingsError(f"evaluator({', '.join(objectives)}): 1 to {MOST_OBJECTIVES} different names are needed")

@@ -14,8 +14,9 @@ def front_mask(values: Array) -> NDArray[np.bool_]:
 
     Of equal rows the first is kept. Infinite rows, as of infeasible designs (`armwright.feasibility`), are not on it.
 
-    >>> front_mask([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0]])
-    array([ True,  True, False, False])
+    Examples:
+        >>> front_mask([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0]])
+        array([ True,  True, False, False])
     """
     values = np.asarray(values, dtype=np.float64)
     if len(values) == 0:
@@ -34,10 +35,11 @@ def hypervolume(values: Array, reference_point: Sequence[float]) -> float:
 
     Points that are not below the reference point in all objectives count nothing, nor do dominated ones.
 
-    >>> hypervolume([[1.0, 2.0], [2.0, 1.0]], (3.0, 3.0))
-    3.0
-    >>> hypervolume([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [0.0, 3.0]], (3.0, 3.0))
-    3.0
+    Examples:
+        >>> hypervolume([[1.0, 2.0], [2.0, 1.0]], (3.0, 3.0))
+        3.0
+        >>> hypervolume([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [0.0, 3.0]], (3.0, 3.0))
+        3.0
     """
     values = np.asarray(values, dtype=np.float64)
     inside = np.all(values < np.asarray(reference_point), axis=1) if len(values) else np.zeros(0, dtype=bool)
@@ -100,8 +102,9 @@ def knee_number(values: Array, reference_point: Sequence[float]) -> int | None:
 
     None where fewer than three designs of the front lie in the box.
 
-    >>> knee_number(np.array([[0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]), (5.0, 5.0))
-    1
+    Examples:
+        >>> knee_number(np.array([[0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]), (5.0, 5.0))
+        1
     """
     numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
     if len(numbers) < 3:

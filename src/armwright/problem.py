@@ -59,13 +59,14 @@ class Problem:
     evaluator: a function of one's own that measures objectives in place of ours (`armwright.measuring`).
     constraints: what a design has to keep, as the task says it.
 
-    >>> import armwright as aw
-    >>> problem = aw.Problem(aw.load_task("target-1"), aw.paper_space(joints=4))
-    >>> [objective.name for objective in problem.objectives]
-    ['position_error', 'torque']
-    >>> designs = problem.space.sample(1000, seed=0)
-    >>> problem.evaluate(designs).shape
-    (1000, 2)
+    Examples:
+        >>> import armwright as aw
+        >>> problem = aw.Problem(aw.load_task("target-1"), aw.paper_space(joints=4))
+        >>> [objective.name for objective in problem.objectives]
+        ['position_error', 'torque']
+        >>> designs = problem.space.sample(1000, seed=0)
+        >>> problem.evaluate(designs).shape
+        (1000, 2)
     """
 
     task: Task

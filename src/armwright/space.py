@@ -439,16 +439,17 @@ class DesignSpace(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 def paper_space(joints: int = 4) -> DesignSpace:
     """The design space of the paper, with `joints` joints (4 in its experiments).
 
-    >>> import armwright as aw
-    >>> space = aw.paper_space(joints=2)
-    >>> [parameter.name for parameter in space.parameters]
-    ['origin_x', 'origin_y', 'origin_z', 'joint_1', 'joint_2', 'link_1', 'link_2']
-    >>> params = {"origin_x": 0, "origin_y": 0, "origin_z": 0.1, "joint_1": "Y", "joint_2": "P", "link_1": 0.2}
-    >>> space.design(params | {"link_2": 0.3}).joints
-    'YP'
-    >>> space.design(params | {"link_2": 0.4})
-    Traceback (most recent call last):
-    armwright.exceptions.DesignError: link_2 = 0.4 m is outside 0.03 <= link_2 <= 0.3 m
+    Examples:
+        >>> import armwright as aw
+        >>> space = aw.paper_space(joints=2)
+        >>> [parameter.name for parameter in space.parameters]
+        ['origin_x', 'origin_y', 'origin_z', 'joint_1', 'joint_2', 'link_1', 'link_2']
+        >>> params = {"origin_x": 0, "origin_y": 0, "origin_z": 0.1, "joint_1": "Y", "joint_2": "P", "link_1": 0.2}
+        >>> space.design(params | {"link_2": 0.3}).joints
+        'YP'
+        >>> space.design(params | {"link_2": 0.4})
+        Traceback (most recent call last):
+        armwright.exceptions.DesignError: link_2 = 0.4 m is outside 0.03 <= link_2 <= 0.3 m
     """
     content = {"name": "paper" if joints == 4 else f"paper-{joints}", "joints": joints}
     return check_document(content, DesignSpace, SpaceError, "paper_space")
@@ -462,9 +463,10 @@ def builtin_spaces() -> list[str]:
 def load_space(name_or_path: str | Path) -> DesignSpace:
     """A built-in space by its name, or that of a YAML file; keys that it leaves out are as in the paper.
 
-    >>> import armwright as aw
-    >>> aw.load_space("slideopt").joint_types
-    ('R', 'P', 'Y', 'O', 'S', 'F')
+    Examples:
+        >>> import armwright as aw
+        >>> aw.load_space("slideopt").joint_types
+        ('R', 'P', 'Y', 'O', 'S', 'F')
     """
     name = str(name_or_path)
     if name == "paper":

@@ -134,16 +134,17 @@ def optimize(
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials; a run
         that has begun always goes on.
 
-    >>> import armwright as aw
-    >>> problem = aw.Problem(aw.load_task("target-1"))
-    >>> run = aw.optimize(problem, proposer="rules", n_init=5, n_total=20, seed=0)
-    >>> len(run.trials), run.hypervolume.shape
-    (25, (20,))
-    >>> [trial.number for trial in run.trials if trial.source == "rules"]
-    [5, 15]
-    >>> errors = [member.values[0] for member in run.front]
-    >>> errors == sorted(errors)
-    True
+    Examples:
+        >>> import armwright as aw
+        >>> problem = aw.Problem(aw.load_task("target-1"))
+        >>> run = aw.optimize(problem, proposer="rules", n_init=5, n_total=20, seed=0)
+        >>> len(run.trials), run.hypervolume.shape
+        (25, (20,))
+        >>> [trial.number for trial in run.trials if trial.source == "rules"]
+        [5, 15]
+        >>> errors = [member.values[0] for member in run.front]
+        >>> errors == sorted(errors)
+        True
     """
     if on_model_failure not in ON_MODEL_FAILURE:
         raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')

@@ -245,9 +245,10 @@ def builtin_names() -> list[str]:
 def builtin_tasks() -> dict[str, Task]:
     """The tasks that come with armwright, by name.
 
-    >>> import armwright as aw
-    >>> {name: len(task.targets) for name, task in aw.builtin_tasks().items() if name.startswith("target")}
-    {'target-1': 8, 'target-2': 9, 'target-3': 8}
+    Examples:
+        >>> import armwright as aw
+        >>> {name: len(task.targets) for name, task in aw.builtin_tasks().items() if name.startswith("target")}
+        {'target-1': 8, 'target-2': 9, 'target-3': 8}
     """
     return {name: _builtin(name) for name in builtin_names()}
 
@@ -261,12 +262,13 @@ def _builtin(name: str) -> Task:
 def load_task(name_or_path: str | Path) -> Task:
     """A built-in task by its name, `random-N` of the seeded family, or the task of a YAML file.
 
-    >>> import armwright as aw
-    >>> aw.load_task("target-1").targets[0]
-    (-0.45, -0.45, -0.45)
-    >>> aw.load_task("target-4")
-    Traceback (most recent call last):
-    armwright.exceptions.TaskError: unknown task "target-4". Did you mean "target-3"? ...
+    Examples:
+        >>> import armwright as aw
+        >>> aw.load_task("target-1").targets[0]
+        (-0.45, -0.45, -0.45)
+        >>> aw.load_task("target-4")
+        Traceback (most recent call last):
+        armwright.exceptions.TaskError: unknown task "target-4". Did you mean "target-3"? ...
     """
     known = builtin_names()
     if str(name_or_path) in known:

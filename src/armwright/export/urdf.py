@@ -28,15 +28,16 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
     z along the tool's axis and its x to the tool's side. Links are solid cylinders of uniform density from joint to
     joint, for inertia, collision and sight.
 
-    >>> import armwright as aw
-    >>> space = aw.paper_space(joints=2)
-    >>> arm = space.arm(space.sample(1, seed=0)[0])
-    >>> print(aw.to_urdf(arm, "two"))
-    <?xml version="1.0"?>
-    <robot name="two">
-    ...
-    </robot>
-    <BLANKLINE>
+    Examples:
+        >>> import armwright as aw
+        >>> space = aw.paper_space(joints=2)
+        >>> arm = space.arm(space.sample(1, seed=0)[0])
+        >>> print(aw.to_urdf(arm, "two"))
+        <?xml version="1.0"?>
+        <robot name="two">
+        ...
+        </robot>
+        <BLANKLINE>
     """
     return text_of(urdf_tree(arm, name))
 
