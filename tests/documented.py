@@ -7,7 +7,7 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[1]
-PAGES = tuple(sorted(str(file.relative_to(ROOT)) for at in (ROOT, ROOT / "docs") for file in at.glob("*.md")))
+PAGES = tuple(sorted(str(file.relative_to(ROOT)) for file in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))))
 
 PROGRAMS = ("armwright", ".venv/bin/armwright", "python", "python3", ".venv/bin/python", "pip", "make", "export", "sh",
             "xargs", "sudo", "apt", "apt-get", "dask", "ssh", "git", "docker", "optuna-dashboard", ".")  # fmt: skip
@@ -56,6 +56,12 @@ def commands(page: str) -> list[Command]:
         for number, line in enumerate(block.text.splitlines())
         if (text := without_comment(line))
     ]
+
+
+def code_spans(page: str) -> list[str]:
+    """Everything that a page sets in code within its sentences and tables."""
+    tokens = MarkdownIt().enable("table").parse((ROOT / page).read_text(encoding="utf-8"))
+    return [span.content for block in tokens for span in block.children or () if span.type == "code_inline"]
 
 
 def without_comment(line: str) -> str:

@@ -12,18 +12,19 @@ import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 import yaml
-from markdown_it import MarkdownIt
 
 import armwright as aw
+from armwright.cli import app
 from armwright.experiment.plan import ExperimentPlan, cells_of, load_experiment
 from armwright.space import DesignSpace
 from armwright.task import Task
-from tests.documented import PAGES, ROOT, Block, Command, blocks, commands
+from tests.documented import PAGES, ROOT, Block, Command, blocks, code_spans, commands
 from tests.robots import robot
-from website.commands import commands as cli
 
 # Commands that are not run, by what they match as a whole; the first that matches counts.
 NOT_RUN = {
@@ -88,6 +89,11 @@ SLOW = (
 )
 
 
+def cli() -> dict[str, Any]:
+    """Each command by its name, as Typer parses it."""
+    return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+
 def reason_not_to_run(command: str) -> str:
     return next((reason for pattern, reason in NOT_RUN.items() if re.fullmatch(pattern, command)), "")
 
@@ -140,17 +146,14 @@ def test_what_is_said_in_passing_exists() -> None:
     ours = set(re.findall(r'add(?:_argument|option)\(\s*"(--[a-z-]+)"', scripts))
     known = set[str]().union(*options.values()) | {"--version", "--help"} | ours
     for page in PAGES:
-        for block in MarkdownIt().enable("table").parse((ROOT / page).read_text(encoding="utf-8")):
-            for span in block.children or ():
-                if span.type != "code_inline":
-                    continue
-                words = span.content.split()
-                said = {word.split("=")[0] for word in words if re.fullmatch(r"--[a-z][a-z-]+(=.*)?", word)}
-                if words[0] == "armwright" and len(words) > 1 and not words[1].startswith("-"):
-                    assert words[1] in options, f"{page}: {span.content}"
-                    assert said <= options[words[1]] | {"--help"}, f"{page}: {span.content}"
-                elif words[0].startswith("--"):
-                    assert said <= known, f"{page}: {span.content}"
+        for span in code_spans(page):
+            words = span.split()
+            said = {word.split("=")[0] for word in words if re.fullmatch(r"--[a-z][a-z-]+(=.*)?", word)}
+            if words[0] == "armwright" and len(words) > 1 and not words[1].startswith("-"):
+                assert words[1] in options, f"{page}: {span}"
+                assert said <= options[words[1]] | {"--help"}, f"{page}: {span}"
+            elif words[0].startswith("--"):
+                assert said <= known, f"{page}: {span}"
 
 
 def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[str]:
