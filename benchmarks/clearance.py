@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 from one_core import on_one_core, print_rates, rates_in_turn, seconds
 
+from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate_arrays
-from armwright.kinematics.arrays import arrays_of
 from armwright.kinematics.clearance import clearances
 from armwright.objectives import named_objectives
 from armwright.obstacles import Box, Cylinder, Ground
@@ -32,7 +32,7 @@ SPACE = paper_space(6)
 
 def main() -> None:
     matrix = SPACE.matrix(SPACE.sample(N, seed=0))
-    arms = arrays_of(SPACE, matrix)
+    arms = stack_designs(SPACE, matrix)
     q = evaluate_arrays(arms, TASK.points).q
     paper = Problem(TASK, SPACE)
     with_clearance = Problem(TASK, SPACE, objectives=named_objectives(["position_error", "torque", "collision"]))

@@ -25,9 +25,10 @@ import pinocchio as pin
 from skrobot.coordinates import Coordinates
 from skrobot.model import RobotModel
 
+from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import ArmArrays, Precision, arrays_of, stack_arms
+from armwright.kinematics.arm_arrays import ArmArrays, Precision, stack_arms
 from armwright.kinematics.solve import UPDATES, solve_postures
 from armwright.masses import MassPerMetre
 from armwright.problem import Problem
@@ -121,7 +122,7 @@ def print_joints_and_targets() -> None:
         (4, 8, "float64"),
     ):
         space = paper_space(dof)
-        arrays = arrays_of(space, space.matrix(space.sample(2000, seed=0)), precision)
+        arrays = stack_designs(space, space.matrix(space.sample(2000, seed=0)), precision)
 
         def work(_: int, t: int = t, arrays: ArmArrays = arrays, precision: Precision = precision) -> None:
             solve_postures(arrays, points[:t], precision=precision)

@@ -21,16 +21,16 @@ ARMS, TARGETS = 4000, 8
 def main() -> None:
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])  # before any thread begins
     os.environ["WARP_CACHE_PATH"] = tempfile.mkdtemp(prefix="armwright-poses-")  # where nothing is compiled yet
+    from armwright.batch_builder import stack_designs
     from armwright.goals import AXIS, ORIENTATION, plain_goals, turned
-    from armwright.kinematics.arrays import arrays_of
     from armwright.kinematics.devices import load
     from armwright.kinematics.solve import LANES, solve_postures
     from armwright.space import paper_space
 
     compiled = {}
-    for rows in ("position", "mixed"):
+    for rows in ("position", "pose"):
         began = time.process_time()
-        load("float32", LANES["cpu"], "turning", rows, "cpu")
+        load("float32", LANES["cpu"], "revolute", rows, "cpu")
         compiled[rows] = time.process_time() - began
     rng = np.random.default_rng(0)
     points = rng.uniform(-0.5, 0.5, (TARGETS, 3))
@@ -38,7 +38,7 @@ def main() -> None:
     print(f"designs/s on one core, {TARGETS} targets, 100 updates")
     for joints in (6, 7):
         space = paper_space(joints)
-        arms = arrays_of(space, space.matrix(space.sample(ARMS, seed=0)))
+        arms = stack_designs(space, space.matrix(space.sample(ARMS, seed=0)))
         kinds = ([0] * 8, [AXIS] * 8, [ORIENTATION] * 8, [0, AXIS, ORIENTATION, AXIS] * 2)
         best = np.full(len(kinds), np.inf)
         for _ in range(5):

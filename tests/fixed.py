@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.batch_builder import stack_designs
 from armwright.evaluation import Evaluation
 from armwright.history import FinishedTrial, History
-from armwright.kinematics.arrays import arrays_of
 from armwright.kinematics.paths import Paths
 from armwright.moves import lines_of
 from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
@@ -39,7 +39,7 @@ class FixedProblem(Problem):
         mass = self.space.most_joints * self.space.mass.mass(self.space.link[1])
         lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
-        arms = arrays_of(self.space, rows)
+        arms = stack_designs(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
         angle = np.zeros_like(error)
         known = (arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from armwright.kinematics import solve
-from armwright.kinematics.arrays import FIXED, ArmArrays
+from armwright.kinematics.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.solve import Postures
 
 

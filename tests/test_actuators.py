@@ -12,13 +12,14 @@ import yaml
 from typer.testing import CliRunner
 
 from armwright.arm import Actuator, Arm, Joint, Link
+from armwright.batch_builder import stack_designs
 from armwright.catalogue import ActuatorRecord, catalogue
 from armwright.cli import app
 from armwright.evaluation import evaluate
 from armwright.exceptions import ArmError, SettingsError, SpaceError
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import FLOATS, arrays_of, stack_arms
+from armwright.kinematics.arm_arrays import FLOATS, stack_arms
 from armwright.objectives import named_objectives
 from armwright.problem import Problem
 from armwright.run_folder import read_run
@@ -50,7 +51,7 @@ def pinocchio_model(arm: Arm) -> tuple[pinocchio.Model, pinocchio.Data]:
 
 def test_the_arrays_are_those_of_the_arms_to_the_bit() -> None:
     designs = SPACE.sample(200, 1)
-    one, other = arrays_of(SPACE, SPACE.matrix(designs)), stack_arms([SPACE.arm(design) for design in designs])
+    one, other = stack_designs(SPACE, SPACE.matrix(designs)), stack_arms([SPACE.arm(design) for design in designs])
     for name in (*FLOATS, "motion", "base_mass"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
     for name in ("effort", "price"):
@@ -106,7 +107,7 @@ def test_a_single_actuator_is_no_parameter() -> None:
     assert len(single.parameters) == 11
     design = single.sample(1, 0)[0]
     assert [joint.actuator.name for joint in single.arm(design).joints] == ["mid"] * 4
-    assert arrays_of(single, single.matrix([design])).actuation.effort.tolist() == [[4.1] * 4]
+    assert stack_designs(single, single.matrix([design])).actuation.effort.tolist() == [[4.1] * 4]
 
 
 @pytest.mark.parametrize(

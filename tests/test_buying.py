@@ -17,7 +17,7 @@ import armwright as aw
 from armwright.buying import BOUGHT, ArmComparison, ComparedArm, compare_arms, read_bought, standing
 from armwright.exceptions import ArmError, FailureError, MissingExtraError, RunFolderError, SettingsError, TaskError
 from armwright.history import History
-from armwright.kinematics.arrays import stack_arms
+from armwright.kinematics.arm_arrays import stack_arms
 from armwright.objectives import named_objectives
 from armwright.report.figures import draw_front, write_figures
 from armwright.report.page import write_report

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from armwright.batch_builder import stack_designs
 from armwright.canonical import SameArms
-from armwright.kinematics.arrays import arrays_of
 from armwright.objectives import named_objectives
 from armwright.parameters import Design
 from armwright.problem import Problem
@@ -22,7 +22,7 @@ def values(problem: Problem, designs: list[Design], updates: int = 3) -> np.ndar
     from armwright.evaluation import Evaluation
     from armwright.kinematics.solve import solve_postures
 
-    arms = arrays_of(problem.space, problem.space.matrix(designs), "float64")
+    arms = stack_designs(problem.space, problem.space.matrix(designs), "float64")
     points = problem.task.points
     solved = solve_postures(arms, points, updates, precision="float64")
     error = np.linalg.norm(solved.reached - points, axis=-1)

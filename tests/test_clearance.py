@@ -11,9 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from armwright.arm import Arm, Joint, Link, uniform_link
+from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import Precision, arrays_of, stack_arms
+from armwright.kinematics.arm_arrays import Precision, stack_arms
 from armwright.kinematics.chain import link_lines
 from armwright.kinematics.clearance import clearances
 from armwright.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
@@ -310,7 +311,7 @@ def test_the_first_link_may_stand_on_what_its_foot_touches() -> None:
 def test_both_ways_to_arrays_have_the_radius() -> None:
     space = paper_space(5)
     designs = space.sample(20, 0)
-    one, other = arrays_of(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
+    one, other = stack_designs(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
     assert np.array_equal(one.radius, other.radius)
     assert one.radius.dtype == other.radius.dtype == np.float32
     assert one[3:5].radius.shape == (2, 5)

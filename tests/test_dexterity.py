@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from skrobot.coordinates.math import manipulability
 
 from armwright.arm import Arm, Joint, uniform_link
+from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import arrays_of, stack_arms
+from armwright.kinematics.arm_arrays import stack_arms
 from armwright.kinematics.jacobian import frames_of, jacobians
 from armwright.objectives import named_objectives
 from armwright.problem import Problem
@@ -121,4 +122,4 @@ def test_clumsiness_is_of_the_worst_target_and_costs_nothing_where_nobody_asks()
     plain = Problem(task, space).evaluation(designs)
     Problem(task, space).values(plain)
     assert "_singular_values" not in vars(plain)
-    assert arrays_of(space, space.matrix(designs)).precision == "float32"
+    assert stack_designs(space, space.matrix(designs)).precision == "float32"

@@ -20,7 +20,7 @@ from armwright.exceptions import RunConflictError, SettingsError
 from armwright.export.mjcf import to_mjcf
 from armwright.export.shapes import inertia_tensor
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import FIXED, stack_arms
+from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.dynamics import inverse_dynamics
 from armwright.kinematics.jacobian import frames_of, jacobian_rate, jacobians
 from armwright.moves import Moves, lines_of, moments, timing_of

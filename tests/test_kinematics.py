@@ -17,7 +17,7 @@ from armwright.arm import Arm, Joint, Link, uniform_link
 from armwright.exceptions import ArmError, SettingsError
 from armwright.export.urdf import to_urdf
 from armwright.kinematics import solve
-from armwright.kinematics.arrays import ArmArrays, stack_arms
+from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.solve import Postures
 from armwright.parameters import Design
 from armwright.space import DesignSpace, paper_space
@@ -480,10 +480,10 @@ def test_refused_arms_are_named() -> None:
         return Arm((0.0, 0.0, 0.0), joints, (link,) * len(joints))
 
     refused = [
-        ([arm(*[turning] * 17)], "up to 16 joints, not 17"),
-        ([arm(turning, Joint("revolute", "x", -1.0, 6.5))], r"joint 2 turns beyond ±2π rad: \[-1, 6.5\]"),
-        ([arm(Joint("revolute", "x", -6.5, 1.0))], r"joint 1 turns beyond ±2π rad: \[-6.5, 1\]"),
-        ([], "no arms"),
+        ([arm(*[turning] * 17)], "an arm has 17 joints; the kernels take at most 16"),
+        ([arm(turning, Joint("revolute", "x", -1.0, 6.5))], r"joint 2: limits \[-1, 6.5\] rad are outside"),
+        ([arm(Joint("revolute", "x", -6.5, 1.0))], r"joint 1: limits \[-6.5, 1\] rad are outside"),
+        ([], "at least one arm"),
     ]
     for arms, words in refused:
         with pytest.raises(ArmError, match=words):

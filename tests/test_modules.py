@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armwright.arm import Arm
+from armwright.batch_builder import stack_designs
 from armwright.exceptions import DesignError, SpaceError
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import arrays_of, stack_arms
+from armwright.kinematics.arm_arrays import stack_arms
 from armwright.kinematics.chain import joint_positions
 from armwright.kinematics.solve import solve_postures
 from armwright.modules import MODULES, MOUNTS
@@ -51,7 +52,7 @@ def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:
 @pytest.mark.parametrize("space", [MIXED, *map(load_space, builtin_spaces())], ids=lambda space: space.name)
 def test_designs_as_rows_build_the_same_arms_to_the_bit(space: DesignSpace, precision: Any) -> None:
     designs = space.sample(300, 7)
-    one = arrays_of(space, space.matrix(designs), precision)
+    one = stack_designs(space, space.matrix(designs), precision)
     other = stack_arms([space.arm(design) for design in designs], precision)
     for field in fields(one):
         mine, theirs = getattr(one, field.name), getattr(other, field.name)

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from armwright.arm import Arm, Joint, Link, uniform_link
+from armwright.batch_builder import stack_designs
 from armwright.cli import app
 from armwright.documents import parse_document
 from armwright.evaluation import Evaluation, evaluate
 from armwright.exceptions import RunConflictError, SettingsError, TaskError
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import arrays_of
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.kinematics.solve import solve_postures
@@ -140,7 +140,7 @@ def test_a_flip_is_a_jump() -> None:
 def test_moves_begin_in_the_kept_posture_and_go_on_from_sample_to_sample() -> None:
     """As one would do it by hand, one move and one sample after the other; to the bit."""
     space = paper_space(5)
-    arms = arrays_of(space, space.matrix(space.sample(40, 3)))
+    arms = stack_designs(space, space.matrix(space.sample(40, 3)))
     targets, pairs = np.array(CORNERS), ((0, 1), (2, 1), (1, 0))
     evaluation = Problem(task(moves=[(a + 1, b + 1) for a, b in pairs], move_step=0.05), space).evaluate_arrays(arms)
     paths = evaluation.paths

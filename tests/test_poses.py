@@ -11,11 +11,12 @@ import pinocchio
 import pytest
 
 from armwright.arm import Arm, Joint, uniform_link
+from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate, evaluate_arrays
 from armwright.export.urdf import to_urdf
 from armwright.goals import Goals, plain_goals, pointing, turned
 from armwright.kinematics import solve
-from armwright.kinematics.arrays import FIXED, arrays_of, stack_arms
+from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.solve import solve_postures, update_once
 from armwright.modules import MOUNTS
 from armwright.space import DesignSpace
@@ -328,13 +329,14 @@ def test_half_a_turn_is_defined(rows: int, precision: str) -> None:
 
 
 def test_tools_of_mounted_arms_point_where_the_arm_says() -> None:
-    """`arrays_of` and `stack_arms` agree to the bit, for all mounts."""
+    """`stack_designs` and `stack_arms` agree to the bit, for all mounts."""
     space = DesignSpace(name="any", joints=4, mount=tuple(MOUNTS))
     designs = space.sample(50, 0)
-    rows, one_by_one = arrays_of(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
-    assert np.array_equal(rows.tool_axis, one_by_one.tool_axis)
-    assert np.array_equal(rows.tool_side, one_by_one.tool_side)
-    assert len(np.unique(rows.tool_axis, axis=0)) == 6
+    batch = stack_designs(space, space.matrix(designs))
+    one_by_one = stack_arms([space.arm(design) for design in designs])
+    assert np.array_equal(batch.tool_axis, one_by_one.tool_axis)
+    assert np.array_equal(batch.tool_side, one_by_one.tool_side)
+    assert len(np.unique(batch.tool_axis, axis=0)) == 6
 
 
 # Restarts

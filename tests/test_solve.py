@@ -54,7 +54,7 @@ def test_first_use_by_many_threads_leaves_stderr_as_it_was() -> None:
 @pytest.mark.parametrize("closed", ["", "import os; os.close(2)\n"])
 def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
     done = run(
-        closed + "from armwright.kinematics.devices import load; load('float32', 8, 'turning', 'position', 'cpu')"
+        closed + "from armwright.kinematics.devices import load; load('float32', 8, 'revolute', 'position', 'cpu')"
     )
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -100,7 +100,7 @@ import warp as wp
 from armwright.kinematics.clearance_kernels import clearance_kernels_of
 from armwright.kinematics.kernels import kernels_of
 from armwright.kinematics.pose_kernels import pose_kernels_of
-variants = [kernels_of("float32", 1, "turning"), kernels_of("float32", 1, "any"), pose_kernels_of("float32", 1, "any")]
+variants = [kernels_of("float32", 1, "revolute"), kernels_of("float32", 1, "any"), pose_kernels_of("float32", 1, "any")]
 solving = [k for v in variants for k in (v.descend, v.settle, v.hold) if k is not None]
 measuring = clearance_kernels_of("float32")
 kernels = {kernel.module.name: kernel for kernel in (*solving, measuring.place, measuring.part, measuring.clear)}
@@ -162,7 +162,7 @@ def test_chunks_do_not_change_the_bits(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_many_targets_are_a_question_of_memory_alone() -> None:
     asked = Problem(load_task("target-1"))
-    arms = problem.arrays_of(asked.space, asked.space.matrix(asked.space.sample(3, 4)))
+    arms = problem.stack_designs(asked.space, asked.space.matrix(asked.space.sample(3, 4)))
     targets = np.random.default_rng(4).uniform(-0.7, 0.7, (2000, 3))
     postures = solve_postures(arms, targets, updates=5)
     assert postures.q.shape == (3, 2000, 4)

@@ -9,9 +9,10 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright.batch_builder import stack_designs
 from armwright.exceptions import DesignError, SpaceError
 from armwright.front import find_front
-from armwright.kinematics.arrays import FLOATS, arrays_of, stack_arms
+from armwright.kinematics.arm_arrays import FLOATS, stack_arms
 from armwright.llm.prompt import load_prompt
 from armwright.masses import MassOfTube, MassPerLink
 from armwright.parameters import Design, FloatParameter
@@ -190,7 +191,7 @@ def test_single_parameters_can_be_fixed_or_narrower(tmp_path: Path) -> None:
     assert {design.joints[2] for design in designs} == {"R", "P", "Y"}
     assert {design.origin[2] for design in designs} == {0.0}
     assert 0.1 <= min(design.links[0] for design in designs) <= max(design.links[0] for design in designs) <= 0.2
-    one, other = arrays_of(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
+    one, other = stack_designs(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
     for name in (*FLOATS, "motion"):
         assert np.array_equal(getattr(one, name), getattr(other, name))
     assert space.designs(space.matrix(designs)) == designs

@@ -9,7 +9,7 @@ import pytest
 from armwright.arm import Arm
 from armwright.exceptions import ArmError
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.arrays import stack_arms
+from armwright.kinematics.arm_arrays import stack_arms
 from armwright.kinematics.solve import solve_postures
 from armwright.urdf.document import LARGEST_FILE
 from armwright.urdf.reading import SNAP, UrdfArm, read_urdf

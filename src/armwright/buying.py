@@ -19,7 +19,7 @@ from armwright.constraints import Quantity
 from armwright.evaluation import Evaluation
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.history import FrontMember, History
-from armwright.kinematics.arrays import FIXED, stack_arms
+from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.objectives import (
     OF_CLEARANCE,
     PEAK_TORQUE,

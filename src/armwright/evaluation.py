@@ -11,7 +11,7 @@ from armwright.arm import Arm
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.goals import Goals, plain_goals
-from armwright.kinematics.arrays import FIXED, MOST_JOINTS, ArmArrays, stack_arms
+from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
 from armwright.kinematics.dynamics import Drives, driven
@@ -239,7 +239,7 @@ def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
     """n times (N, 1, D) postures to start from, each the same share of every joint's range for all arms."""
     if n == 0:
         return
-    shares = np.random.default_rng(0).uniform(size=(n, MOST_JOINTS))[:, : arrays.dof]
+    shares = np.random.default_rng(0).uniform(size=(n, MAX_JOINTS))[:, : arrays.dof]
     lower, upper = arrays.lower.astype(np.float64), arrays.upper.astype(np.float64)
     for share in shares:
         yield np.where(arrays.motion == FIXED, 0.0, lower + share * (upper - lower))[:, None]

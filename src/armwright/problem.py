@@ -7,11 +7,12 @@ import numpy as np
 
 from armwright.arm import Arm
 from armwright.arrays import Array
+from armwright.batch_builder import stack_designs
 from armwright.constraints import Constraint, read_constraints
 from armwright.evaluation import Evaluation, evaluate_arrays
 from armwright.exceptions import EvaluatorError, SettingsError, TaskError
 from armwright.feasibility import ranked
-from armwright.kinematics.arrays import ArmArrays, arrays_of
+from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.measuring import Evaluator
 from armwright.objectives import (
@@ -161,7 +162,7 @@ class Problem:
 
     def evaluation_of_rows(self, rows: Array) -> Evaluation:
         """The same of designs as rows (N, P), which may lie outside the space: what is built knows no ranges."""
-        return self.evaluate_arrays(arrays_of(self.space, rows))
+        return self.evaluate_arrays(stack_designs(self.space, rows))
 
     def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
         """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
@@ -178,7 +179,7 @@ class Problem:
         measured: (n,) of each objective that an evaluator measures.
         """
         worst, others = self.judged(self.evaluation_of_rows(rows), measured), self.task.cases[1:]
-        arms = arrays_of(self.space, rows) if others else None
+        arms = stack_designs(self.space, rows) if others else None
         for case in others:
             assert arms is not None
             worst = np.maximum(worst, self.judged(self._of_case(arms, *case), measured))

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate_arrays
 from armwright.feasibility import counted
 from armwright.history import History
-from armwright.kinematics.arrays import arrays_of
 from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.tolerance import moved
@@ -70,7 +70,7 @@ def verify(
     exact, exactly_broken = problem.split(_judged(problem, rows))
     copies = np.max([_judged(problem, copies) for copies in moved(problem.space, rows)], axis=0)
     off, broken_off = problem.split(copies)
-    dof = arrays_of(problem.space, rows).dof
+    dof = stack_designs(problem.space, rows).dof
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), dof))
     started, broken_started = problem.split(np.max([_judged(problem, rows, start) for start in starts], axis=0))
     worst = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
@@ -83,7 +83,7 @@ def verify(
 
 def _judged(problem: Problem, rows: Array, start: Array | None = None) -> Array:
     """(N, M + C) in float64.  start: (T, D) angles [rad]; None for the straight start."""
-    arrays = arrays_of(problem.space, rows, "float64")
+    arrays = stack_designs(problem.space, rows, "float64")
     task = problem.task
     known = (task.obstacles, task.goals, task.lines, task.workspace)
     found = [evaluate_arrays(arrays, points, "cpu", start, loads, *known) for points, loads in task.cases]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.kinematics.arrays import ArmArrays, Precision
+from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, load_clearance
 from armwright.kinematics.solve import in_threads
 from armwright.obstacles import SHAPES, Obstacle

@@ -12,7 +12,7 @@ from typing import Any
 
 import warp as wp
 
-from armwright.kinematics.arrays import FIXED, SLIDES, Precision
+from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Precision
 from armwright.obstacles import SHAPES
 
 _OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
@@ -48,11 +48,11 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
     @wp.func
     def slid(motion: int, p: Vector3, way: real, x: Vector3, y: Vector3, z: Vector3):
         """A joint's place: a sliding one has gone its way along its axis."""
-        if motion == wp.static(SLIDES):
+        if motion == wp.static(PRISMATIC):
             return p + way * x
-        if motion == wp.static(SLIDES + 1):
+        if motion == wp.static(PRISMATIC + 1):
             return p + way * y
-        if motion == wp.static(SLIDES + 2):
+        if motion == wp.static(PRISMATIC + 2):
             return p + way * z
         return p
 

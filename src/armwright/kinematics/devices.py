@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any, Literal, cast, get_args
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
-from armwright.kinematics.arrays import Motions, Precision, Rows
+from armwright.kinematics.arm_arrays import Motions, Precision, TargetKind
 
 Device = Literal["cpu", "cuda"]
 
@@ -43,10 +43,10 @@ def cores() -> int:
 _loading = threading.Lock()
 
 
-def load(precision: Precision, lanes: int, motions: Motions, rows: Rows, device: Device) -> tuple[Any, Any]:
+def load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> tuple[Any, Any]:
     """Warp and one variant of the kernels, compiled and loaded on a device, so that threads only launch."""
     with _loading:
-        return _warp(), _load(precision, lanes, motions, rows, device)
+        return _warp(), _load(precision, lanes, motions, kind, device)
 
 
 def load_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
@@ -71,12 +71,12 @@ def _warp() -> Any:
 
 
 @cache
-def _load(precision: Precision, lanes: int, motions: Motions, rows: Rows, device: Device) -> Any:
+def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> Any:
     with _said_where_it_is_kept():
         from armwright.kinematics.kernels import kernels_of
         from armwright.kinematics.pose_kernels import pose_kernels_of
 
-        make = {"position": kernels_of, "mixed": pose_kernels_of}[rows]
+        make = {"position": kernels_of, "pose": pose_kernels_of}[kind]
         kernels = make(precision, lanes, motions)
         for kernel in (kernels.descend, kernels.settle, kernels.hold):
             if kernel is not None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from armwright.arm import GRAVITY
 from armwright.arrays import Array
-from armwright.kinematics.arrays import FIXED, SLIDES, ArmArrays
+from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, ArmArrays
 from armwright.kinematics.jacobian import Frames, frames_of, jacobian_of, jacobian_rate
 from armwright.kinematics.paths import Paths, largest_of
 from armwright.moves import Moves, Timing, timing_of
@@ -40,7 +40,7 @@ def _newton_euler(
     n, k, dof = velocity.shape
     bodies = arms.bodies
     mass, com, inertia = bodies.total_mass[..., None], bodies.total_com, bodies.inertia
-    slides = ((arms.motion >= SLIDES) & (arms.motion < FIXED))[:, None, :, None]  # (N, 1, D, 1)
+    slides = ((arms.motion >= PRISMATIC) & (arms.motion < FIXED))[:, None, :, None]  # (N, 1, D, 1)
     along, rising = frames.axis * velocity[..., None], frames.axis * acceleration[..., None]  # (N, K, D, 3)
     turning, turning_faster = np.where(slides, 0.0, along), np.where(slides, 0.0, rising)
     sliding, sliding_faster = np.where(slides, along, 0.0), np.where(slides, rising, 0.0)
@@ -137,7 +137,7 @@ def _course(arms: ArmArrays, q: Array, frames: Frames, line: Array) -> tuple[Arr
 def _damping(arms: ArmArrays) -> Array:
     """(N,) what is added to the diagonal of J Jᵀ [m²], by an arm's size: it turns links, and slides by metres."""
     long = arms.length + np.linalg.norm(arms.tool, axis=1)
-    slides = ((arms.motion >= SLIDES) & (arms.motion < FIXED)).any(axis=1)
+    slides = ((arms.motion >= PRISMATIC) & (arms.motion < FIXED)).any(axis=1)
     size = np.hypot(long, slides)
     return (DAMPING * np.where(size > 0.0, size, 1.0)) ** 2  # one without size does not move its tip at all
 

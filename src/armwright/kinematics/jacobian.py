@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arrays import FIXED, SLIDES, ArmArrays
+from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, ArmArrays
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class Frames:
 def frames_of(arms: ArmArrays, q: Array) -> Frames:
     """The frames in postures q (N, K, D) [rad] or [m]."""
     n, k, dof = q.shape
-    turns, slides = arms.motion < SLIDES, (arms.motion >= SLIDES) & (arms.motion < FIXED)  # (N, D)
-    local = np.where((turns | slides)[..., None], np.eye(3)[arms.motion % SLIDES], 0.0)  # (N, D, 3)
+    turns, slides = arms.motion < PRISMATIC, (arms.motion >= PRISMATIC) & (arms.motion < FIXED)  # (N, D)
+    local = np.where((turns | slides)[..., None], np.eye(3)[arms.motion % PRISMATIC], 0.0)  # (N, D, 3)
     cross = np.cross(local[:, :, None], np.eye(3)).swapaxes(-1, -2)[:, None]  # (N, 1, D, 3, 3): v ↦ local x v
     angle = np.where(turns[:, None], q, 0.0)[..., None, None]
     turned = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
@@ -69,4 +69,4 @@ def jacobian_rate(arms: ArmArrays, frames: Frames, velocity: Array) -> Array:
 
 def _slides(arms: ArmArrays) -> NDArray[np.bool_]:
     """(N, 1, D, 1)"""
-    return (arms.motion >= SLIDES)[:, None, :, None]
+    return (arms.motion >= PRISMATIC)[:, None, :, None]

@@ -24,7 +24,7 @@ from typing import Any
 import warp as wp
 
 from armwright.arm import GRAVITY
-from armwright.kinematics.arrays import FIXED, MOST_JOINTS, SLIDES, Motions, Precision
+from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, PRISMATIC, Motions, Precision
 
 # At -O2, Warp's default, LLVM leaves more of the lanes scalar: 43,000 designs/s on a core rather than 58,000.
 OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
@@ -57,7 +57,7 @@ def kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kernels:
     real, Vector3 = {"float32": (wp.float32, wp.vec3f), "float64": (wp.float64, wp.vec3d)}[precision]
     Lane = wp.types.vector(length=lanes, dtype=real)
     Wide = wp.types.vector(length=lanes, dtype=wp.float64)
-    Joints = wp.types.matrix(shape=(MOST_JOINTS, lanes), dtype=real)  # row j: joint j in all lanes
+    Joints = wp.types.matrix(shape=(MAX_JOINTS, lanes), dtype=real)  # row j: joint j in all lanes
 
     zero, one, two, gravity = real(0.0), real(1.0), real(2.0), real(GRAVITY)
     one_wide = wp.float64(1.0)
@@ -144,11 +144,11 @@ def kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kernels:
     @wp.func
     def turned_by_any(motion: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
         """The same for joints that slide or do not move, too; the axis of a fixed one means nothing."""
-        if motion < SLIDES:
+        if motion < PRISMATIC:
             return turned_by_turning(motion, x, y, z, s, c)
-        if motion == SLIDES:
+        if motion == PRISMATIC:
             return x, y, z, x
-        if motion == SLIDES + 1:
+        if motion == PRISMATIC + 1:
             return x, y, z, y
         return x, y, z, z
 
@@ -159,7 +159,7 @@ def kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kernels:
 
     @wp.func
     def slid_by_any(motion: int, place: Lane, way: Lane, axis: Lane):
-        if motion < SLIDES or motion == FIXED:
+        if motion < PRISMATIC or motion == FIXED:
             return place
         return place + wp.cw_mul(way, axis)
 
@@ -170,7 +170,7 @@ def kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kernels:
 
     @wp.func
     def column_of_any(motion: int, ax: Lane, ay: Lane, az: Lane, ry: Lane, rz: Lane):
-        if motion < SLIDES:
+        if motion < PRISMATIC:
             return wp.cw_mul(ay, rz) - wp.cw_mul(az, ry)
         if motion < FIXED:
             return ax
@@ -183,21 +183,21 @@ def kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kernels:
 
     @wp.func
     def margin_of_any(motion: int):
-        if motion < SLIDES:
+        if motion < PRISMATIC:
             return turn_margin
         return slide_margin
 
     @wp.func
     def load(motion: int, ax: Lane, ay: Lane, az: Lane, lever_x: Lane, lever_y: Lane, mass: Lane):
         """The derivative of mass times height by a joint with this axis."""
-        if motion < SLIDES:
+        if motion < PRISMATIC:
             return wp.cw_mul(ax, lever_y) - wp.cw_mul(ay, lever_x)
         if motion < FIXED:
             return wp.cw_mul(mass, az)
         return Lane(zero)
 
     turned, slid, column_of, margin_of = {
-        "turning": (turned_by_turning, slid_by_turning, column_of_turning, margin_of_turning),
+        "revolute": (turned_by_turning, slid_by_turning, column_of_turning, margin_of_turning),
         "any": (turned_by_any, slid_by_any, column_of_any, margin_of_any),
     }[motions]
 

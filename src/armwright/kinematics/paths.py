@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arrays import ArmArrays
+from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.devices import Device
 from armwright.kinematics.solve import solve_postures
 from armwright.moves import Lines, Moves, lines_of

@@ -14,7 +14,7 @@ from functools import cache, partial
 
 import warp as wp
 
-from armwright.kinematics.arrays import SLIDES, Motions, Precision
+from armwright.kinematics.arm_arrays import PRISMATIC, Motions, Precision
 from armwright.kinematics.kernels import OPTIONS, Kernels, kernels_of
 
 WANTED = 16  # numbers that describe a target: see `descend`
@@ -76,11 +76,11 @@ def pose_kernels_of(precision: Precision, lanes: int, motions: Motions) -> Kerne
 
     @wp.func
     def turn_of_any(motion: int, along: Lane):
-        if motion < SLIDES:
+        if motion < PRISMATIC:
             return along
         return Lane(zero)
 
-    turn_of = {"turning": turn_of_turning, "any": turn_of_any}[motions]
+    turn_of = {"revolute": turn_of_turning, "any": turn_of_any}[motions]
 
     @wp.func
     def along(a: Vector3, x: Lane, y: Lane, z: Lane):

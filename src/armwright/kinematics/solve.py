@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.exceptions import ArmError, FailureError, SettingsError
 from armwright.goals import ORIENTATION, Goals
-from armwright.kinematics.arrays import (
+from armwright.kinematics.arm_arrays import (
     ARRAYS,
     FIXED,
     FLOATS,
@@ -25,8 +25,8 @@ from armwright.kinematics.arrays import (
     ArmArrays,
     Floats,
     Precision,
-    Rows,
-    checked_precision,
+    TargetKind,
+    check_precision,
 )
 from armwright.kinematics.devices import Device, cores, load, resolve_device
 
@@ -74,14 +74,14 @@ def solve_postures(
     """
     if updates < 0:
         raise SettingsError(f"updates = {updates} is outside 0 <= updates")
-    arms = _in_precision(arms, checked_precision(precision))
+    arms = _in_precision(arms, check_precision(precision))
     device = resolve_device(device, many=True)
     n, t, dof = len(arms), len(targets), arms.dof
-    start = None if start is None and arms.starts_at_zero else np.zeros(1) if start is None else start
+    start = None if start is None and arms.ranges_include_zero else np.zeros(1) if start is None else start
     starts = None
     if start is not None:
         starts = np.where(arms.motion[:, None] == FIXED, 0.0, _broadcast(start, (n, t, dof)))
-    rows = _rows_of(goals)
+    kind = _kind_of(goals)
     wanted = _wanted(targets, np.zeros(t) if payload is None else payload, goals)
     q, reached, torque = (np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof))
     solved = Postures(q, reached, torque, angle=np.zeros((n, t), dtype=precision))
@@ -91,10 +91,10 @@ def solve_postures(
         some_arms = arms[chunk]
         for some, lanes in parts:
             begin = None if starts is None else starts[chunk, some]
-            found = _solve(some_arms, wanted[some], updates, begin, rows, lanes, device)
+            found = _solve(some_arms, wanted[some], updates, begin, kind, lanes, device)
             for whole, part in zip((solved.q, solved.reached, solved.torque), found, strict=False):
                 whole[chunk, some] = part
-            if rows == "mixed":
+            if kind == "pose":
                 solved.angle[chunk, some] = found[3][..., 0]
 
     groups = -(-t // LANES[device])
@@ -120,7 +120,7 @@ def update_once(
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
     moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
     lanes = LANES["cpu"]
-    wp, kernels = load(arms.precision, lanes, arms.motions, _rows_of(goals), "cpu")
+    wp, kernels = load(arms.precision, lanes, arms.motions, _kind_of(goals), "cpu")
     wanted = _wanted(np.zeros((1, 3)), np.zeros(1), goals)
     at, q_last, h_last = (
         wp.array(_in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
@@ -130,8 +130,8 @@ def update_once(
     return _from_lanes(q_last.numpy())[:, 0], _from_lanes(h_last.numpy())[:, 0]
 
 
-def _rows_of(goals: Goals | None) -> Rows:
-    return "mixed" if goals is not None and goals.oriented else "position"
+def _kind_of(goals: Goals | None) -> TargetKind:
+    return "pose" if goals is not None and goals.oriented else "position"
 
 
 def _wanted(targets: NDArray[np.float64], payload: NDArray[np.float64], goals: Goals | None) -> NDArray[np.float64]:
@@ -158,11 +158,11 @@ def _solve(
     targets: NDArray[np.float64],
     updates: int,
     start: NDArray[np.float64] | None,
-    rows: Rows,
+    kind: TargetKind,
     lanes: int,
     device: Device,
 ) -> list[NDArray[Any]]:
-    """Kept angles, reached points, torques and, of mixed rows, angles off of a chunk of arms, (N, T, ...).
+    """Kept angles, reached points, torques and, of poses, angles off of a chunk of arms, (N, T, ...).
 
     targets: (T, C) as of `_wanted`.
     """
@@ -171,9 +171,9 @@ def _solve(
     if start is not None:
         begin = _in_lanes(np.clip(start, arms.lower[:, None], arms.upper[:, None]), lanes)
     if device == "cpu" and len(arms) <= _most_kept(arms, len(at), lanes):
-        results = _kept_arrays(arms, at, updates, rows, lanes).solve(arms, at, begin)
+        results = _kept_arrays(arms, at, updates, kind, lanes).solve(arms, at, begin)
     else:
-        wp, kernels = load(arms.precision, lanes, arms.motions, rows, device)
+        wp, kernels = load(arms.precision, lanes, arms.motions, kind, device)
         at_ = wp.array(at, dtype=kernels.Lane, device=device, copy=False)
         q_last = wp.zeros((len(arms), len(at), arms.dof), dtype=kernels.Lane, device=device)
         if begin is not None:
@@ -186,10 +186,10 @@ def _solve(
 class _KeptArrays:
     """What the kernels read and write on the CPU for some arms at a time, made once and filled again for others."""
 
-    def __init__(self, arms: ArmArrays, at: NDArray[Any], updates: int, rows: Rows, lanes: int) -> None:
-        wp, kernels = load(arms.precision, lanes, arms.motions, rows, "cpu")
+    def __init__(self, arms: ArmArrays, at: NDArray[Any], updates: int, kind: TargetKind, lanes: int) -> None:
+        wp, kernels = load(arms.precision, lanes, arms.motions, kind, "cpu")
         most, groups, dof = _most_kept(arms, len(at), lanes), len(at), arms.dof
-        read = {name: getattr(arms, name) for name in (ARRAYS if rows == "position" else (*ARRAYS, *TOOL))}
+        read = {name: getattr(arms, name) for name in (ARRAYS if kind == "position" else (*ARRAYS, *TOOL))}
         self._arms = {name: np.zeros((most, *some.shape[1:]), dtype=some.dtype) for name, some in read.items()}
         self._at = np.zeros(at.shape, dtype=arms.precision)
         self._q_last, self._h_last, *self._results = (
@@ -220,14 +220,14 @@ class _KeptArrays:
 _kept = threading.local()
 
 
-def _kept_arrays(arms: ArmArrays, at: NDArray[Any], updates: int, rows: Rows, lanes: int) -> _KeptArrays:
+def _kept_arrays(arms: ArmArrays, at: NDArray[Any], updates: int, kind: TargetKind, lanes: int) -> _KeptArrays:
     """This thread's arrays for arms with as many joints and targets of a kind."""
     sets: dict[tuple[Any, ...], _KeptArrays] = _kept.__dict__.setdefault("sets", {})
-    key = (arms.dof, arms.precision, arms.motions, len(at), updates, rows, lanes)
+    key = (arms.dof, arms.precision, arms.motions, len(at), updates, kind, lanes)
     if key not in sets:
         if len(sets) == MOST_KEPT:
             sets.clear()
-        sets[key] = _KeptArrays(arms, at, updates, rows, lanes)
+        sets[key] = _KeptArrays(arms, at, updates, kind, lanes)
     return sets[key]
 
 
@@ -242,7 +242,7 @@ def _bytes_of_one(arms: ArmArrays, groups: int, lanes: int) -> int:
 
 
 def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, wp: Any, kernels: Any) -> list[Any]:
-    """Kept angles, reached points, torques and, of mixed rows, angles off, (N, G, ...) in lanes, on the same device.
+    """Kept angles, reached points, torques and, of poses, angles off, (N, G, ...) in lanes, on the same device.
 
     at: (G, C) what targets ask for, in lanes.  q_last, h_last: (N, G, D) in lanes; they move on.
     """
@@ -254,7 +254,7 @@ def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, wp
 
 
 def _columns(dof: int, kernels: Any) -> tuple[int, ...]:
-    """Of the results: kept angles, reached points, torques and, of mixed rows, angles off."""
+    """Of the results: kept angles, reached points, torques and, of poses, angles off."""
     return (dof, 3, dof) if kernels.settle is None else (dof, 3, dof, 1)
 
 

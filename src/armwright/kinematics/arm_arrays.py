@@ -1,0 +1,254 @@
+"""Arms stacked into arrays, the input of the kernels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arm import AXES, Arm, Joint
+from armwright.arrays import Array
+from armwright.exceptions import ArmError, SettingsError, did_you_mean
+
+MAX_JOINTS = 16
+MAX_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
+PRISMATIC, FIXED = 3, 6  # motions: 0 to 2 rotate about local x, y, z; 3 to 5 translate along them; 6 is fixed
+
+Precision = Literal["float32", "float64"]
+Motions = Literal["revolute", "any"]  # of all joints of some arms
+TargetKind = Literal["position", "pose"]  # points alone, or some with an axis or orientation of the tool
+Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
+Ints = NDArray[np.int32]
+
+TOOL = ("tool_axis", "tool_side")  # fields of `ArmArrays` that only pose targets need
+ARRAYS = ("base", "lower", "upper", "offset", "com", "mass", "motion")  # fields that all IK kernels read
+FLOATS = (*ARRAYS[:-1], *TOOL)
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """Actuators of N arms of up to D joints.
+
+    Attributes:
+        effort: (N, D) largest torque of each actuator [N m]; infinite for fixed joints.
+        speed: (N, D) largest speed [rad/s]; NaN if unknown, infinite for fixed joints.
+        price: (N,) of all actuators of an arm [USD]; NaN if one has no price.
+    """
+
+    effort: Array
+    speed: Array
+    price: Array
+
+    def __getitem__(self, part: slice) -> "Actuation":
+        return Actuation(self.effort[part], self.speed[part], self.price[part])
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Rigid bodies of the links of N arms of up to D joints, in float64 whatever the precision of the arms.
+
+    A link is a solid cylinder that carries a point mass at its end (`armwright.arm.Link`).
+    """
+
+    mass: Array  # (N, D) of the cylinder [kg]
+    com: Array  # (N, D, 3) of the cylinder, from its joint [m]
+    offset: Array  # (N, D, 3) along the cylinder, from its joint to the next or to the end of the last link [m]
+    radius: Array  # (N, D) [m]
+    end_mass: Array  # (N, D) [kg]
+    end_place: Array  # (N, D, 3) of the point mass, from the link's joint [m]
+
+    @property
+    def total_mass(self) -> Array:
+        """(N, D) mass of cylinder and point mass [kg]."""
+        return self.mass + self.end_mass
+
+    @property
+    def total_com(self) -> Array:
+        """(N, D, 3) centre of mass of cylinder and point mass, from the joint [m]."""
+        total = self.total_mass[..., None]
+        both = self.mass[..., None] * self.com + self.end_mass[..., None] * self.end_place
+        return both / np.where(total > 0.0, total, 1.0)
+
+    @property
+    def inertia(self) -> Array:
+        """(N, D, 3, 3) about the total centre of mass, in the link's frame [kg m²]; equal to the exported files'."""
+        square = (self.offset**2).sum(axis=-1)
+        length = np.sqrt(square)[..., None]
+        axis = np.where(length > 0.0, self.offset / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
+        along = axis[..., :, None] * axis[..., None, :]
+        across_axis = (self.mass * (3.0 * self.radius**2 + square) / 12.0)[..., None, None]
+        around_axis = (self.mass * self.radius**2 / 2.0)[..., None, None]
+        tensor = across_axis * (np.eye(3) - along) + around_axis * along
+        centre = self.total_com
+        for mass, place in ((self.mass, self.com), (self.end_mass, self.end_place)):
+            away = place - centre
+            squared = (away**2).sum(axis=-1)[..., None, None] * np.eye(3)
+            tensor += mass[..., None, None] * (squared - away[..., :, None] * away[..., None, :])
+        return tensor
+
+    def __getitem__(self, part: slice) -> "Bodies":
+        return Bodies(**{field.name: getattr(self, field.name)[part] for field in fields(self)})
+
+
+@dataclass(frozen=True)
+class ArmArrays:
+    """N arms of up to D joints. A shorter arm ends with fixed joints that have neither length nor mass.
+
+    All floats that the kernels read are of one precision; the others are float64.
+    """
+
+    base: Floats  # (N, 3) [m]
+    motion: Ints  # (N, D) 0 to 2: rotates about local x, y, z; 3 to 5: translates along them; 6: fixed
+    lower: Floats  # (N, D) [rad] or [m]; ±1 for fixed joints, so that nothing divides by 0
+    upper: Floats  # (N, D) [rad] or [m]
+    offset: Floats  # (N, D, 3) from a joint to the next, or to the tip of the tool [m]
+    com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next [m]
+    mass: Floats  # (N, D) [kg]
+    radius: Floats  # (N, D) of the link after a joint [m]; 0 if there is none
+    tool: Array  # (N, 3) from the end of the last link to the tip [m], in its frame; included in `offset`
+    tool_axis: Floats  # (N, 3) the tool's own z in the world with all joints at 0, and so in the last local frame
+    tool_side: Floats  # (N, 3) likewise the tool's own x
+    n_joints: Ints  # (N,) number of an arm's joints, at most D
+    travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
+    length: Array  # (N,) of all links [m]
+    base_mass: Array  # (N,) mass that stands with the base [kg]
+    bodies: Bodies  # for dynamics alone
+    actuation: Actuation | None = None  # None unless all moving joints have actuators
+
+    def __len__(self) -> int:
+        return len(self.base)
+
+    def __getitem__(self, part: slice) -> "ArmArrays":
+        values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        cut: dict[str, Any] = {name: None if value is None else value[part] for name, value in values.items()}
+        return ArmArrays(**cut)
+
+    @property
+    def precision(self) -> Precision:
+        """Precision of the arrays that the kernels read."""
+        return "float64" if self.base.dtype == np.float64 else "float32"
+
+    @property
+    def dof(self) -> int:
+        """Number D of joints of the longest arm, fixed ones included."""
+        return self.motion.shape[1]
+
+    @property
+    def motions(self) -> Motions:
+        """The kernel variant that all arms need."""
+        return "revolute" if np.all(self.motion < PRISMATIC) else "any"
+
+    @property
+    def prismatic(self) -> NDArray[np.bool_]:
+        """(N, D) True for joints that translate."""
+        return (self.motion >= PRISMATIC) & (self.motion < FIXED)
+
+    @property
+    def ranges_include_zero(self) -> bool:
+        """True if every joint can stand at 0."""
+        return bool(np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0))
+
+
+def check_precision(name: str) -> Precision:
+    """Return `name` if it is a precision, else raise SettingsError."""
+    allowed = get_args(Precision)
+    if name not in allowed:
+        raise SettingsError(f'precision = "{name}" is not one of {", ".join(allowed)}.{did_you_mean(name, allowed)}')
+    return cast("Precision", name)
+
+
+def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArrays:
+    """Stack arms into arrays.
+
+    Args:
+        arms: N arms of at most MAX_JOINTS joints.
+        precision: of the arrays that the kernels read.
+
+    Raises:
+        ArmError: if there is no arm, or one that the kernels cannot take.
+    """
+    if not arms:
+        raise ArmError("expected at least one arm, got none")
+    for arm in arms:
+        _check(arm)
+    n, dof = len(arms), max(len(arm.joints) for arm in arms)
+    motion = np.full((n, dof), FIXED, dtype=np.int32)
+    lower, upper, travel = np.full((3, n, dof), 1.0)
+    lower *= -1.0
+    mass, radius = np.zeros((2, n, dof))
+    offset, com = np.zeros((2, n, dof, 3))
+    bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,))))
+    for i, arm in enumerate(arms):
+        own = slice(len(arm.joints))
+        motion[i, own] = [_motion(joint) for joint in arm.joints]
+        lower[i, own] = [-1.0 if joint.kind == "fixed" else joint.lower for joint in arm.joints]
+        upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
+        travel[i, own] = [joint.travel for joint in arm.joints]
+        offset[i, own] = [link.offset for link in arm.links]
+        offset[i, len(arm.joints) - 1] += arm.tool
+        com[i, own] = [link.total_com for link in arm.links]
+        mass[i, own] = [link.total_mass for link in arm.links]
+        radius[i, own] = [link.radius if link.length > 0.0 else 0.0 for link in arm.links]
+        for part in fields(Bodies):
+            getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
+    return ArmArrays(
+        base=np.array([arm.base for arm in arms], dtype=precision),
+        motion=motion,
+        lower=-round_down(-lower, precision),
+        upper=round_down(upper, precision),
+        offset=offset.astype(precision),
+        com=com.astype(precision),
+        mass=mass.astype(precision),
+        radius=radius.astype(precision),
+        tool=np.array([arm.tool for arm in arms]),
+        tool_axis=np.array([arm.tool_axis for arm in arms], dtype=precision),
+        tool_side=np.array([arm.tool_side for arm in arms], dtype=precision),
+        n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
+        travel=travel,
+        length=np.array([arm.length for arm in arms]),
+        base_mass=np.array([arm.base_mass for arm in arms]),
+        bodies=bodies,
+        actuation=_actuation(arms, dof),
+    )
+
+
+def round_down(limits: Array, precision: Precision) -> Any:
+    """Return upper limits in this precision, none above its exact value.
+
+    float32 of 2.4 rad is 1e-7 rad more than 2.4, which no kept angle may be.
+    """
+    near = limits.astype(precision)
+    return np.where(near > limits, np.nextafter(near, near.dtype.type(-np.inf)), near)
+
+
+def _check(arm: Arm) -> None:
+    if len(arm.joints) > MAX_JOINTS:
+        raise ArmError(f"an arm has {len(arm.joints)} joints; the kernels take at most {MAX_JOINTS}")
+    for number, joint in enumerate(arm.joints, start=1):
+        if joint.kind == "revolute" and max(-joint.lower, joint.upper) > MAX_ANGLE:
+            raise ArmError(
+                f"joint {number}: limits [{joint.lower:g}, {joint.upper:g}] rad are outside [-2π, 2π]; narrow them"
+            )
+
+
+def _motion(joint: Joint) -> int:
+    if joint.kind == "fixed":
+        return FIXED
+    return AXES.index(joint.axis) + (PRISMATIC if joint.kind == "prismatic" else 0)
+
+
+def _actuation(arms: Sequence[Arm], dof: int) -> Actuation | None:
+    """Return None if a moving joint has no actuator."""
+    efforts, speeds = np.full((2, len(arms), dof), np.inf)
+    prices = np.zeros(len(arms))
+    for i, arm in enumerate(arms):
+        for j, joint in enumerate(arm.joints):
+            if joint.kind == "fixed":
+                continue
+            if joint.actuator is None:
+                return None
+            efforts[i, j] = joint.actuator.effort
+            speeds[i, j] = np.nan if joint.actuator.speed is None else joint.actuator.speed
+            prices[i] += np.nan if joint.actuator.price is None else joint.actuator.price
+    return Actuation(efforts, speeds, prices)
