@@ -11,9 +11,9 @@ from pydantic_ai.usage import RequestUsage
 
 from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm import chat
-from armwright.llm.speaker import CHECK, Question, Reply, Speaker
+from armwright.llm.speaker import CHECK, LlmBackend, Question, Reply
 from armwright.problem import Problem
-from armwright.proposers.dialogue import Dialogue
+from armwright.proposers.dialogue import LlmSession
 from armwright.proposers.llm import LlmProposer
 from armwright.study import Progress, Run, optimize
 from armwright.task import load_task
@@ -38,7 +38,7 @@ def notes(seen: list[Progress]) -> list[str]:
     return [progress.note for progress in seen if progress.note]
 
 
-class Greedy(Speaker):
+class Greedy(LlmBackend):
     """Takes all requests that it may, each for 0.1 USD."""
 
     model = "greedy"
@@ -70,7 +70,7 @@ class Greedy(Speaker):
     def cancel(self) -> None: ...
 
 
-class Asking(Dialogue):
+class Session(LlmSession):
     """Asks from many threads at a time."""
 
     def ask_together(self, threads: int, before_answers: Callable[[], None]) -> list[ProposalError | str]:
@@ -78,17 +78,17 @@ class Asking(Dialogue):
 
         def ask() -> None:
             try:
-                came.append(self._call(Question("p-0001", "answer", "Which?"), self.speaker.ask, self._over))
+                came.append(self._call(Question("p-0001", "answer", "Which?"), self.backend.ask, self._over))
             except ProposalError as fault:
                 came.append(fault)
 
         asked = [threading.Thread(target=ask) for _ in range(threads)]
         for thread in asked:
             thread.start()
-        assert isinstance(self.speaker, Greedy)
-        self.speaker.asking.wait()
+        assert isinstance(self.backend, Greedy)
+        self.backend.asking.wait()
         before_answers()
-        self.speaker.go_on.set()
+        self.backend.go_on.set()
         for thread in asked:
             thread.join()
         return came
@@ -171,7 +171,7 @@ def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatS
     ],
 )
 def test_the_price_is_that_of_the_host(model: str, address: str | None, words: str) -> None:
-    assert chat.cost_words(model, address, 10**6, 10**6) == words
+    assert chat.describe_cost(model, address, 10**6, 10**6) == words
     place = chat._place(model, address)
     if place is not None:
         usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)
@@ -270,22 +270,22 @@ def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_
 @pytest.mark.parametrize("budget", [{"max_calls": 10}, {"max_cost": 1.05}])
 @pytest.mark.parametrize("threads", [3, 4, 8])
 def test_questions_beside_each_other_share_one_budget(budget: dict[str, Any], threads: int) -> None:
-    speaker = Greedy()
-    came = Asking(speaker, "asking", **budget).ask_together(threads, lambda: None)
-    assert speaker.requests == min(10, 3 * threads)
+    backend = Greedy()
+    came = Session(backend, "asking", **budget).ask_together(threads, lambda: None)
+    assert backend.requests == min(10, 3 * threads)
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["budget"] * max(0, threads - 4)
 
 
 def test_what_was_set_aside_and_not_taken_is_there_for_others() -> None:
-    speaker = Greedy(most=1)
-    came = Asking(speaker, "asking", max_calls=7).ask_together(9, lambda: None)
-    assert speaker.requests == 7
+    backend = Greedy(most=1)
+    came = Session(backend, "asking", max_calls=7).ask_together(9, lambda: None)
+    assert backend.requests == 7
     assert came.count("so be it") == 7
 
 
 def test_who_waits_for_the_budget_of_others_is_let_go_at_the_end() -> None:
-    speaker = Greedy()
-    dialogue = Asking(speaker, "asking", max_calls=3)
-    came = dialogue.ask_together(4, dialogue.cancel)
-    assert speaker.requests == 3
+    backend = Greedy()
+    session = Session(backend, "asking", max_calls=3)
+    came = session.ask_together(4, session.cancel)
+    assert backend.requests == 3
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["cancelled"] * 3

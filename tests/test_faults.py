@@ -350,6 +350,6 @@ def test_whatever_a_server_says_is_an_answer_or_a_fault(
             if step == "answer":
                 asked.ask_designs(question, PROBLEM)
             else:
-                asked.speaker.ask(question)
+                asked.backend.ask(question)
 
     check()

@@ -221,10 +221,10 @@ def test_calls_for_no_trial(run: Path, value: str) -> None:
 
 @pytest.mark.parametrize("url", ["http://a:x/v1", "http://[::1", "http://", "http://\x01/v1", "http://a b/v1"])
 def test_an_address_that_is_none(url: str) -> None:
-    from armwright.llm.chat import Chat
+    from armwright.llm.chat import ModelClient
 
     with pytest.raises(SettingsError, match="is no address"):
-        Chat("openai-chat:x", url)
+        ModelClient("openai-chat:x", url)
 
 
 @pytest.mark.parametrize(

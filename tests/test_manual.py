@@ -92,9 +92,9 @@ def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> N
 def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Answering]:
     """Answers in a thread of its own: for each file that is written for people, the name and text of an answer."""
     written: queue.SimpleQueue[Path] = queue.SimpleQueue()
-    write, threads = people.People._write, list[threading.Thread]()
+    write, threads = people.ManualBackend._write, list[threading.Thread]()
 
-    def note(self: people.People, file: Path, text: str) -> None:
+    def note(self: people.ManualBackend, file: Path, text: str) -> None:
         write(self, file, text)
         written.put(file)
 
@@ -108,7 +108,7 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Answering]:
         threads.append(threading.Thread(target=answer, args=(answers,), daemon=True))
         threads[-1].start()
 
-    monkeypatch.setattr(people.People, "_write", note)
+    monkeypatch.setattr(people.ManualBackend, "_write", note)
     monkeypatch.setattr(people, "LOOK_EVERY", 0.01)
     yield start
     for thread in threads:

@@ -49,10 +49,10 @@ def try_model(model: str | None = None, base_url: str | None = None) -> str:
     configured = configured_model(model, base_url)
     if configured is None:
         raise ModelError("no model is configured; give --model, or set ARMWRIGHT_MODEL")
-    from armwright.llm.chat import Chat
+    from armwright.llm.chat import ModelClient
 
     try:
-        reply = Chat(configured.model, configured.base_url).check()
+        reply = ModelClient(configured.model, configured.base_url).check()
     except CallError as fault:
         raise ModelError(f"{fault} ({fault.kind})") from fault
     cost = "price not known" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
@@ -111,9 +111,9 @@ def _configured(model: str | None, base_url: str | None) -> Finding:
     if configured.base_url:
         named += f", at {configured.base_url}"
     try:
-        from armwright.llm.chat import Chat
+        from armwright.llm.chat import ModelClient
 
-        Chat(configured.model, configured.base_url)
+        ModelClient(configured.model, configured.base_url)
     except ArmwrightError as fault:
         return Finding(WRONG, "model", f"{named}: {fault}")
     return Finding(OK, "model", f"{named}; --call tries it")

@@ -36,7 +36,7 @@ from armwright.llm.speaker import CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.llm.words import one_line
 from armwright.problem import Problem
-from armwright.proposers.dialogue import Dialogue
+from armwright.proposers.dialogue import LlmSession
 from armwright.proposers.proposer import ProposerSummary
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task, builtin_names
@@ -109,7 +109,7 @@ class Draft:
         }
 
 
-class Drafter(Dialogue):
+class Drafter(LlmSession):
     """Asks a language model for drafts.
 
     out: the folder of the files; None writes nothing, and keeps nothing of what was said.
@@ -130,9 +130,9 @@ class Drafter(Dialogue):
         max_cost: float | None = None,
         origin: str = "model",
     ) -> None:
-        from armwright.llm.chat import Chat
+        from armwright.llm.chat import ModelClient
 
-        chat = Chat(configured.model, configured.base_url, temperature=temperature, seed=seed, origin=origin)
+        chat = ModelClient(configured.model, configured.base_url, temperature=temperature, seed=seed, origin=origin)
         super().__init__(chat, "draft", max_calls=max_calls, max_cost=max_cost)
         self.configured = configured
         self.out = out
@@ -145,11 +145,11 @@ class Drafter(Dialogue):
 
     def forecast(self, words: str) -> str:
         """Who is asked, and about what that will take, in one line for the user."""
-        from armwright.llm.chat import cost_words
+        from armwright.llm.chat import describe_cost
 
         named, given = self.configured, estimated_tokens(draft_prompt(words))
         server = f" at {named.base_url}" if named.base_url else ""
-        cost = cost_words(named.model, named.base_url, given, ANSWER_TOKENS)
+        cost = describe_cost(named.model, named.base_url, given, ANSWER_TOKENS)
         return (
             f"asking {self._by()}{server}, named by {named.named_by}: about {given:,} tokens in, {ANSWER_TOKENS:,} "
             f"out, up to {MOST_ANSWERS} times; {cost}"
@@ -164,11 +164,11 @@ class Drafter(Dialogue):
         prompt = draft_prompt(words)
         self._check_price(prompt)
         self._identity = f"draft-{len({call.proposal for call in self._transcript.calls}) + 1:04d}"
-        self.speaker.begin()
+        self.backend.begin()
         refusal = way = ""
         for _ in range(MOST_ANSWERS):
             try:
-                said = self._call(Question(self._identity, "draft", prompt), self.speaker.ask, self._over)
+                said = self._call(Question(self._identity, "draft", prompt), self.backend.ask, self._over)
             except ProposalError as fault:
                 raise self._failure(fault, refusal) from fault
             try:
@@ -249,7 +249,7 @@ class Drafter(Dialogue):
     def _by(self) -> str:
         """Who answers; a stand-in is never called a model."""
         model = self.configured.model
-        return model if self.speaker.origin == "model" else f"a {self.speaker.origin} stand-in for a model ({model})"
+        return model if self.backend.origin == "model" else f"a {self.backend.origin} stand-in for a model ({model})"
 
     def _check_price(self, prompt: str) -> None:
         """SettingsError where the first question alone may go beyond max_cost."""

@@ -70,20 +70,22 @@ HEADERS = {
 }
 
 
-class Wish(BaseModel, frozen=True, extra="forbid"):
+class ControlRequest(BaseModel, frozen=True, extra="forbid"):
     """What the page's user wants of the study."""
 
     action: Literal["pause", "resume", "stop"]
 
 
-class HintWish(BaseModel, frozen=True, extra="forbid"):
+class HintRequest(BaseModel, frozen=True, extra="forbid"):
     """A hint for the next question to the model."""
 
     action: Literal["hint"]
     text: str = Field(min_length=1, max_length=LONGEST_HINT)
 
 
-_WISHES: TypeAdapter[Wish | HintWish] = TypeAdapter(Annotated[Wish | HintWish, Field(discriminator="action")])
+_REQUESTS: TypeAdapter[ControlRequest | HintRequest] = TypeAdapter(
+    Annotated[ControlRequest | HintRequest, Field(discriminator="action")]
+)
 _ACTIONS: dict[str, Callable[[Path], None]] = {"pause": pause_study, "resume": resume_study, "stop": stop_study}
 
 
@@ -282,13 +284,13 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         except ClientDisconnect:
             return Response(status_code=400)  # to nobody
         try:
-            wish = _WISHES.validate_json(body)
+            asked = _REQUESTS.validate_json(body)
             if not folder.is_dir():
                 return PlainTextResponse("the run folder is gone", status_code=409)
-            if isinstance(wish, HintWish):
-                await asyncio.to_thread(add_hint, folder, wish.text)
+            if isinstance(asked, HintRequest):
+                await asyncio.to_thread(add_hint, folder, asked.text)
             else:
-                await asyncio.to_thread(_ACTIONS[wish.action], folder)
+                await asyncio.to_thread(_ACTIONS[asked.action], folder)
         except ValidationError:
             return PlainTextResponse("that is no pause, resume, stop or hint", status_code=422)
         except ArmwrightError as fault:

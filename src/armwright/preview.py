@@ -8,9 +8,9 @@ from typing import Any
 from armwright.exceptions import SettingsError
 from armwright.history import History
 from armwright.llm.prompt import estimated_tokens, load_prompt
-from armwright.llm.recording import Recording
+from armwright.llm.recording import ReplayBackend
 from armwright.problem import Problem
-from armwright.proposers.asking import Asking, AskingProposer
+from armwright.proposers.asking import Asking, PromptedProposer
 from armwright.proposers.replay import recorded_asking
 from armwright.run_folder import RunConfig, read_run
 from armwright.space import DesignSpace
@@ -36,7 +36,7 @@ class Preview:
 def preview(problem: Problem, asking: Asking, *, n_init: int = 10, seed: int = 0) -> Preview:
     """The first prompt of a new run."""
     history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
-    proposer = AskingProposer(Recording((), Path()), asking, "llm")
+    proposer = PromptedProposer(ReplayBackend((), Path()), asking, "llm")
     return _preview(proposer, problem, n_init, proposer.prompt_for(history, Asker(proposer, seed).seed(n_init)))
 
 
@@ -63,8 +63,8 @@ def preview_after(
     asking = replace(asking, **wishes)
     prompt = load_prompt(asking.prompt) if own is None or "prompt" in wishes else own
     settings = config.study.proposer or {}
-    proposer = AskingProposer(
-        Recording((), run), asking, settings["name"] if "prompt" in settings else "llm", prompt=prompt
+    proposer = PromptedProposer(
+        ReplayBackend((), run), asking, settings["name"] if "prompt" in settings else "llm", prompt=prompt
     )
     proposer.look(run)
     asker = Asker(proposer, config.seed)
@@ -83,7 +83,7 @@ def preview_after(
     return replace(_preview(proposer, history.problem, number, text), note=note)
 
 
-def _preview(proposer: AskingProposer, problem: Problem, number: int, text: str) -> Preview:
+def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: str) -> Preview:
     return Preview(number, text, estimated_tokens(text), proposer.schema(problem))
 
 

@@ -371,7 +371,7 @@ def drafter(written: bool) -> tuple[Any, _Answered]:
         origin="scripted",
     )
     answers = _Answered()
-    made.speaker = answers  # type: ignore[assignment]
+    made.backend = answers  # type: ignore[assignment]
     return made, answers
 
 

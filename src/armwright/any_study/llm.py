@@ -15,10 +15,10 @@ from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm.prompt import Form
 from armwright.llm.speaker import CHECK, Question, Reply
 from armwright.proposers.asking import ANSWERS, Asking
-from armwright.proposers.dialogue import Dialogue
+from armwright.proposers.dialogue import LlmSession
 
 
-class StudyLlmProposer(Dialogue, StudyProposer):
+class StudyLlmProposer(LlmSession, StudyProposer):
     """Asks a language model for each proposal, from the study's trials and a description in words.
 
     model: vendor and name, as of LlmProposer: `openai-chat:gpt-4o`, `anthropic:…`, `ollama:…`, …
@@ -51,12 +51,12 @@ class StudyLlmProposer(Dialogue, StudyProposer):
         max_cost: float | None = None,
         origin: str = "model",
     ) -> None:
-        from armwright.llm.chat import Chat
+        from armwright.llm.chat import ModelClient
 
         Asking(memory=memory, answer=answer)  # refuses names that do not exist
         if answer == "text":
             raise SettingsError('answer "text" is for people; a model needs "two-step" or "one-step"')
-        chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
+        chat = ModelClient(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
         # A stand-in's trials must never be taken for a model's: they have a source of their own.
         super().__init__(chat, "llm" if origin == "model" else origin, max_calls=max_calls, max_cost=max_cost)
         self.description = description
@@ -75,11 +75,11 @@ class StudyLlmProposer(Dialogue, StudyProposer):
     def check(self) -> None:
         """Makes sure that answers are to be had, before any trial; ModelError where not."""
         try:
-            self._call(CHECK, lambda question: self.speaker.check(), self._over)
+            self._call(CHECK, lambda question: self.backend.check(), self._over)
         except ProposalError as fault:
             raise ModelError(f"{fault}. Check the model, its key and base_url") from fault
         if self._budget.price_is_missing:
-            raise ModelError(f"the price of {self.speaker.model} is not known, so max_cost cannot hold; use max_calls")
+            raise ModelError(f"the price of {self.backend.model} is not known, so max_cost cannot hold; use max_calls")
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """The next trial, from what the study has found."""
@@ -102,7 +102,7 @@ class StudyLlmProposer(Dialogue, StudyProposer):
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
         step = "answer"
         if self._form == "then-schema":
-            thoughts = self._call(Question(identity, "reasoning", prompt, known), self.speaker.ask, self._over)
+            thoughts = self._call(Question(identity, "reasoning", prompt, known), self.backend.ask, self._over)
             prompt, step = parameters_prompt(parameters, objectives, thoughts, self._expects), "parameters"
         question = Question(identity, step, prompt, known)
         text = self._call(question, lambda asked: self._ask_for(asked, parameters, objectives), self._over)
@@ -116,7 +116,7 @@ class StudyLlmProposer(Dialogue, StudyProposer):
 
         reasoning = self._form == "schema"
         schema = answer_schema(parameters, objectives, reasoning=reasoning, expected=self._expects)
-        return self.speaker.ask_for(question, schema, read)
+        return self.backend.ask_for(question, schema, read)
 
     @property
     def _expects(self) -> bool:

@@ -20,7 +20,7 @@ from armwright.exceptions import DesignError, MissingExtraError, SettingsError, 
 from armwright.extras import needed
 from armwright.llm.answer import without_words_around
 from armwright.llm.secrets import WithoutKeys, redacted, without_keys
-from armwright.llm.speaker import CHECK, MOST_REQUESTS, CallError, Interrupted, Question, Reader, Reply, Speaker
+from armwright.llm.speaker import CHECK, MOST_REQUESTS, CallError, Interrupted, LlmBackend, Question, Reader, Reply
 
 with needed("llm", "a language model"):
     from genai_prices import Usage, calc_price
@@ -36,9 +36,9 @@ with needed("llm", "a language model"):
     from pydantic_ai.settings import ModelSettings
     from pydantic_ai.usage import UsageLimits
 
-    from armwright.llm.faults import CALL_FAULTS, PASSING, kind_of, words_of
+    from armwright.llm.faults import CALL_FAULTS, PASSING, describe_fault, kind_of_fault
 
-# A price that cannot be known is no news to the user, who is told of costs by `cost_words` and the budget.
+# A price that cannot be known is no news to the user, who is told of costs by `describe_cost` and the budget.
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
 
 CALL_SECONDS = 120.0  # of one request, all attempts included
@@ -97,7 +97,7 @@ class _Server(WrapperModel):
             await asyncio.sleep(pause)
 
 
-class Chat(Speaker):
+class ModelClient(LlmBackend):
     """One model behind one server. Every call is new: the model remembers nothing between calls.
 
     model: `openai-chat:gpt-4o`, `anthropic:…`, `google:…`, `azure:…`, `openrouter:…`, `ollama:…`, `vllm:…`.
@@ -196,7 +196,9 @@ class Chat(Speaker):
                 raise Interrupted(self._reply(messages, time.perf_counter() - started)) from fault
             except CALL_FAULTS as fault:
                 reply = self._reply(messages, time.perf_counter() - started)
-                raise CallError(kind_of(fault), f"{self.model}: {_one_line(words_of(fault))}", reply) from fault
+                raise CallError(
+                    kind_of_fault(fault), f"{self.model}: {_one_line(describe_fault(fault))}", reply
+                ) from fault
         return self._reply(messages, time.perf_counter() - started)
 
     def _reply(self, messages: Sequence[ModelMessage], seconds: float) -> Reply:
@@ -245,7 +247,7 @@ def estimated_cost(model: str, base_url: str | None, input_tokens: int, output_t
     return float(price.total_price)
 
 
-def cost_words(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> str:
+def describe_cost(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> str:
     """The same in words."""
     cost = estimated_cost(model, base_url, input_tokens, output_tokens)
     if cost is not None:

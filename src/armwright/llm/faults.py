@@ -52,7 +52,7 @@ PASSING = (
 )
 
 
-def kind_of(fault: Exception) -> str:
+def kind_of_fault(fault: Exception) -> str:
     """One word: key, quota, rate_limit, server, timeout, connection, context, refused, answer, …"""
     if _key_cannot_be_sent(fault):
         return "key"
@@ -61,7 +61,7 @@ def kind_of(fault: Exception) -> str:
     return next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
 
 
-def words_of(fault: Exception) -> str:
+def describe_fault(fault: Exception) -> str:
     """What went wrong, in the server's own words where it gave some, else with the reason behind it."""
     if _key_cannot_be_sent(fault):
         return "its key cannot be sent: it holds a line break, or a letter that no key has"

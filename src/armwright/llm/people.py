@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import AnswerPendingError, DesignError, FailureError
-from armwright.llm.speaker import CHECK, CallError, Question, Reply, Speaker, TextReader
+from armwright.llm.speaker import CHECK, CallError, LlmBackend, Question, Reply, TextReader
 
 LOOK_EVERY = 0.5  # [s]
 ENDINGS = ("md", "json", "txt")  # of an answer's file
 LARGEST_FILE = 10_000_000  # characters
 
 
-class People(Speaker):
+class ManualBackend(LlmBackend):
     """Writes DIR/NNN-prompt.md and takes DIR/NNN-answer.md (or .json), where NNN is the trial's number.
 
     wait: whether to wait for an answer that is not there; else AnswerPendingError.
@@ -40,7 +40,7 @@ class People(Speaker):
 
     def ask(self, question: Question) -> Reply:
         """The free answer."""
-        return self.ask_people(question, lambda text: text)
+        return self.ask_text(question, lambda text: text)
 
     def ask_for(self, question: Question, schema: Mapping[str, Any], read: Any) -> Reply:
         """People are asked for text, not for a schema."""
@@ -58,7 +58,7 @@ class People(Speaker):
         """Whether an answer lies there that has not been refused."""
         return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
 
-    def ask_people(self, question: Question, read: TextReader) -> Reply:
+    def ask_text(self, question: Question, read: TextReader) -> Reply:
         """The answer as `read` gives it; what it refuses (DesignError) is put aside, with the reason, for another."""
         started = time.perf_counter()
         number = int(question.proposal.rpartition("-")[2])

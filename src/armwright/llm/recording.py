@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import ReplayError
-from armwright.llm.speaker import CHECK, CallError, Question, Reader, Reply, Speaker
+from armwright.llm.speaker import CHECK, CallError, LlmBackend, Question, Reader, Reply
 from armwright.llm.transcript import Call
 
 
-class Recording(Speaker):
+class ReplayBackend(LlmBackend):
     """Answers as the calls of a record did, failures included.
 
     strict: whether a question in other words than the recorded one is an error.

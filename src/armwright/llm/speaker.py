@@ -66,7 +66,7 @@ class Interrupted(KeyboardInterrupt):
         self.reply = reply
 
 
-class Speaker(Protocol):
+class LlmBackend(Protocol):
     """Answers questions, several at a time if asked from several threads.
 
     model: who answers, in words.  origin: what answers: `model`, `manual` (people), `scripted` (a stand-in).

@@ -11,10 +11,10 @@ from armwright.exceptions import DesignError, ModelError, ProposalError, Setting
 from armwright.history import History
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.llm.prompt import MEMORIES, Form, Prompt, load_prompt, parameters_prompt
-from armwright.llm.speaker import CHECK, Question, Reply, Speaker
+from armwright.llm.speaker import CHECK, LlmBackend, Question, Reply
 from armwright.llm.transcript import TRANSCRIPTS, Transcript, hints_of
 from armwright.problem import Problem
-from armwright.proposers.dialogue import Dialogue
+from armwright.proposers.dialogue import LlmSession
 from armwright.proposers.hints import Hints
 from armwright.proposers.proposer import Proposal, Proposer
 
@@ -48,8 +48,8 @@ class Asking:
             raise SettingsError(f"proposals = {self.proposals}: a whole number from 1 to {MOST_PROPOSALS} is needed")
 
 
-class AskingProposer(Dialogue, Proposer):
-    """Asks a speaker for each proposal, and keeps what was said.
+class PromptedProposer(LlmSession, Proposer):
+    """Asks a backend for each proposal, and records what was asked and answered.
 
     name: the `source` of its trials.
     max_calls, max_cost: after so many calls, or [USD], of the whole run it asks no more.
@@ -57,7 +57,7 @@ class AskingProposer(Dialogue, Proposer):
 
     def __init__(
         self,
-        speaker: Speaker,
+        backend: LlmBackend,
         asking: Asking,
         name: str,
         *,
@@ -65,7 +65,7 @@ class AskingProposer(Dialogue, Proposer):
         max_calls: int | None = None,
         max_cost: float | None = None,
     ) -> None:
-        super().__init__(speaker, name, max_calls=max_calls, max_cost=max_cost)
+        super().__init__(backend, name, max_calls=max_calls, max_cost=max_cost)
         self.asking = asking
         self.per_call = asking.proposals
         self.prompt = prompt or load_prompt(asking.prompt)
@@ -101,7 +101,7 @@ class AskingProposer(Dialogue, Proposer):
     def check(self) -> None:
         """Makes sure that answers are to be had; a budget that is used up is said at the first question."""
         try:
-            self._call(CHECK, self.speaker.check, self._over)
+            self._call(CHECK, self.backend.check, self._over)
         except ProposalError as fault:
             if fault.kind == "budget":
                 return
@@ -111,7 +111,7 @@ class AskingProposer(Dialogue, Proposer):
             ) from fault
         if self._budget.price_is_missing:
             raise ModelError(
-                f"the price of {self.speaker.model} is not known, so --max-cost cannot hold; use --max-calls",
+                f"the price of {self.backend.model} is not known, so --max-cost cannot hold; use --max-calls",
                 final="budget",
             )
 
@@ -138,7 +138,7 @@ class AskingProposer(Dialogue, Proposer):
         over = self._over
         try:
             if question.step == "reasoning":
-                said = self._call(question, self.speaker.ask, over)
+                said = self._call(question, self.backend.ask, over)
                 question = self._extracting(problem, question.proposal, said, question.known)
             text = self._call(question, lambda asked: self.ask_designs(asked, problem), over)
         except ProposalError as fault:
@@ -205,7 +205,7 @@ class AskingProposer(Dialogue, Proposer):
             answers = read_answers(content, problem, self.asking.proposals)
             return written_answers(answers, problem, str(content.get("reasoning", "")))
 
-        return self.speaker.ask_for(question, self.schema(problem), read)
+        return self.backend.ask_for(question, self.schema(problem), read)
 
     @property
     def _expects(self) -> bool:

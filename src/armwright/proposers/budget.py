@@ -10,7 +10,7 @@ from armwright.llm.speaker import MOST_REQUESTS
 from armwright.llm.transcript import Call
 
 
-class Budget:
+class CallBudget:
     """Requests and money [USD] of all sessions of a run; several threads may ask at a time.
 
     What a question may take is set aside while it is under way, so that those beside it cannot spend it, too. Money is

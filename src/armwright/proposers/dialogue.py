@@ -1,4 +1,4 @@
-"""Questions to one speaker: each is kept with its answer, and none goes beyond the budget."""
+"""A session with one backend: each question is recorded with its answer, and none exceeds the budget."""
 
 import threading
 from collections import Counter
@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from armwright.llm.speaker import CallError, Interrupted, Question, Reply, Speaker
+from armwright.llm.speaker import CallError, Interrupted, LlmBackend, Question, Reply
 from armwright.llm.transcript import Call, Transcript
-from armwright.proposers.budget import Budget
+from armwright.proposers.budget import CallBudget
 from armwright.proposers.proposer import ProposerSummary
 
 NEVER_MADE = ("missing", "cancelled")  # faults of calls that cost nothing, as long as no request was answered
 
 
-class Dialogue:
+class LlmSession:
     """What all that ask have in common; several threads may ask at a time.
 
     name: the `source` of its trials.
@@ -22,11 +22,11 @@ class Dialogue:
     """
 
     def __init__(
-        self, speaker: Speaker, name: str, *, max_calls: int | None = None, max_cost: float | None = None
+        self, backend: LlmBackend, name: str, *, max_calls: int | None = None, max_cost: float | None = None
     ) -> None:
         self.name = name
-        self.speaker = speaker
-        self._budget = Budget(max_calls, max_cost)
+        self.backend = backend
+        self._budget = CallBudget(max_calls, max_cost)
         self._transcript = Transcript(None)
         self._over = threading.Event()  # of the session, set when nothing more is wanted
 
@@ -38,8 +38,8 @@ class Dialogue:
         costs = [call.cost_usd for call in calls if call.requests]
         return ProposerSummary(
             name=self.name,
-            model=self.speaker.model,
-            origin=self.speaker.origin,
+            model=self.backend.model,
+            origin=self.backend.origin,
             calls=sum(max(1, call.requests) for call in calls),
             call_failures=dict(Counter(call.fault for call in calls if call.fault)),
             input_tokens=sum(call.input_tokens for call in calls),
@@ -52,14 +52,14 @@ class Dialogue:
         """Ends the calls under way, and begins no more in this session."""
         self._over.set()
         self._budget.wake()
-        self.speaker.cancel()
+        self.backend.cancel()
 
     def _begin(self, transcript: Path | None) -> None:
         """A session begins; what was said before lies in `transcript`."""
         self._transcript = Transcript(transcript)
         self._budget.begin(self._transcript.calls)
         self._over = threading.Event()
-        self.speaker.begin()
+        self.backend.begin()
 
     def _call(self, question: Question, ask: Callable[[Question], Reply], over: threading.Event) -> str:
         """The answer; what came back is kept, and what it cost, even if the call was cut short by Ctrl-C."""
@@ -82,8 +82,8 @@ class Dialogue:
             proposal=question.proposal,
             step=question.step,
             known=question.known,
-            origin=self.speaker.origin,
-            model=self.speaker.model,
+            origin=self.backend.origin,
+            model=self.backend.model,
             prompt=question.prompt,
             answer=reply.text,
             requests=reply.requests,

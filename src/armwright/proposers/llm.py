@@ -8,13 +8,13 @@ from armwright.history import History
 from armwright.llm.feedback import N_PARETO, N_RANDOM
 from armwright.llm.prompt import MOST_TARGETS, MOST_TOKENS, estimated_tokens, parameters_prompt
 from armwright.problem import Problem
-from armwright.proposers.asking import Asking, AskingProposer
+from armwright.proposers.asking import Asking, PromptedProposer
 
 TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, by what prompts came to
 THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # that a model is taken to write, for an estimate
 
 
-class LlmProposer(AskingProposer):
+class LlmProposer(PromptedProposer):
     """Asks a language model for each proposal, and keeps what was said.
 
     model: vendor and name, `openai-chat:gpt-4o`, `anthropic:claude-…`, `google:…`, `azure:…`, `openrouter:…`,
@@ -46,12 +46,12 @@ class LlmProposer(AskingProposer):
         max_cost: float | None = None,
         origin: str = "model",
     ) -> None:
-        from armwright.llm.chat import Chat
+        from armwright.llm.chat import ModelClient
 
         asking = Asking(prompt, memory, answer, proposals)
         if answer == "text":
             raise SettingsError('answer "text" is for people; a model needs "two-step" or "one-step"')
-        chat = Chat(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
+        chat = ModelClient(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
         # A stand-in's designs must never be taken for a model's: they have a source of their own.
         name = "llm" if origin == "model" else origin
         super().__init__(chat, asking, name, max_calls=max_calls, max_cost=max_cost)
@@ -65,7 +65,7 @@ class LlmProposer(AskingProposer):
 
     def forecast(self, problem: Problem, n: int) -> str:
         """About what `n` proposals will take, before any is asked for."""
-        from armwright.llm.chat import cost_words
+        from armwright.llm.chat import describe_cost
 
         calls = -(-n // self.asking.proposals)
         given, written = self._tokens_each(problem)
@@ -74,7 +74,7 @@ class LlmProposer(AskingProposer):
             f"{n} proposals: about {steps * calls + 1} calls, {_thousands(calls * given)} tokens in, "
             f"{_thousands(calls * written)} out"
         )
-        return f"{words}; {cost_words(self.model, self.base_url, calls * given, calls * written)}"
+        return f"{words}; {describe_cost(self.model, self.base_url, calls * given, calls * written)}"
 
     def _tokens_each(self, problem: Problem) -> tuple[int, int]:
         """Tokens in and out of one proposal: as those so far in this run, else as a full prompt has."""

@@ -4,13 +4,13 @@ from pathlib import Path
 
 from armwright.exceptions import SettingsError
 from armwright.llm.answer import read_text, written_answers
-from armwright.llm.people import People
+from armwright.llm.people import ManualBackend
 from armwright.llm.speaker import Question, Reply
 from armwright.problem import Problem
-from armwright.proposers.asking import Asking, AskingProposer
+from armwright.proposers.asking import Asking, PromptedProposer
 
 
-class ManualProposer(AskingProposer):
+class ManualProposer(PromptedProposer):
     """Writes each prompt to FOLDER/NNN-prompt.md and takes the answer from FOLDER/NNN-answer.md (or .json).
 
     prompt, memory, proposals: as of LlmProposer.
@@ -30,16 +30,16 @@ class ManualProposer(AskingProposer):
     ) -> None:
         if Path(folder).exists() and not Path(folder).is_dir():
             raise SettingsError(f"{folder} is a file; manual needs a folder for its questions")
-        self.people = People(Path(folder), wait)
-        super().__init__(self.people, Asking(prompt, memory, "text", proposals), "manual")
+        self.manual = ManualBackend(Path(folder), wait)
+        super().__init__(self.manual, Asking(prompt, memory, "text", proposals), "manual")
 
     def check(self) -> None:
         """Nobody is asked before there is a question."""
 
     def announce(self, number: int) -> str:
         """Which file waits for which, as long as there is no answer."""
-        asked, answer = self.people.files(number)
-        if self.people.is_answered(number):
+        asked, answer = self.manual.files(number)
+        if self.manual.is_answered(number):
             return ""
         return f"{asked} waits for your answer in {answer}"
 
@@ -49,4 +49,4 @@ class ManualProposer(AskingProposer):
         def read(text: str) -> str:
             return written_answers(read_text(text, problem, self.asking.proposals), problem)
 
-        return self.people.ask_people(question, read)
+        return self.manual.ask_text(question, read)

@@ -12,14 +12,14 @@ from armwright.control import Hint
 from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError
 from armwright.history import FinishedTrial, History
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
-from armwright.llm.recording import Recording
+from armwright.llm.recording import ReplayBackend
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of
-from armwright.proposers.asking import LAST_STEPS, Asking, AskingProposer
+from armwright.proposers.asking import LAST_STEPS, Asking, PromptedProposer
 from armwright.proposers.proposer import Proposal, ProposerSummary, Record, RecordedTurn
 from armwright.run_folder import CONFIG, TRIALS, RunConfig, read_config, read_run
 
 
-class ReplayProposer(AskingProposer):
+class ReplayProposer(PromptedProposer):
     """Plays the transcripts of a run folder, or of a transcripts.jsonl, again: no network, no cost.
 
     With the settings of the recorded run, on the same machine with the same versions, the run comes out equal to the
@@ -41,8 +41,8 @@ class ReplayProposer(AskingProposer):
         name = next(call.proposal for call in calls if call.proposal).rpartition("-")[0]
         recorded = read_config(folder) if (folder / CONFIG).is_file() else None
         prompt, then = _as_recorded(file, recorded, calls, asking or Asking())
-        super().__init__(Recording(calls, file, strict), then, name, prompt=prompt)
-        self.recording: Recording = self.speaker  # pyright: ignore[reportAttributeAccessIssue]
+        super().__init__(ReplayBackend(calls, file, strict), then, name, prompt=prompt)
+        self.recording: ReplayBackend = self.backend  # pyright: ignore[reportAttributeAccessIssue]
         self._trials = _recorded_trials(folder, recorded)
 
     def settings(self) -> Mapping[str, Any]:
