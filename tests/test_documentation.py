@@ -156,6 +156,13 @@ def test_what_is_said_in_passing_exists() -> None:
                 assert said <= known, f"{page}: {span}"
 
 
+def test_every_file_that_is_named_exists() -> None:
+    for page in PAGES:
+        for span in code_spans(page):
+            if re.fullmatch(r"(src|tests|benchmarks|examples|tools|optunahub)/[\w./-]+", span):
+                assert (ROOT / span).exists(), f"{page}: {span}"
+
+
 def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[str]:
     """A line as a user types it, in a folder, with armwright on the path."""
     program = folder / ".bin" / "armwright"
