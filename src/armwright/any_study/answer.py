@@ -9,7 +9,7 @@ from typing import Any, cast
 from armwright.any_study.parameters import Parameter, read_value, unknown, value_schema, written_value
 from armwright.any_study.prompt import Told
 from armwright.exceptions import DesignError
-from armwright.llm.answer import LONGEST_REASON
+from armwright.llm.answer import LONGEST_REASON, object_schema
 from armwright.llm.words import one_line
 
 AROUND = ("parameters", "reasoning", "reason", "expected")  # what an answer holds beside the values
@@ -36,14 +36,14 @@ def answer_schema(
     """
     fields = {parameter.key: value_schema(parameter) for parameter in parameters}
     needed = [parameter.key for parameter in parameters if not parameter.conditional]
-    content: dict[str, Any] = {"parameters": _object(fields, needed)}
+    content: dict[str, Any] = {"parameters": object_schema(fields, needed)}
     if reasoning:
         content = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **content}
     if expected:
         values = {o.key: {"type": "number", "description": f"that you expect; {o.direction}"} for o in objectives}
-        content["expected"] = _object(values, list(values))
+        content["expected"] = object_schema(values)
     content["reason"] = {"type": "string", "description": "the main reason for these parameters, in one sentence"}
-    return {"title": "NewTrial", "description": "What to evaluate next.", **_object(content, list(content))}
+    return {"title": "NewTrial", "description": "What to evaluate next.", **object_schema(content)}
 
 
 def read_answer(content: Mapping[str, Any], parameters: Sequence[Parameter], objectives: Sequence[Told]) -> StudyAnswer:
@@ -80,10 +80,6 @@ def written_answer(
     if answer.expected is not None:
         content["expected"] = {o.key: value for o, value in zip(objectives, answer.expected, strict=True)}
     return json.dumps({**content, "reason": answer.reason}, ensure_ascii=False)
-
-
-def _object(fields: Mapping[str, Any], needed: Sequence[str]) -> dict[str, Any]:
-    return {"type": "object", "properties": dict(fields), "required": list(needed), "additionalProperties": False}
 
 
 def _by_name(content: Mapping[str, Any], parameters: Sequence[Parameter]) -> tuple[dict[str, Any], list[str]]:

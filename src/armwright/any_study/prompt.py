@@ -11,7 +11,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from armwright.any_study.parameters import Parameter, keys, value_text
 from armwright.any_study.standing import best_trials
-from armwright.llm.feedback import N_PARETO, N_RANDOM
+from armwright.llm.feedback import N_PARETO, N_RANDOM, draw_in_order
 from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, Form, estimated_tokens, fenced, rendered
 
 FEWEST_PROPOSED = 1
@@ -96,13 +96,7 @@ def _drawn(
     rng = np.random.default_rng(seed)
     among = {trial.number for trial in best}
     others = [trial for trial in complete if trial.number not in among]
-    return list(best) if ranked else _some(best, N_PARETO, rng), _some(others, N_RANDOM, rng)
-
-
-def _some(trials: Sequence[FrozenTrial], n: int, rng: np.random.Generator) -> list[FrozenTrial]:
-    if len(trials) <= n:
-        return list(trials)
-    return [trials[i] for i in sorted(rng.choice(len(trials), size=n, replace=False).tolist())]
+    return list(best) if ranked else draw_in_order(best, N_PARETO, rng), draw_in_order(others, N_RANDOM, rng)
 
 
 def _record(

@@ -22,12 +22,12 @@ from armwright.any_study.standing import best_trials, minimised, violation
 from armwright.any_study.unit import from_unit, is_number, to_unit
 from armwright.exceptions import DesignError, ProposalError
 from armwright.feasibility import ranked
+from armwright.proposers.rule_helpers import MIDDLE, change_until_new, draw_gap, proposal_id, rule_of
 
 T = TypeVar("T")
 Params = dict[str, Any]
 Made = tuple[Params, str]  # parameters, and why
 
-MIDDLE = (0.35, 0.65)  # of a gap
 BEYOND = (0.2, 1.0)  # an end of the front, in steps from its neighbour to it
 STRIDE = (0.02, 0.5)  # along a trend, of the range of the parameter that counts most
 RIDGE = 1e-2  # of the trend's regression, times the number of trials
@@ -94,7 +94,7 @@ class StudyRulesProposer(StudyProposer):
         rng = np.random.default_rng(seed)
         rule = most_promising(standing, rng)
         params, reason = RULES[rule](standing, rng)
-        return StudyProposal(distinct(params, standing, rng), f"{self.name}-{number:04d}-{rule}", reason)
+        return StudyProposal(distinct(params, standing, rng), proposal_id(self.name, number, rule), reason)
 
 
 def standing_of(study: optuna.Study, space: Space, name: str) -> Standing:
@@ -154,7 +154,7 @@ def record(standing: Standing) -> dict[str, tuple[int, int]]:
     if not any(is_number(distribution) for distribution in standing.space.values()):
         counts = {rule: counts[rule] for rule in ("cross", "swap") if rule in counts} or {"far": [0, 0]}
     for row, trial in enumerate(standing.complete):
-        rule = str(trial.user_attrs.get("proposal")).rpartition("-")[2]
+        rule = rule_of(str(trial.user_attrs.get("proposal")))
         if trial.user_attrs.get("source") == standing.name and rule in counts:
             earlier, own = standing.values[:row], standing.values[row]
             beaten = bool(np.any(np.all(earlier <= own, axis=1)))
@@ -249,8 +249,7 @@ def wide_gap(standing: Standing, rng: np.random.Generator) -> tuple[int, int]:
         order = np.argsort(values[:, m], kind="stable")
         pairs += zip(rows[order[:-1]].tolist(), rows[order[1:]].tolist(), strict=True)
         gaps += (np.diff(values[order, m]) / span[m]).tolist()
-    chance = np.array(gaps) ** 2 + 1e-12  # never nothing at all
-    return pairs[int(rng.choice(len(pairs), p=chance / chance.sum()))]
+    return pairs[draw_gap(gaps, rng)]
 
 
 def trials_like(standing: Standing, own: Params, names: Sequence[str]) -> list[int]:
@@ -283,21 +282,18 @@ def linear(units: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[np
 
 
 def distinct(params: Params, standing: Standing, rng: np.random.Generator) -> Params:
-    """The parameters, a little changed where they have been tried; the same where the space leaves no others."""
-    spread = 0.01
-    for _ in range(20):
-        if params not in standing.tried:
-            break
-        # Numbers are changed where there are any: another choice would be another proposal.
+    """Return the parameters, changed a little if they have been tried; the same if the space leaves no others."""
+
+    def changed(params: Params, spread: float) -> Params:
+        # Numbers are changed if there are any: another choice would be another proposal.
         name = one_of([n for n in params if is_number(standing.space[n])] or list(params), rng)
         distribution = standing.space[name]
         if is_number(distribution):
-            changed = to_unit(params[name], distribution) + rng.normal(0.0, spread)
-            params = {**params, name: from_unit(changed, distribution)}
-        else:
-            params = {**params, name: drawn(distribution, rng)}
-        spread *= 1.5
-    return params
+            share = to_unit(params[name], distribution) + rng.normal(0.0, spread)
+            return {**params, name: from_unit(share, distribution)}
+        return {**params, name: drawn(distribution, rng)}
+
+    return change_until_new(params, lambda params: params in standing.tried, changed)
 
 
 def drawn(distribution: BaseDistribution, rng: np.random.Generator) -> Any:

@@ -51,13 +51,13 @@ def answer_schema(problem: Problem, *, reasoning: bool, expected: bool, proposal
     fields["reason"] = {"type": "string", "description": "the main reason for this design, in one sentence"}
     if proposals > 1:
         words = f"{proposals} designs, each different from the others"
-        content = {"designs": {"type": "array", "description": words, "items": _object(fields)}}
+        content = {"designs": {"type": "array", "description": words, "items": object_schema(fields)}}
     else:
         content = fields
     if reasoning:
         content = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **content}
     title = "NewDesign" if proposals == 1 else "NewDesigns"
-    return {"title": title, "description": "What to evaluate next.", **_object(content)}
+    return {"title": title, "description": "What to evaluate next.", **object_schema(content)}
 
 
 def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 1) -> list[Answer]:
@@ -131,8 +131,10 @@ def _property(parameter: Parameter) -> dict[str, Any]:
     return {"type": "number", "description": words}
 
 
-def _object(fields: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "object", "properties": dict(fields), "required": list(fields), "additionalProperties": False}
+def object_schema(fields: Mapping[str, Any], required: Sequence[str] | None = None) -> dict[str, Any]:
+    """Return the JSON schema of an object with these properties and no others; all are required by default."""
+    needed = list(fields if required is None else required)
+    return {"type": "object", "properties": dict(fields), "required": needed, "additionalProperties": False}
 
 
 def _read_all(designs: Sequence[Any], problem: Problem) -> list[Answer]:

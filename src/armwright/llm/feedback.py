@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ LARGE = 1e6  # from which on numbers are written with an exponent
 NOISE = 1e-9  # below it a number counts as 0
 
 Record = Mapping[str, Any]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,8 @@ class Feedback:
         front = [member.number for member in history.front] or history.nearest(N_PARETO)
         on_front = set(front)
         others = [trial.number for trial in history if trial.number not in on_front]
-        self.front = _draw(front, N_PARETO, rng)
-        self.others = _draw(others, N_RANDOM, rng)
+        self.front = draw_in_order(front, N_PARETO, rng)
+        self.others = draw_in_order(others, N_RANDOM, rng)
         self._history = history
         self.digits = Digits.of(history)
         numbers = [*self.front, *self.others]
@@ -221,9 +222,9 @@ def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:
     return ", ".join(f"{name} {share:.0f} %" for name, share in zip(joints, shares, strict=False))
 
 
-def _draw(numbers: Sequence[int], n: int, rng: np.random.Generator) -> list[int]:
-    """`n` of the numbers, without repetition, in their order."""
-    if len(numbers) <= n:
-        return list(numbers)
-    places = rng.choice(len(numbers), size=n, replace=False)
-    return [numbers[place] for place in sorted(places.tolist())]
+def draw_in_order(items: Sequence[T], n: int, rng: np.random.Generator) -> list[T]:
+    """Draw `n` of the items without repetition, in their order; all of them if there are no more."""
+    if len(items) <= n:
+        return list(items)
+    places = rng.choice(len(items), size=n, replace=False)
+    return [items[place] for place in sorted(places.tolist())]

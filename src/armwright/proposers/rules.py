@@ -16,12 +16,12 @@ from armwright.history import FrontMember, History
 from armwright.objectives import PAPER_OBJECTIVES, TORQUE
 from armwright.parameters import Design
 from armwright.proposers.proposer import Proposal, Proposer
+from armwright.proposers.rule_helpers import MIDDLE, change_until_new, draw_gap, proposal_id, rule_of
 from armwright.proposers.structures import OPENING, fitted
 
 PULL = 0.1  # [m] of base motion if all targets were missed in one direction
 REACHED = 0.005  # [m]; a nearer target pulls no more
 BENT = 0.35  # [rad] mean angle from which a joint counts as bent
-MIDDLE = (0.35, 0.65)  # of a gap
 TRIM = 0.8  # of a link's length
 LEAST_SCALE, MOST_SCALE = 0.4, 1.6
 # What a rule is taken to bring before it has been tried, as a share of the hypervolume.
@@ -66,7 +66,7 @@ class RulesProposer(Proposer):
         else:
             rule = most_promising(history, self.name)
             design, reason = RULES[rule](history, inside, rng)
-        return Proposal(distinct(design, history, rng), f"{self.name}-{number:04d}-{rule}", reason)
+        return Proposal(distinct(design, history, rng), proposal_id(self.name, number, rule), reason)
 
 
 def bounds(history: History) -> tuple[float, ...]:
@@ -87,7 +87,7 @@ def most_promising(history: History, name: str) -> str:
     gain = np.diff(volume, prepend=0.0)
     added = {rule: [expected * float(volume[-1])] for rule, expected in EXPECTED.items()}
     for trial in history.proposed:
-        rule = (trial.proposal or "").rpartition("-")[2]
+        rule = rule_of(trial.proposal)
         if trial.source == name and rule in added:
             added[rule].append(float(gain[trial.number]))
     if len(history.problem.space.joint_types) == 1:
@@ -161,18 +161,14 @@ RULES: dict[str, Rule] = {"fill": fill, "trim": trim, "swap": swap}
 
 
 def wide_gap(inside: list[FrontMember], reference_point: tuple[float, ...], rng: np.random.Generator) -> Gap:
-    """A step of the front, those at the edges of the reference box included, by chance: as the area's square.
-
-    By chance, since the widest one may be wide because no design can fill it.
-    """
+    """Draw a step of the front by its area; the steps at the edges of the reference box are included."""
     sides: list[FrontMember | None] = [None, *inside, None]
     corners = [(0.0, reference_point[1]), *((m.values[0], m.values[1]) for m in inside), (reference_point[0], 0.0)]
     gaps: list[Gap] = []
     for k, ((error, torque), (more_error, less_torque)) in enumerate(itertools.pairwise(corners)):
         area = (more_error - error) * (torque - less_torque)
         gaps.append(Gap(area, sides[k], sides[k + 1], torque, less_torque))
-    chance = np.array([gap.area for gap in gaps]) ** 2 + 1e-12  # never nothing at all
-    return gaps[int(rng.choice(len(gaps), p=chance / chance.sum()))]
+    return gaps[draw_gap([gap.area for gap in gaps], rng)]
 
 
 def between(a: Design, b: Design, share: float, history: History) -> Design:
@@ -221,16 +217,14 @@ def towards_missed(history: History, member: FrontMember) -> Array:
 
 
 def distinct(design: Design, history: History, rng: np.random.Generator) -> Design:
-    """The design, a little changed where it has been tried; the same where the space leaves no other."""
-    space, spread = history.problem.space, 0.01
-    for _ in range(20):
-        if not history.has_tried(design):
-            break
+    """Return the design, changed a little if it has been tried; the same if the space leaves no other."""
+
+    def changed(design: Design, spread: float) -> Design:
         origin = np.array(design.origin) + rng.normal(0.0, spread, 3)
         links = np.array(design.links) * np.exp(rng.normal(0.0, spread, len(design.links)))
-        design = space.clipped(origin, design.joints, links, design)
-        spread *= 1.5
-    return design
+        return history.problem.space.clipped(origin, design.joints, links, design)
+
+    return change_until_new(design, history.has_tried, changed)
 
 
 def described(design: Design) -> str:
