@@ -34,7 +34,6 @@ NOT_RUN = {
     r"export \w+=.*": "a key of nobody's",
     r"armwright experiment .*--model .*": "needs a model's key",
     r"armwright .*--model .*": "needs a model; test_llm.py and test_draft.py run such against a server of their own",
-    r"armwright compare .* runs/gpt-4o": "needs a model's run; that of docs/experiments.md is run",
     r"armwright .*--proposer replay:.*": "needs a run that a model was asked in; test_replay.py makes one",
     r"armwright .*--proposer manual:.*": "waits for people; test_manual.py answers",
     r"armwright optimize .*--live|armwright live .*": "serves until nobody looks on; test_live.py looks on",
@@ -49,7 +48,6 @@ NOT_RUN = {
 LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/\S+)( --model \S+)?")
 # Pages whose programs are run elsewhere, where what comes of them is looked at, too.
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
-SAME_AS_README = {("docs/tasks.md", "armwright optimize my-task.yaml")}
 
 LONGEST_WAIT = 900.0  # [s] for a command: one that waits for something that never comes is a fault of the page
 
@@ -58,7 +56,6 @@ SHORT = "--n-total 40 --no-figures"
 POINTS = {"points.csv": "x,y,z\n400,-200,100\n400,200,100\n100,350,500\n"}
 TEMPLATE = '{% extends "proposal.md.j2" %}\n{% block analysis %}\nSay which lengths are in stock.\n{% endblock %}\n'
 FILES = {
-    "README.md": POINTS,
     "docs/tasks.md": POINTS,
     "docs/spaces.md": {
         "mine.yaml": "name: mine\ntargets: [[0.3, 0.0, 0.2], [0.2, 0.2, 0.3]]\n",
@@ -70,7 +67,6 @@ FILES = {
                             "six-axis.yaml": "joints: 6\n"},
 }  # fmt: skip
 BEFORE = {
-    "README.md": ["armwright optimize target-1 --seed 0"],  # as `make demo` does
     "docs/exports.md": [f"armwright optimize target-1 {SHORT}"],
     "docs/page.md": [f"armwright optimize target-1 {SHORT} --out runs/{name}" for name in "ab"],
     "docs/language-models.md": [f"armwright optimize target-1 {SHORT} --out runs/mine"],
@@ -79,10 +75,11 @@ BEFORE = {
 }  # fmt: skip
 SLOW = (
     "README.md",
-    "docs/buy-or-build.md",
+    "docs/compare-arms.md",
     "docs/examples.md",
     "docs/experiments.md",
     "docs/page.md",
+    "docs/searching.md",
     "docs/spaces.md",
     "docs/tutorial.md",
     "docs/workers.md",
@@ -130,9 +127,6 @@ def test_what_is_not_run_is_there_to_be_excused() -> None:
     shown = [command.text for page in PAGES for command in commands(page)]
     for pattern in NOT_RUN:
         assert any(re.fullmatch(pattern, command) for command in shown), pattern
-    for page, command in SAME_AS_README:
-        assert command in [c.text for c in commands(page)]
-        assert command in [c.text for c in commands("README.md")]
     for page, file in PROGRAMS_RUN_IN.items():
         assert Path(page).name in (Path(__file__).parent / file).read_text(), page
 
@@ -248,7 +242,7 @@ def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
     for block in blocks(page):
         for number in range(len(block.text.splitlines()) + 1):
             command = run.get(f"{page}:{block.line + number}")
-            if command is not None and (page, command.text) not in SAME_AS_README:
+            if command is not None:
                 said = run_command(command, in_folder)
         if block.language in ("yaml", "csv", "python") and (name := file_of(block)):
             (in_folder / name).write_text(block.text)

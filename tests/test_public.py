@@ -41,23 +41,3 @@ def test_the_python_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().out.rstrip().endswith("</robot>")
     assert (in_folder / "runs" / "mine" / "summary.json").exists()
     assert {"hypervolume.png", "front.png"} <= {path.name for path in aw.write_figures(Path("runs/mine"))}
-
-
-def test_the_files_of_the_readme_load(in_folder: Path) -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text()
-    task, targets, ways, space, motors = re.findall(r"```yaml\n(.*?)```", readme, re.DOTALL)
-    (in_folder / "task.yaml").write_text(task)
-    problem = aw.Problem(aw.load_task("task.yaml"))
-    assert problem.evaluate(problem.space.sample(2, 0)).shape == (2, 3)
-    (in_folder / "targets.yaml").write_text("name: tools\n" + targets)
-    assert aw.load_task("targets.yaml").goals.oriented
-    (in_folder / "ways.yaml").write_text("name: ways\n" + ways)
-    assert len(aw.load_task("ways.yaml").targets) == 8
-    (in_folder / "space.yaml").write_text(space)
-    assert aw.load_space("space.yaml").joints == 6
-    (in_folder / "space.yaml").write_text(space + motors)
-    assert [record.name for record in aw.load_space("space.yaml").actuators] == [
-        "XM540-W270",
-        "XM430-W350",
-        "XL430-W250",
-    ]
