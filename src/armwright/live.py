@@ -1,12 +1,12 @@
-"""The page of a run, live: served to browsers on this machine while the run goes on, in this process or another.
+"""The live page: serve a run to browsers on this machine while it goes on, in this process or another.
 
-It reads the run folder and writes what its user wants into control.json, so the study never waits for it, and neither
-knows of the other. Needs the extra `live`.
+The server reads the run folder and writes the user's requests into control.json, so the study never waits for it.
+Needs the extra `live`.
 
     /               the page
-    /run            the run, packed; ?designs=N&calls=M: what is new from there on
+    /run            the run, packed; ?designs=N&calls=M: only what is new since then
     /file           a design as text: ?design=N&format=urdf or mjcf
-    /events         what the study does, as server-sent events
+    /events         the status of the study, as server-sent events
     /control        POST: pause, resume, stop, hint; with the page's token, from the page alone
 """
 
@@ -18,7 +18,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import AsyncGenerator, Callable, Mapping
+from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, cast
@@ -26,58 +26,47 @@ from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, cast
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from armwright.control import (
-    CONTROL,
     LONGEST_HINT,
-    STATUS,
-    Hint,
     add_hint,
     pause_study,
-    read_control,
-    read_status,
     resume_study,
     stop_study,
 )
 from armwright.exceptions import ArmwrightError, FailureError, SettingsError
 from armwright.extras import check_extra
 from armwright.files import writable
-from armwright.llm.transcript import TRANSCRIPTS, used_hints
-from armwright.report.content import RunContent, design_files
 from armwright.report.page import render_page
-from armwright.results import SUMMARY
-from armwright.run_folder import CONFIG, TRIALS, is_held, read_config
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
     from starlette.requests import Request
+from armwright.report.live_run import LiveRun
 
 LOOPBACK = "127.0.0.1"
-HTTP_PORT = 80  # which addresses leave out
-LOOK_EVERY = 0.25  # [s] between two looks at the run folder
-BEAT = 15.0  # [s] after which an event says that nothing has changed
-GRACE = 3.0  # [s] that a server without its study waits for a page to look on
-LINGER = 60.0  # [s] that it waits for one that has looked on, and may be a tab that is not seen
-LARGEST_BODY = 64 * 1024  # [bytes] of a POST
-WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
-RECENT = 20  # trials, whose time says how long the others will take
-RUNNING = ("evaluating", "asking", "paused")
+HTTP_PORT = 80  # omitted in addresses
+LOOK_EVERY = 0.25  # [s] between two checks of the run folder
+BEAT = 15.0  # [s] between events while nothing changes
+GRACE = 3.0  # [s] to wait for a first page after the study has ended
+LINGER = 60.0  # [s] to wait for a page to come back, such as a tab in the background
+LARGEST_BODY = 64 * 1024  # largest POST [bytes]
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
-    "Content-Security-Policy": "frame-ancestors 'none'",  # beside the page's own
+    "Content-Security-Policy": "frame-ancestors 'none'",  # in addition to the page's own policy
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 
 
 class ControlRequest(BaseModel, frozen=True, extra="forbid"):
-    """What the page's user wants of the study."""
+    """A request of the page's user to the study."""
 
     action: Literal["pause", "resume", "stop"]
 
 
 class HintRequest(BaseModel, frozen=True, extra="forbid"):
-    """A hint for the next question to the model."""
+    """A hint for the next prompt."""
 
     action: Literal["hint"]
     text: str = Field(min_length=1, max_length=LONGEST_HINT)
@@ -89,116 +78,14 @@ _REQUESTS: TypeAdapter[ControlRequest | HintRequest] = TypeAdapter(
 _ACTIONS: dict[str, Callable[[Path], None]] = {"pause": pause_study, "resume": resume_study, "stop": stop_study}
 
 
-class LiveRun:
-    """The run folder as it is now; there need not be a run in it yet. Several threads may ask."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.fault = ""  # why the folder cannot be read
-        self._content: RunContent | None = None
-        self._seen: list[tuple[int, ...] | None] = []
-        self._server = secrets.token_hex(8)  # another at this address is another run to a page
-        self._run = 0  # how many runs lay here since the server began
-        self._lock = threading.Lock()
-        self.status = self._status()
-
-    def look(self) -> None:
-        """Reads what has changed."""
-        with self._lock:
-            seen = [_stamp(self.folder / name) for name in WATCHED]
-            if seen == self._seen and not (self.status["doing"] in RUNNING and not is_held(self.folder)):
-                return
-            self._seen = seen
-            try:
-                self._read()
-                self.fault = ""
-            except ArmwrightError as fault:
-                self.fault = str(fault)  # such as a file that is just being written anew; read again when it changes
-            except Exception as fault:  # noqa: BLE001 (whatever lies in a folder, the server goes on looking)
-                self.fault = f"the run folder cannot be read: {type(fault).__name__}: {fault}"
-            self.status = self._status()
-
-    def packed(self, designs: int, calls: int) -> bytes | None:
-        """What is new for a page; None as long as there is no run."""
-        with self._lock:
-            return None if self._content is None else self._content.packed(designs, calls, with_files=False)
-
-    def file(self, number: int, kind: str) -> str | None:
-        """A design as text; None where there is none."""
-        with self._lock:
-            if self._content is None or number >= len(self._content.history) or kind not in ("urdf", "mjcf"):
-                return None
-            return design_files(self._content.history, number)[kind]
-
-    def _read(self) -> None:
-        if not (self.folder / CONFIG).is_file():
-            return
-        if self._content is None or not self._content.is_still(read_config(self.folder)):
-            self._content = None  # what cannot be read is not shown as what was read before
-            self._run += 1
-            self._content = RunContent(self.folder)
-        elif self._content.refresh():
-            self._run += 1
-
-    def _status(self) -> dict[str, Any]:
-        """What the bar of the page says."""
-        content, said, asked = self._content, read_status(self.folder), read_control(self.folder)
-        history = None if content is None else content.history
-        study = None if content is None else content.study
-        planned = None if study is None else study.n_trials
-        n = 0 if history is None else len(history)
-        doing = "unknown" if said is None else said.doing
-        if doing in RUNNING and not is_held(self.folder):
-            doing = "gone"
-        if said is None and content is not None and content.summary is not None:
-            doing = "finished"
-        recent = [] if history is None else [trial.seconds.get("total", 0.0) for trial in history.trials[-RECENT:]]
-        left = None if planned is None or not recent else (planned - n) * sum(recent) / len(recent)
-        calls = () if content is None else content.calls
-        used = used_hints(calls)
-        return {
-            "run": f"{self._server}-{self._run}",
-            "doing": doing,
-            "since": 0.0 if said is None else said.since,
-            "designs": n,
-            "calls": len(calls),
-            "planned": planned,
-            "finished": content is not None and content.summary is not None,
-            "left": left,
-            "paused": asked.paused,
-            "fault": self.fault or ("" if said is None else said.fault),
-            "takes_hints": study is not None and _asks_a_model(study.proposer or {}),
-            "hints": [
-                {"text": hint.text, "used": _iteration(used, hint, 0 if study is None else study.n_init)}
-                for hint in asked.hints
-            ],
-        }
-
-
-def _asks_a_model(proposer: Mapping[str, Any]) -> bool:
-    """Whether a hint has a reader: not the rules, not people with a question on their desk, not a recorded run."""
-    return "prompt" in proposer and "replay" not in proposer and proposer["name"] != "manual"
-
-
-def _iteration(used: dict[Hint, str], hint: Hint, n_init: int) -> int | None:
-    """The iteration whose question carried a hint."""
-    if hint not in used:
-        return None
-    return int(used[hint].rpartition("-")[2]) - n_init + 1
-
-
-def _stamp(path: Path) -> tuple[int, ...] | None:
-    try:
-        there = path.stat()
-    except OSError:
-        return None
-    return there.st_mtime_ns, there.st_ctime_ns, there.st_size, there.st_ino
-
-
 def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages: "Pages") -> "Starlette":
-    """The server's application.
+    """Return the server's application.
 
-    is_allowed: whether a request for this host is for us; any other is a web page's that had its name point here.
+    Args:
+        folder: The run folder.
+        token: Required by requests that change anything.
+        is_allowed: Tells whether a Host header names this server; others are refused (DNS rebinding).
+        pages: Counts the open pages.
     """
     from starlette.applications import Starlette
     from starlette.middleware import Middleware
@@ -233,7 +120,7 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         designs, calls = (_whole(request, name) for name in ("designs", "calls"))
         try:
             data = await asyncio.to_thread(run.packed, designs, calls)
-        except ValueError as fault:  # numbers in the folder's files that are none
+        except ValueError as fault:  # damaged numbers in the folder's files
             return PlainTextResponse(f"the run cannot be shown: {fault}", status_code=500)
         if data is None:
             return PlainTextResponse(run.fault or "the run has not begun yet", status_code=503)
@@ -243,11 +130,11 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         said, kind = request.query_params.get("design", ""), request.query_params.get("format", "")
         text = await asyncio.to_thread(run.file, int(said), kind) if _is_whole(said) else None
         if text is None:
-            return PlainTextResponse("there is no such file", status_code=404)
+            return PlainTextResponse("no such file", status_code=404)
         return Response(text, media_type="application/xml")
 
     async def events(request: Request) -> Response:
-        if request.method == "HEAD":  # which has no end of its own
+        if request.method == "HEAD":  # the stream would never end
             return Response(media_type="text/event-stream")
         return StreamingResponse(_told(), media_type="text/event-stream")
 
@@ -272,17 +159,17 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
             return PlainTextResponse("the token of the page is missing or wrong; reload the page", status_code=403)
         origin = request.headers.get("origin", "")
         if origin != f"{request.url.scheme}://{request.headers.get('host', '')}":
-            return PlainTextResponse("only the page itself may ask for this", status_code=403)
+            return PlainTextResponse("only the page itself may send this", status_code=403)
         if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-            return PlainTextResponse("JSON is wanted", status_code=415)
+            return PlainTextResponse("expected application/json", status_code=415)
         body = b""
         try:
             async for part in request.stream():
                 body += part
                 if len(body) > LARGEST_BODY:
-                    return PlainTextResponse("that is too long", status_code=413)
+                    return PlainTextResponse("request too long", status_code=413)
         except ClientDisconnect:
-            return Response(status_code=400)  # to nobody
+            return Response(status_code=400)  # nobody receives it
         try:
             asked = _REQUESTS.validate_json(body)
             if not folder.is_dir():
@@ -292,7 +179,7 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
             else:
                 await asyncio.to_thread(_ACTIONS[asked.action], folder)
         except ValidationError:
-            return PlainTextResponse("that is no pause, resume, stop or hint", status_code=422)
+            return PlainTextResponse("expected pause, resume, stop or hint", status_code=422)
         except ArmwrightError as fault:
             return PlainTextResponse(str(fault), status_code=409)
         await asyncio.to_thread(run.look)
@@ -312,7 +199,7 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
 
 
 class _Guard:
-    """Refuses requests for other hosts, and says with every answer what a browser may do with it."""
+    """Refuse requests for other hosts, and add the security headers to every response."""
 
     def __init__(self, app: Any, is_allowed: Callable[[str], bool]) -> None:
         self._app = app
@@ -331,14 +218,14 @@ class _Guard:
                 message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in HEADERS.items())]
             await send(message)
 
-        if len(hosts) != 1 or not self._is_allowed(hosts[0]):  # of two, others might believe the other one
-            await PlainTextResponse("this server answers on its own address only", 421)(scope, receive, sent)
+        if len(hosts) != 1 or not self._is_allowed(hosts[0]):  # with two, a proxy might use the other one
+            await PlainTextResponse("unknown host; use the address that the server printed", 421)(scope, receive, sent)
             return
         await self._app(scope, receive, sent)
 
 
 def _whole(request: "Request", name: str) -> int:
-    """A whole number of the address, 0 where it is none."""
+    """Return a whole number from the query; 0 if it is missing or invalid."""
     said = request.query_params.get(name, "")
     return int(said) if _is_whole(said) else 0
 
@@ -348,21 +235,29 @@ def _is_whole(said: str) -> bool:
 
 
 class Pages:
-    """The pages that look on."""
+    """The open pages."""
 
     def __init__(self) -> None:
         self.open = 0
-        self.were_open = False  # ever
-        self.is_closing = False  # the server
+        self.were_open = False  # at any time
+        self.is_closing = False  # whether the server is shutting down
 
 
 def serve(
     folder: Path, tell: Callable[[str], None], host: str = LOOPBACK, port: int = 0, study: BinaryIO | None = None
 ) -> None:
-    """Serves the page of a run until Ctrl-C.
+    """Serve the page of a run until Ctrl-C.
 
-    tell: called with the page's address when it can be opened. port: 0 for any that is free.
-    study: a pipe that ends with the process of the study; then the server ends, too, as soon as no page looks on.
+    Args:
+        folder: The run folder.
+        tell: Called with the page's address once it can be opened.
+        host: Address to listen on.
+        port: Port to listen on; 0 for any free one.
+        study: A pipe that closes when the study's process ends; the server then ends as soon as no page is open.
+
+    Raises:
+        MissingExtraError: The extra `live` is not installed.
+        FailureError: The address cannot be used.
     """
     check_extra("live", "the live page")
     import uvicorn
@@ -407,7 +302,7 @@ def _listen(host: str, port: int) -> socket.socket:
         listener = socket.socket(kind, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
-        listener.listen(128)  # so that whoever is told the address can connect, however soon
+        listener.listen(128)  # accepts connections before the address is announced
     except OSError as fault:
         raise FailureError(f"cannot listen on {host}, port {port}: {fault.strerror or fault}") from fault
     except OverflowError as fault:
@@ -416,10 +311,10 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def _hosts(host: str, listener: socket.socket) -> Callable[[str], bool]:
-    """Which names a browser may have called us by."""
+    """Return the check of Host headers for this address."""
     address, port = cast("tuple[str, int]", listener.getsockname()[:2])
     if not _is_loopback(address):
-        return lambda asked: True  # whoever opens it to a network knows by what names it is reached
+        return lambda asked: True  # on a network, any name may lead here
     names = {f"[{name}]" if ":" in name else name for name in (host.lower(), address, "localhost", LOOPBACK, "::1")}
     known = {f"{name}:{port}" for name in names}
     return lambda asked: asked.lower() in known or (port == HTTP_PORT and asked.lower() in names)
@@ -432,21 +327,21 @@ def _is_loopback(address: str) -> bool:
 
 
 def begin_server(folder: Path) -> str:
-    """Begins a process that serves the page of the study of this process; the page's address.
+    """Start a process that serves the page of this process's study, and return the page's address.
 
-    It outlives the study as long as a page looks on, and its crash is no matter to the study.
+    The server outlives the study while a page is open. If it crashes, the study goes on.
     """
     check_extra("live", "the live page")
-    # Nothing of the folder that the user stands in is taken for a module (-P).
+    # -P: never import modules from the working directory.
     command = [sys.executable, "-P", "-m", "armwright", "live", str(folder.absolute()), "--follow"]
-    # A session of its own: Ctrl-C ends the study, and the page still shows what it came to.
+    # A new session: after Ctrl-C the page still shows the results.
     server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
     assert server.stdout is not None
     address = server.stdout.readline().decode().strip()
     if not address.startswith("http://"):
-        raise FailureError("the live page's server did not begin; its words stand above")
+        raise FailureError("the live page's server did not start; its output is above")
     _pipes.append(server)
     return address
 
 
-_pipes: list[subprocess.Popen[bytes]] = []  # kept, as their ends tell the servers that the study is gone
+_pipes: list[subprocess.Popen[bytes]] = []  # kept open: their closing tells the servers that the study has ended

@@ -1,4 +1,4 @@
-"""The figures of a comparison: what the paper shows of its methods, and what else tells them apart."""
+"""Figures of a comparison: those of the paper, and further ones that tell methods apart."""
 
 import math
 import textwrap
@@ -18,24 +18,25 @@ from armwright.comparison import Comparison, Run
 from armwright.history import BBO, RANDOM, History
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
 from armwright.pareto import front_numbers, hypervolume, solution_numbers
+from armwright.report.arm_figures import draw_arm, frame
 from armwright.report.drawing import one_panel, several_panels, write_drawn
-from armwright.report.figures import axis_label, draw_arm, draw_samples, frame
+from armwright.report.figures import axis_label, draw_samples
 from armwright.report.style import FRONT, MISSED, TARGET, line, look
 from armwright.results import FIGURES
 from armwright.run_folder import RunConfig
 
-MOST_SHOWN = 12  # tasks in a figure of targets
-COLUMNS = 3  # of panels
-MARKERS = 5  # on a curve
-LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # [inch]
-STEPS = ("reasoning", "answer", "parameters")  # where a model's reasons stand, the best place first
-LONGEST_REASONING = 5_200  # characters; its beginning and its end are shown
+MOST_SHOWN = 12  # most tasks in the figure of targets
+COLUMNS = 3  # panels side by side
+MARKERS = 5  # markers on a curve
+LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
+STEPS = ("reasoning", "answer", "parameters")  # transcript steps that contain a model's reasons, the best first
+LONGEST_REASONING = 5_200  # characters; longer text loses its middle
 LINE_LENGTH = 104  # characters
 
 
 @dataclass(frozen=True)
 class Curves:
-    """A figure of hypervolume curves: its name, its title, its methods."""
+    """A figure of hypervolume curves."""
 
     name: str
     title: str
@@ -45,17 +46,20 @@ class Curves:
 def write_comparison_figures(
     place: Path, comparison: Comparison, curves: Sequence[Curves] = (), samples: Sequence[str] = ()
 ) -> list[Path]:
-    """Draws a comparison into `place`/figures; the .png files.
+    """Draw a comparison into `place`/figures and return the PNG files.
 
-    curves: without any, one with all methods. samples: the first of these methods that has runs is shown closer; none:
-        the last method of all.
+    Args:
+        place: Folder of the experiment.
+        comparison: The runs to compare.
+        curves: Figures of hypervolume curves; by default one with all methods.
+        samples: Methods to show in detail: the first one with runs is drawn; by default the last of all methods.
     """
     return write_drawn(place / FIGURES, _drawn(comparison, curves, samples))
 
 
 def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
     yield "targets", draw_targets(comparison)
-    plane = all(len(run.config.objectives) > 1 for run in comparison.runs)  # of the first two objectives
+    plane = all(len(run.config.objectives) > 1 for run in comparison.runs)  # figures of the first two objectives
     with_curves = [
         method for method in comparison.methods if any(len(comparison.curves(method, t)) for t in comparison.tasks)
     ]
@@ -71,11 +75,11 @@ def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[s
         yield f"attainment-{task}", draw_attainment(comparison, task)
     if any(run.proposer for run in comparison.runs):
         yield "credit", draw_credit_shares(comparison)
-    yield from _closer(comparison, samples)
+    yield from _details(comparison, samples)
 
 
-def _closer(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
-    """One run of each task: its samples, Solutions 1 and 2 at every target, and the reasons for Solution 1."""
+def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
+    """Yield figures of one run per task: its samples, Solutions 1 and 2, and the reasons for Solution 1."""
     shown = next((method for method in samples if method in comparison.methods), comparison.methods[-1])
     for task in comparison.tasks[:COLUMNS]:
         runs = [run for run in comparison.of(shown, task) if len(run.curve)]
@@ -94,7 +98,7 @@ def _closer(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[st
 
 
 def draw_targets(comparison: Comparison) -> Figure:
-    """The targets of each task, in space."""
+    """Draw the targets of each task in space."""
     shown = comparison.tasks[:MOST_SHOWN]
     columns = min(len(shown), COLUMNS + 1)
     rows = -(-len(shown) // columns)
@@ -117,7 +121,7 @@ def draw_targets(comparison: Comparison) -> Figure:
 
 
 def draw_area(comparison: Comparison) -> Figure:
-    """What E_hv measures, on one run: the area between the front and the reference point."""
+    """Draw the area that E_hv measures, between the front of one run and the reference point."""
     run = next(
         r
         for method in [comparison.baseline, *comparison.methods]
@@ -160,7 +164,7 @@ def draw_area(comparison: Comparison) -> Figure:
 
 
 def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> Figure:
-    """The hypervolume over the counted trials: mean and standard deviation over the seeds, a panel for each task."""
+    """Draw the mean and standard deviation of the hypervolume over the seeds, with a panel for each task."""
     figure, panels = _panels(comparison.tasks, 2.6)
     for axes, task in zip(panels, comparison.tasks, strict=True):
         for method in methods:
@@ -193,13 +197,13 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
     _legend(figure, handles)
     seeds = {len(comparison.of(method, task)) for method in methods for task in comparison.tasks} - {0}
     runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
-    words = f"mean and standard deviation of {runs} runs"
-    figure.suptitle(f"{title}: {words}" if title else words.capitalize(), fontsize=10)
+    caption = f"mean and standard deviation of {runs} runs"
+    figure.suptitle(f"{title}: {caption}" if title else caption.capitalize(), fontsize=10)
     return figure
 
 
 def draw_attainment(comparison: Comparison, task: str) -> Figure:
-    """The empirical attainment surfaces: what half of a method's runs attained, between what one and what all did."""
+    """Draw empirical attainment surfaces: attained by half of a method's runs, by at least one and by all."""
     figure, axes = one_panel(5.2, 4.2)
     reference = comparison.reference_point(task)
     handles: list[Any] = []
@@ -232,7 +236,7 @@ def draw_attainment(comparison: Comparison, task: str) -> Figure:
 
 
 def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
-    """The share of all runs that have come to a level of the best known hypervolume, over the counted trials."""
+    """Draw the share of runs that reached a level of the best known hypervolume, over the counted trials."""
     levels = sorted({time.level for time in comparison.times})
     figure = several_panels(10.4, 3.2)
     panels: Any = np.atleast_1d(figure.subplots(1, len(levels), sharey=True))
@@ -251,13 +255,13 @@ def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
         axes.set_xlabel("Iteration")
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-    panels[0].set_ylabel("Runs that are there")
+    panels[0].set_ylabel("Runs that reached it")
     _legend(figure, [_handle(comparison, method, marked=False) for method in methods])
     return figure
 
 
 def draw_credit_shares(comparison: Comparison) -> Figure:
-    """Which share of the hypervolume each source gained, method by method: means over the runs."""
+    """Draw each source's share of the final hypervolume per method, averaged over the runs."""
     pairs = [
         (task, method)
         for task in comparison.tasks
@@ -286,7 +290,7 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
     axes.set_ylim(len(pairs) - 0.4, -0.6)
     axes.set_xlim(0, 1)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0))
-    axes.set_xlabel("Share of the final hypervolume, by who enlarged it")
+    axes.set_xlabel("Share of the final hypervolume by source")
     axes.grid(axis="y", visible=False)
     patches = [
         Patch(facecolor=look(s).colour, hatch=look(s).hatch, edgecolor="white", label=look(s).label) for s in sources
@@ -304,7 +308,7 @@ def _gained_shares(runs: Sequence[Run]) -> Mapping[str, float]:
 
 
 def _reasons(run: Run, history: History, solutions: tuple[int, int] | None) -> Figure | None:
-    """The words with which Solution 1 was proposed, or the proposal of the front nearest to it."""
+    """Draw the reasons given for Solution 1, or for the proposal on the front that is nearest to it."""
     if solutions is None or not run.proposer:
         return None
     proposed = [member.number for member in history.front if history.trials[member.number].proposal is not None]
@@ -314,30 +318,30 @@ def _reasons(run: Run, history: History, solutions: tuple[int, int] | None) -> F
     number = within[0]
     trial = history.trials[number]
     calls = Transcript(run.folder / TRANSCRIPTS, read_only=True).calls
-    spoken = _spoken([call for call in calls if call.proposal == trial.proposal and call.fault is None])
-    words = spoken.answer if spoken is not None else trial.reason
-    if not words.strip():
+    call = _reasoned_call([call for call in calls if call.proposal == trial.proposal and call.fault is None])
+    text = call.answer if call is not None else trial.reason
+    if not text.strip():
         return None
-    who = "the built-in rules" if spoken is None else f"{spoken.model} ({spoken.origin})"
+    who = "the built-in rules" if call is None else f"{call.model} ({call.origin})"
     which = "Solution 1" if number == solutions[0] else "the proposal on the front that is nearest to Solution 1"
     head = f"{run.task}, {run.method}, seed {run.seed}: why #{number}, {which}, was proposed by {who}"
-    return _text(head, _shortened(words))
+    return _draw_text(head, _shortened(text))
 
 
-def _spoken(calls: Sequence[Call]) -> Call | None:
+def _reasoned_call(calls: Sequence[Call]) -> Call | None:
     return next((call for step in STEPS for call in calls if call.step == step), None)
 
 
-def _shortened(words: str) -> str:
-    if len(words) <= LONGEST_REASONING:
-        return words
+def _shortened(text: str) -> str:
+    if len(text) <= LONGEST_REASONING:
+        return text
     half = LONGEST_REASONING // 2
-    return f"{words[:half].rstrip()}\n\n[… {len(words) - 2 * half:,} characters …]\n\n{words[-half:].lstrip()}"
+    return f"{text[:half].rstrip()}\n\n[… {len(text) - 2 * half:,} characters …]\n\n{text[-half:].lstrip()}"
 
 
-def _text(head: str, words: str) -> Figure:
-    """Words as a figure; nothing in them is markup."""
-    plain = "".join(c for c in words if c.isprintable() or c == "\n")
+def _draw_text(head: str, text: str) -> Figure:
+    """Draw plain text as a figure; markup is not interpreted."""
+    plain = "".join(c for c in text if c.isprintable() or c == "\n")
     lines = [part for whole in plain.splitlines() for part in textwrap.wrap(whole, LINE_LENGTH) or [""]]
     height = 0.7 + 0.148 * len(lines)
     figure = Figure(figsize=(8.0, height))
@@ -363,13 +367,13 @@ def _name_axes(axes: Any, config: RunConfig) -> None:
 
 
 def _front(run: Run) -> np.ndarray:
-    """(K, 2) the front of a run, in the first two objectives."""
+    """Return the front of a run in the first two objectives, (K, 2)."""
     counted = run.history().counted
     return counted[front_numbers(counted)][:, :2]
 
 
 def _stairs(surface: np.ndarray, reference: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """A surface of `moocore.eaf` within the reference box as a line of steps, from the box's top to its right side."""
+    """Return a surface of `moocore.eaf` as the x and y of a step line from the top to the right side of the box."""
     points = surface[np.argsort(surface[:, 0])][:, :2]
     points = points[np.all(points < np.asarray(reference[:2]), axis=1)]
     if not len(points):
@@ -380,7 +384,7 @@ def _stairs(surface: np.ndarray, reference: Sequence[float]) -> tuple[np.ndarray
 
 
 def _at(grid: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """The steps' heights at `grid`; left of them, the top of the box."""
+    """Return the heights of the steps at `grid`; left of the first step, the top of the box."""
     place = np.searchsorted(x, grid, side="right") - 1
     return np.where(place >= 0, y[np.maximum(place, 0)], y[0])
 
@@ -417,7 +421,7 @@ def _handle(comparison: Comparison, method: str, marked: bool = True) -> Line2D:
 
 
 def _legend(figure: Figure, handles: Sequence[Any]) -> None:
-    """Below the panels, in as many columns as there is room for."""
+    """Add a legend below the panels, with as many columns as fit."""
     if handles:
         widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
         columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))

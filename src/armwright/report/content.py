@@ -1,6 +1,6 @@
-"""What the page shows of a run folder, packed as one piece of bytes that its script takes apart.
+"""The content of the page: a run folder packed as bytes for the page's script.
 
-The same bytes stand in report.html and come from the live server, which sends only what is new.
+report.html embeds these bytes; the live server sends them, reduced to what is new.
 """
 
 import json
@@ -33,38 +33,38 @@ from armwright.results import read_summary
 from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
 
 KINDS = ("revolute", "prismatic", "fixed")
-NO_JOINT = Joint("fixed", "z")  # fill up shorter arms
+NO_JOINT = Joint("fixed", "z")  # padding of shorter arms
 NO_LINK = Link((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 1.0)
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
 class RunContent:
-    """A run folder as the page shows it. `refresh` reads what has come since; what was read is kept."""
+    """A run folder as the page shows it; `refresh` reads only what is new."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.config: RunConfig = read_config(folder)
         self._reader = TrialsReader(folder, self.config)
-        self._chunks: list[tuple[int, Arrays]] = []  # designs by the number of their first
+        self._chunks: list[tuple[int, Arrays]] = []  # chunks of designs, by the number of the first
         self._n = 0
         self.history = self._nothing()
         self.refresh()
 
     def is_still(self, config: RunConfig) -> bool:
-        """Whether a folder with these settings holds the same run, perhaps a longer one."""
+        """Return whether a folder with these settings holds the same run, possibly extended."""
         changing: dict[str, Any] = {"reference_point": None, "versions": {}, "earlier_versions": [], "method": None}
         ours, theirs = (one.model_copy(update=changing) for one in (self.config, config))
         return ours == theirs and type(self.config.method) is type(config.method)
 
     def refresh(self) -> bool:
-        """Reads on; whether it had to begin anew, as the file is another one than before."""
-        self.config = read_config(self.folder)  # the reference point may have been found
+        """Read what is new; return whether the trials file was replaced and had to be read from the start."""
+        self.config = read_config(self.folder)  # the reference point may have been chosen since
         is_other = self._reader.read_on() or len(self._reader.trials) < self._n
         if is_other:
             self._chunks, self._n, self.history = [], 0, self._nothing()
         summary = read_summary(self.folder)
-        # A summary of another kind of run is none of this one's.
+        # A summary of another kind of run does not belong to this one.
         self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
         self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
         self.history = self.history.grown(self._reader.trials, self.config.reference_point)
@@ -78,7 +78,7 @@ class RunContent:
 
     @property
     def study(self) -> Method | None:
-        """How its study searches; None for a search for the whole front."""
+        """The settings of its study; None for a direct search."""
         return None if isinstance(self.config.method, FrontMethod) else self.config.method
 
     def packed(self, designs_from: int = 0, calls_from: int = 0, with_files: bool = True) -> bytes:
@@ -87,7 +87,7 @@ class RunContent:
         with_files: URDF and MJCF of the front's designs, too.
         """
         if designs_from not in {self._n, *(first for first, _ in self._chunks)}:
-            designs_from = 0  # the page knows another state of the run than any that was sent: all of it anew
+            designs_from = 0  # the page holds a state that was never sent: send everything
         arrays = _joined([arrays for first, arrays in self._chunks if first >= designs_from])
         front = [member.number for member in self.history.front]
         search = None if self.summary is None or self.study is not None else self.summary["search"]
@@ -112,7 +112,7 @@ class RunContent:
 
 
 def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
-    """Arms that exist already, as they were last compared with the run, and where they stand beside its front now."""
+    """Return the existing arms of the last comparison and their relation to the present front."""
     return [
         {
             "name": arm.name,
@@ -125,19 +125,19 @@ def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
 
 
 def design_files(history: History, number: int) -> dict[str, str]:
-    """A design as text for simulators, by format."""
+    """Return a design as text for simulators, by format."""
     name, arm = f"{history.problem.task.name}-{number}", history.member(number).arm
     return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}
 
 
 def _of_arm(history: History, number: int) -> dict[str, float]:
-    """What an arm is, whatever the targets, by the names that `armwright pick` knows."""
+    """Return quantities of an arm that do not depend on the targets, named as in `armwright pick`."""
     numbers = numbers_of(history, history.member(number))
     return {name: numbers[name] for name in ("length", "mass", *bounded_numbers(history, number))}
 
 
 def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
-    """A JSON head and arrays as bytes: the head's length (uint32, little-endian), the head, then the arrays.
+    """Pack a JSON head and arrays: the head's length (uint32, little-endian), the head, then the arrays.
 
     The head's "arrays" says of each its type, where it begins after the head [bytes], and its shape. All begin at
     multiples of 8, so that a script can look at them where they lie.
@@ -156,7 +156,7 @@ def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
 
 
 def _designs(history: History, numbers: range) -> Arrays:
-    """What the page knows of these designs, one row each; `q` is (n, T, J) joint angles [rad] or strokes [m]."""
+    """Return the page's arrays of these designs, one row each; `q`: (n, T, J) joint angles [rad] or strokes [m]."""
     space = history.problem.space
     trials = [history.trials[number] for number in numbers]
     arms = [history.problem.arm(trial.design) for trial in trials]
@@ -173,7 +173,7 @@ def _designs(history: History, numbers: range) -> Arrays:
 
 
 def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
-    """The arms, joint by joint, as `Arm` has them; `joints` (n,) of the J that there is room for are an arm's own."""
+    """Return the arms joint by joint, padded to J joints; `joints`: (n,) the number that an arm has."""
     own = [arm.joints + (NO_JOINT,) * (room - len(arm.joints)) for arm in arms]
     links = [arm.links + (NO_LINK,) * (room - len(arm.links)) for arm in arms]
 
@@ -205,7 +205,7 @@ def _joined(chunks: Sequence[Arrays]) -> dict[str, NDArray[Any]]:
 
 
 def _about(config: RunConfig, folder: Path, history: History, spent: int | None) -> dict[str, Any]:
-    """What hardly changes while the run goes on; spent: evaluations of a search for the whole front."""
+    """Return the head's slowly changing part; `spent`: evaluations of a direct search."""
     task, method, space = config.task, config.method, config.space
     study = None if isinstance(method, FrontMethod) else method
     known = known_front(config.problem)
@@ -277,7 +277,7 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def _goals(goals: Goals) -> dict[str, Any]:
-    """How the targets are to be reached; frames: the axes that the tool should have, as columns, by rows."""
+    """Return the targets' orientation requirements; frames: tool axes as columns, stored row by row."""
     return {
         "oriented": goals.oriented,
         "rows": goals.rows.tolist(),
@@ -288,7 +288,7 @@ def _goals(goals: Goals) -> dict[str, Any]:
 
 
 def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
-    """What the run has come to."""
+    """Return the results of the run so far."""
     reference = history.reference_point
     final = hypervolume(history.counted, reference) if reference is not None and len(history) else None
     found: dict[str, Any] = {
@@ -318,7 +318,7 @@ def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | No
 
 
 def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
-    """Of the designs from `first` on, what was proposed and why, and what went wrong where a proposal was due."""
+    """Return the proposals, refinements and failed proposals among the designs from `first` on."""
     return {
         trial.number: {
             "id": trial.proposal,

@@ -1,4 +1,4 @@
-"""Figures without a screen: made, and written as .png and .pdf, all of a folder in one step."""
+"""Figures without a display, written as PNG and PDF; a folder of figures is replaced in one step."""
 
 import shutil
 from collections.abc import Generator, Iterable
@@ -16,27 +16,27 @@ from armwright.report.style import RC
 
 
 def one_panel(width: float, height: float) -> tuple[Figure, Any]:
-    """A figure of this size [inch], and its axes."""
+    """Return a figure of this size [inch] and its only axes."""
     figure = several_panels(width, height)
     return figure, figure.subplots()
 
 
 def several_panels(width: float, height: float) -> Figure:
-    """A figure of this size [inch] whose axes come later."""
+    """Return a figure of this size [inch] without axes."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
-    """Writes figures by name as .png and .pdf into the folder `place`, instead of what lies there; the .png files."""
+    """Replace the folder `place` by these figures, as PNG and PDF, and return the PNG files."""
     part = place.with_name(f"{place.name}.part")
     with matplotlib.rc_context(RC), _writing(place):
         if part.exists():
             shutil.rmtree(part)
         part.mkdir(parents=True)
         names = [_save(figure, part / f"{name}.png") for name, figure in drawn]
-        replace_folder(place, part)  # which so always holds all figures of one state of the run
+        replace_folder(place, part)  # so that the folder never mixes figures of two states of a run
     return [place / name for name in names]
 
 

@@ -1,4 +1,4 @@
-"""The tables and figures of an experiment, from its finished cells."""
+"""Tables and figures of an experiment, from its finished cells."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,15 +11,19 @@ from armwright.report.tables import write_tables
 
 
 def write_experiment_tables(out: Path, plan: ExperimentPlan, found: Comparison, notes: Sequence[str]) -> list[Path]:
-    """Writes the tables into the experiment's folder; the files, the readable one first.
+    """Write the tables into the experiment's folder and return their paths, table.md first.
 
-    notes: what to say of cells that are missing.
+    Args:
+        out: Folder of the experiment.
+        plan: The experiment.
+        found: Its finished runs.
+        notes: Remarks on missing cells.
     """
     return write_tables(out, found, f"Experiment {plan.name}", published(plan), plan.published_in, notes)
 
 
 def write_experiment_figures(out: Path, plan: ExperimentPlan, found: Comparison) -> list[Path]:
-    """Draws the figures that the plan names, and the usual ones, into the experiment's folder; the .png files."""
+    """Draw the standard figures and those named in the plan; return the PNG files."""
     labels = {key: method.label for key, method in plan.methods.items()}
     curves = [Curves(key, f.title, [labels[method] for method in f.methods]) for key, f in plan.figures.items()]
     return write_comparison_figures(out, found, curves, [labels[key] for key in plan.samples])

@@ -1,7 +1,7 @@
 """report.html: one file that shows a run in any browser, without a network.
 
-Its modules lie in page/; here they become one script, and the page says which scripts may run (by their sums), and that
-it may reach nothing.
+The modules in page/ are joined into one script. The page's Content-Security-Policy allows its own scripts by hash and
+forbids all connections.
 """
 
 import base64
@@ -25,7 +25,7 @@ _EXPORT = re.compile(r"^export ((?:async )?function|class|const|let) ([\w$]+)", 
 
 
 def write_report(folder: str | Path) -> Path:
-    """Writes report.html into a run folder, instead of what lies there."""
+    """Write report.html into a run folder, replacing an existing one."""
     folder = Path(folder)
     content = RunContent(folder)
     if not len(content.history):
@@ -44,7 +44,7 @@ def write_report(folder: str | Path) -> Path:
 
 
 def render_page(title: str, data: str = "", token: str = "") -> str:
-    """The page: with its data, or live, with the token that its requests carry."""
+    """Return the page's HTML: with embedded data, or live with the token for its requests."""
     scripts = [*map(_library, LIBRARIES), program()]
     sums = " ".join(f"'sha256-{_sum(script)}'" for script in scripts)
     reach = "connect-src 'self'" if token else "connect-src 'none'"
@@ -53,7 +53,7 @@ def render_page(title: str, data: str = "", token: str = "") -> str:
         "base-uri 'none'; form-action 'none'"
     )
     holder = f'<script type="text/plain" id="content">{data}</script>' if data else ""
-    said = {
+    values = {
         "policy": policy,
         "title": html.escape(title),
         "style": _read("page.css"),
@@ -61,13 +61,13 @@ def render_page(title: str, data: str = "", token: str = "") -> str:
         "token": f'<meta name="armwright-token" content="{html.escape(token)}">' if token else "",
         "scripts": "\n".join(f"<script>{script}</script>" for script in scripts),
     }
-    # In one pass, so that nothing that is put in is taken for a place.
-    return re.sub(r"\{\{ (\w+) \}\}", lambda found: said[found[1]], _read("page.html"))
+    # A single pass, so that inserted text is never taken for a placeholder.
+    return re.sub(r"\{\{ (\w+) \}\}", lambda found: values[found[1]], _read("page.html"))
 
 
 @cache
 def program() -> str:
-    """The page's modules as one script: each in a function of its own, after those that it imports from."""
+    """Return the page's modules as one script, each in its own function, in order of their imports."""
     order: list[str] = []
 
     def visit(name: str) -> None:

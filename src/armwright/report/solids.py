@@ -1,4 +1,4 @@
-"""Obstacles in figures: faces that can be seen through, cut off where the drawing ends."""
+"""Obstacles in figures: translucent faces, clipped to the drawing."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -11,11 +11,11 @@ from armwright.obstacles import Obstacle, Solid
 from armwright.report.style import OBSTACLE
 
 EDGE = 0.5  # [pt]
-AROUND, UPWARDS = 32, 12  # faces of what is round
+AROUND, UPWARDS = 32, 12  # faces of round shapes
 
 
 def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: tuple[Array, float]) -> None:
-    """The parts of obstacles within the cube about a middle with this half side [m]."""
+    """Draw the parts of obstacles within a cube, given by its centre and half its side [m]."""
     middle, half = extent
     for obstacle in obstacles:
         solid = obstacle.solid
@@ -23,7 +23,7 @@ def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: tuple[Array
         shown = [(face, line) for face, line in faces if len(face) > 2]
         if shown:
             faces_, lines = zip(*shown, strict=True)
-            # Matplotlib fills up shorter faces with whatever lies in memory, which may overflow when it is projected.
+            # Matplotlib pads shorter faces with uninitialised memory, which may overflow when projected.
             most = max(map(len, faces_))
             corners = [np.vstack([face, np.repeat(face[-1:], most - len(face), axis=0)]) for face in faces_]
             drawn = Poly3DCollection(corners, facecolor=OBSTACLE, edgecolor=OBSTACLE, alpha=0.18, linewidth=lines)
@@ -31,10 +31,10 @@ def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: tuple[Array
 
 
 def clipped(face: Array, middle: Array, half: float) -> Array:
-    """(m, 3) the part of a flat convex face (n, 3) within a cube; m = 0 where there is none (Sutherland & Hodgman)."""
+    """Clip a flat convex face (n, 3) to a cube; returns (m, 3), m = 0 if it is outside (Sutherland & Hodgman)."""
     for axis in range(3):
         for sign in (-1.0, 1.0):
-            room = half - sign * (face[:, axis] - middle[axis])  # (n,) at least 0 within
+            room = half - sign * (face[:, axis] - middle[axis])  # (n,) >= 0 inside
             corners: list[Array] = []
             for k in range(len(face)):
                 after = (k + 1) % len(face)
@@ -48,7 +48,7 @@ def clipped(face: Array, middle: Array, half: float) -> Array:
 
 
 def _faces(solid: Solid, middle: Array, half: float) -> Iterable[tuple[Array, float]]:
-    """(n, 3) corners of each in the world [m], and how wide the line around it is; of the ground, what can be seen."""
+    """Yield each visible face as its (n, 3) corners in the world [m] and the width of its outline [pt]."""
     if solid.shape == "ground":
         x, y = middle[:2]
         corners = [(x + s * half, y + t * half, solid.centre[2]) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -62,13 +62,13 @@ def _faces(solid: Solid, middle: Array, half: float) -> Iterable[tuple[Array, fl
 
 
 def _box() -> list[Array]:
-    """Of a box from -1 to 1."""
+    """Return the faces of a box from -1 to 1."""
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     return [np.insert(square, axis, side, axis=1) for axis in range(3) for side in (-1.0, 1.0)]
 
 
 def _cylinder() -> tuple[list[Array], list[Array]]:
-    """Of radius 1 from z = -1 to 1: its ends, and what is round."""
+    """Return the faces of a cylinder of radius 1 from z = -1 to 1."""
     angles = np.linspace(0.0, 2 * np.pi, AROUND, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles), np.ones(AROUND)])
     low = ring * [1.0, 1.0, -1.0]
@@ -77,7 +77,7 @@ def _cylinder() -> tuple[list[Array], list[Array]]:
 
 
 def _sphere() -> list[Array]:
-    """Of radius 1."""
+    """Return the faces of a sphere of radius 1."""
     around, up = np.linspace(0.0, 2 * np.pi, AROUND + 1), np.linspace(-np.pi / 2, np.pi / 2, UPWARDS + 1)
     x, y = np.outer(np.cos(around), np.cos(up)), np.outer(np.sin(around), np.cos(up))
     grid = np.stack([x, y, np.broadcast_to(np.sin(up), x.shape)], axis=-1)

@@ -1,4 +1,4 @@
-"""Colours, shapes and words that all figures share: colour-blind safe (Okabe & Ito), readable in grey."""
+"""Colours, markers and labels of all figures: colour-blind safe (Okabe & Ito) and distinct in grey."""
 
 from typing import Any, NamedTuple
 
@@ -6,13 +6,13 @@ from armwright.history import BBO, RANDOM, START
 
 
 class Look(NamedTuple):
-    """How the trials of one source are drawn."""
+    """The marker and colour of the trials of one source."""
 
     label: str
     colour: str
     marker: str
     size: float  # [pt²]
-    hatch: str = ""  # of areas
+    hatch: str = ""  # hatch of filled areas
 
 
 _LOOKS = {
@@ -33,12 +33,12 @@ TARGET = "#CC79A7"
 INFEASIBLE = "#B0B0B0"
 LINK = "#5A5A60"
 OBSTACLE = "#6E7F91"
-REGION = "#8A8A8A"  # to cover
-WAY = "#111111"  # of the tip on a move
+REGION = "#8A8A8A"  # boxes to cover
+WAY = "#111111"  # path of the tip on a move
 JOINT = {"x": "#D55E00", "y": "#0072B2", "z": "#009E73"}
 JOINT_LABEL = {"x": "R (roll, x)", "y": "P (pitch, y)", "z": "Y (yaw, z)"}
 
-RC: Any = {  # read-only by custom
+RC: Any = {  # never modified
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.labelsize": 9,
@@ -53,19 +53,19 @@ RC: Any = {  # read-only by custom
     "legend.frameon": False,
     "figure.dpi": 100,
     "savefig.dpi": 160,
-    "pdf.fonttype": 42,  # fonts embedded as text, as journals ask
+    "pdf.fonttype": 42,  # embed fonts as text, as journals require
     "svg.hashsalt": "armwright",
-    "text.parse_math": False,  # names and words of others are no markup
+    "text.parse_math": False,  # names from users are not markup
 }
 
 
 def look(source: str) -> Look:
-    """The look of a source; proposers of a user's own look like the built-in ones."""
+    """Return the style of a source; custom proposers are drawn like the built-in rules."""
     return _LOOKS.get(source, Look(source, "#D55E00", "^", 44, "////"))
 
 
 class Line(NamedTuple):
-    """How the curve of one method is drawn; the pattern tells it apart in grey, too."""
+    """The colour, dash pattern and marker of one method's curve."""
 
     colour: str
     pattern: Any
@@ -84,5 +84,5 @@ _LINES = (
 
 
 def line(number: int) -> Line:
-    """The look of the method with this number; they repeat after seven."""
+    """Return the style of the method with this number; styles repeat after seven."""
     return _LINES[number % len(_LINES)]

@@ -1,0 +1,215 @@
+"""Arms in three dimensions: the chosen designs at their targets, with moves, workspace and obstacles."""
+
+import math
+from collections.abc import Sequence
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from armwright.evaluation import Evaluation
+from armwright.goals import AXIS
+from armwright.history import FrontMember, History
+from armwright.kinematics.chain import joint_positions, link_lines, rails
+from armwright.objectives import TORQUE
+from armwright.obstacles import Ground
+from armwright.report.solids import draw_obstacles
+from armwright.report.style import (
+    FRONT,
+    JOINT,
+    JOINT_LABEL,
+    LINK,
+    MISSED,
+    OBSTACLE,
+    REGION,
+    TARGET,
+    WAY,
+    look,
+)
+from armwright.workspace import Region
+
+ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
+MOST_PANELS = 12
+
+
+def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
+    """Draw the chosen designs side by side, each with its postures at all targets."""
+    figure = Figure(figsize=(3.8 * len(chosen), 4.4))
+    FigureCanvasAgg(figure)
+    # The layout engines do not know how far the labels of a 3D plot reach.
+    figure.subplots_adjust(left=0.01, right=0.97, bottom=0.1, top=0.9, wspace=0.08)
+    evaluation = history.evaluation([member.number for _, member in chosen])
+    extent = _extent(evaluation, [member for _, member in chosen])
+    for column, (title, member) in enumerate(chosen):
+        axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
+        _draw_panel(axes, member, evaluation, column, range(len(evaluation.targets)), extent)
+        axes.set_title(f"{title}\n{_caption(history, member)}", y=1.0)
+    figure.legend(
+        handles=_legend(evaluation), loc="lower center", ncols=3 if len(chosen) == 1 else _legend_columns(evaluation)
+    )
+    return figure
+
+
+def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
+    """Draw one design with a panel for each target; of more than 12 targets, 12 spread evenly over the list."""
+    evaluation = history.evaluation([member.number])
+    n = len(evaluation.targets)
+    shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MOST_PANELS))})
+    columns = min(4, max(2, math.ceil(math.sqrt(len(shown)))))
+    rows = -(-len(shown) // columns)
+    height = 3.1 * rows + 1.2
+    figure = Figure(figsize=(3.1 * columns, height))
+    FigureCanvasAgg(figure)
+    figure.subplots_adjust(left=0.01, right=0.96, bottom=0.55 / height, top=1 - 0.75 / height, wspace=0.08, hspace=0.12)
+    extent = _extent(evaluation, [member])
+    for place, target in enumerate(shown):
+        axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
+        _draw_panel(axes, member, evaluation, 0, [target], extent)
+        missed = evaluation.missed[0, target]
+        verdict = f"missed by {_describe_miss(evaluation, target)}" if missed else "reached"
+        axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=MISSED if missed else FRONT)
+    part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
+    figure.suptitle(f"{title}{part}\n{_caption(history, member)}", fontsize=10)
+    figure.legend(
+        handles=_legend(evaluation), loc="lower center", ncols=_legend_columns(evaluation) if columns > 2 else 3
+    )
+    return figure
+
+
+def _draw_panel(
+    axes: Any,
+    member: FrontMember,
+    evaluation: Evaluation,
+    row: int,
+    targets: Sequence[int],
+    extent: tuple[np.ndarray, float],
+) -> None:
+    draw_obstacles(axes, evaluation.obstacles, extent)
+    _draw_workspace(axes, evaluation.workspace)
+    _draw_moves(axes, evaluation, row, targets)
+    _draw_postures(axes, member, evaluation, row, targets)
+    frame(axes, extent)
+
+
+def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
+    alpha = 1.0 if len(targets) == 1 else 0.75
+    for target in targets:
+        q = evaluation.q[row, target, : len(member.arm.joints)]
+        places = joint_positions(member.arm, q)
+        for line in rails(member.arm, q):
+            axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
+        for line in link_lines(member.arm, q):
+            axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
+        for joint, place in zip(member.arm.joints, places[:-1], strict=True):
+            axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
+        goal = evaluation.targets[target]
+        axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
+        _draw_goal(axes, evaluation, target, ARROW * member.arm.reach)
+        if evaluation.missed[row, target]:
+            axes.plot(*np.array([places[-1], goal]).T, color=MISSED, linewidth=1.2, linestyle=(0, (2, 2)))
+    axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
+
+
+def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
+    """Draw the moves that end at these targets: the straight line, and the path of the tip."""
+    if not evaluation.moves:
+        return
+    lines = evaluation.paths.lines
+    for (_, end), first, beyond in zip(evaluation.moves.pairs, lines.first, lines.first[1:], strict=False):
+        if end in targets:
+            axes.plot(*lines.points[first:beyond].T, color=TARGET, linewidth=1.2)
+            axes.plot(*evaluation.paths.reached[row, first:beyond].T, color=WAY, linewidth=1.4, linestyle=(0, (3, 1)))
+
+
+def _draw_workspace(axes: Any, workspace: Sequence[Region]) -> None:
+    """Draw the edges of the boxes to cover."""
+    for region in workspace:
+        corners = np.array(list(product(*zip(region.low, region.high, strict=True))))
+        for one, other in combinations(corners, 2):
+            if (one != other).sum() == 1:
+                axes.plot(*np.array([one, other]).T, color=REGION, linewidth=0.8)
+
+
+def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
+    """Draw the required tool direction: an arrow along its z axis, and for a full orientation also along x and y."""
+    goal, rows = evaluation.targets[target], evaluation.goals.rows[target]
+    if not rows:
+        return
+    for k in (2,) if rows == AXIS else (0, 1, 2):
+        colour = TARGET if rows == AXIS else JOINT["xyz"[k]]
+        way = (1.0 if k == 2 else 0.6) * size * evaluation.goals.rotation[target, :, k]
+        axes.quiver(*goal, *way, color=colour, linewidth=1.4, arrow_length_ratio=0.3)
+
+
+def _describe_miss(evaluation: Evaluation, target: int) -> str:
+    words = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
+    if not evaluation.goals.rows[target]:
+        return words
+    return f"{words}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
+
+
+def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
+    """Set equal scales on all axes, so that angles and lengths are not distorted."""
+    centre, half = extent
+    for name, middle in zip("xyz", centre, strict=True):
+        getattr(axes, f"set_{name}lim")(middle - half, middle + half)
+        getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(4))
+        getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=-6, fontsize=7)
+    axes.tick_params(labelsize=6, pad=-2)
+    axes.set_box_aspect((1, 1, 1))
+    axes.view_init(elev=22, azim=-58)
+
+
+def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.ndarray, float]:
+    """Return the centre (3,) and half the side of the cube that contains all targets and postures [m]."""
+    places = [
+        joint_positions(member.arm, q[: len(member.arm.joints)])
+        for row, member in enumerate(members)
+        for q in evaluation.q[row]
+    ]
+    corners = [corner for region in evaluation.workspace for corner in region.corners]
+    points = np.vstack([evaluation.targets, *corners, *places])
+    low, high = points.min(axis=0), points.max(axis=0)
+    for obstacle in evaluation.obstacles:
+        if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor close below
+            low[2] = min(low[2], obstacle.z)
+    return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
+
+
+def _legend(evaluation: Evaluation) -> list[Line2D | Patch]:
+    joints = [Line2D([], [], linestyle="", marker="o", color=JOINT[a], label=JOINT_LABEL[a]) for a in "xyz"]
+    obstacles = [Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle")] if evaluation.obstacles else []
+    moves = [
+        Line2D([], [], color=TARGET, linewidth=1.2, label="straight move"),
+        Line2D([], [], color=WAY, linewidth=1.4, linestyle=(0, (3, 1)), label="its tip"),
+    ][: 2 * bool(evaluation.moves)]
+    regions = [Line2D([], [], color=REGION, linewidth=0.8, label="workspace")] if evaluation.workspace else []
+    return [
+        Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
+        *joints,
+        Line2D([], [], linestyle="", marker="*", markersize=9, color=TARGET, markeredgecolor=FRONT, label="target"),
+        Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
+        *obstacles,
+        *moves,
+        *regions,
+    ]
+
+
+def _legend_columns(evaluation: Evaluation) -> int:
+    """Return the number of columns of a one-line legend."""
+    return len(_legend(evaluation))
+
+
+def _caption(history: History, member: FrontMember) -> str:
+    length = sum(member.design.links)
+    first = f"#{member.number} ({look(member.source).label}), {member.design.joints}, length {length:.2f} m"
+    values = (
+        f"{objective.label.lower()} {value:.4g}" + ("" if objective is TORQUE else f" {objective.unit}")
+        for objective, value in zip(history.problem.objectives, member.values, strict=True)
+    )
+    return f"{first}\n{', '.join(values)}"

@@ -1,0 +1,130 @@
+"""A run folder as the live server shows it: its content, and the status of the study."""
+
+import secrets
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from armwright.control import (
+    CONTROL,
+    STATUS,
+    Hint,
+    read_control,
+    read_status,
+)
+from armwright.exceptions import ArmwrightError
+from armwright.llm.transcript import TRANSCRIPTS, used_hints
+from armwright.report.content import RunContent, design_files
+from armwright.results import SUMMARY
+from armwright.run_folder import CONFIG, TRIALS, is_held, read_config
+
+WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
+RECENT = 20  # trials whose mean duration predicts the remaining time
+RUNNING = ("evaluating", "asking", "paused")
+
+
+class LiveRun:
+    """The current content of a run folder, which may not hold a run yet. Safe to use from several threads."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.fault = ""  # the reason why the folder cannot be read
+        self._content: RunContent | None = None
+        self._seen: list[tuple[int, ...] | None] = []
+        self._server = secrets.token_hex(8)  # tells a page that another server took over its address
+        self._run = 0  # number of runs seen in this folder since the server started
+        self._lock = threading.Lock()
+        self.status = self._status()
+
+    def look(self) -> None:
+        """Read the files that have changed."""
+        with self._lock:
+            seen = [_stamp(self.folder / name) for name in WATCHED]
+            if seen == self._seen and not (self.status["doing"] in RUNNING and not is_held(self.folder)):
+                return
+            self._seen = seen
+            try:
+                self._read()
+                self.fault = ""
+            except ArmwrightError as fault:
+                self.fault = str(fault)  # for example a file that is being rewritten; it is read again when it changes
+            except Exception as fault:  # noqa: BLE001 (the server must survive any folder content)
+                self.fault = f"the run folder cannot be read: {type(fault).__name__}: {fault}"
+            self.status = self._status()
+
+    def packed(self, designs: int, calls: int) -> bytes | None:
+        """Return what is new for a page; None while there is no run."""
+        with self._lock:
+            return None if self._content is None else self._content.packed(designs, calls, with_files=False)
+
+    def file(self, number: int, kind: str) -> str | None:
+        """Return a design as text; None if it does not exist."""
+        with self._lock:
+            if self._content is None or number >= len(self._content.history) or kind not in ("urdf", "mjcf"):
+                return None
+            return design_files(self._content.history, number)[kind]
+
+    def _read(self) -> None:
+        if not (self.folder / CONFIG).is_file():
+            return
+        if self._content is None or not self._content.is_still(read_config(self.folder)):
+            self._content = None  # an unreadable run must not appear as the previous one
+            self._run += 1
+            self._content = RunContent(self.folder)
+        elif self._content.refresh():
+            self._run += 1
+
+    def _status(self) -> dict[str, Any]:
+        """Return the content of the page's status bar."""
+        content, status, asked = self._content, read_status(self.folder), read_control(self.folder)
+        history = None if content is None else content.history
+        study = None if content is None else content.study
+        planned = None if study is None else study.n_trials
+        n = 0 if history is None else len(history)
+        doing = "unknown" if status is None else status.doing
+        if doing in RUNNING and not is_held(self.folder):
+            doing = "gone"
+        if status is None and content is not None and content.summary is not None:
+            doing = "finished"
+        recent = [] if history is None else [trial.seconds.get("total", 0.0) for trial in history.trials[-RECENT:]]
+        left = None if planned is None or not recent else (planned - n) * sum(recent) / len(recent)
+        calls = () if content is None else content.calls
+        used = used_hints(calls)
+        return {
+            "run": f"{self._server}-{self._run}",
+            "doing": doing,
+            "since": 0.0 if status is None else status.since,
+            "designs": n,
+            "calls": len(calls),
+            "planned": planned,
+            "finished": content is not None and content.summary is not None,
+            "left": left,
+            "paused": asked.paused,
+            "fault": self.fault or ("" if status is None else status.fault),
+            "takes_hints": study is not None and _asks_a_model(study.proposer or {}),
+            "hints": [
+                {"text": hint.text, "used": _iteration(used, hint, 0 if study is None else study.n_init)}
+                for hint in asked.hints
+            ],
+        }
+
+
+def _asks_a_model(proposer: Mapping[str, Any]) -> bool:
+    """Return whether a hint would reach a model; rules, people and replays take none."""
+    return "prompt" in proposer and "replay" not in proposer and proposer["name"] != "manual"
+
+
+def _iteration(used: dict[Hint, str], hint: Hint, n_init: int) -> int | None:
+    """Return the iteration whose prompt contained the hint."""
+    if hint not in used:
+        return None
+    return int(used[hint].rpartition("-")[2]) - n_init + 1
+
+
+def _stamp(path: Path) -> tuple[int, ...] | None:
+    try:
+        there = path.stat()
+    except OSError:
+        return None
+    return there.st_mtime_ns, there.st_ctime_ns, there.st_size, there.st_ino

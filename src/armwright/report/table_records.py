@@ -1,0 +1,140 @@
+"""Records of a comparison, one per row of its CSV tables."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from armwright.comparison import Comparison, Run
+from armwright.statistics import Interval, least_p
+
+Published = Mapping[tuple[str, str], tuple[float, float]]  # (method, task): (E_hv, σ_hv)
+
+
+def row_records(comparison: Comparison, published: Published) -> Iterable[dict[str, Any]]:
+    """Yield one record per method and task."""
+    for row in comparison.rows:
+        theirs = published.get((row.method, row.task))
+        yield {
+            "task": row.task,
+            "method": row.method,
+            "runs": row.runs,
+            **_flat("e_hv", row.e_hv),
+            "sigma_hv": row.deviation,
+            **_flat("final", row.final),
+            **_flat("share_of_best_known", row.share),
+            "best_known": comparison.best_known(row.task),
+            "published_e_hv": None if theirs is None else theirs[0],
+            "published_sigma_hv": None if theirs is None else theirs[1],
+            "seconds": row.seconds,
+            "scripted": any(run.is_scripted for run in comparison.of(row.method, row.task)),
+        }
+
+
+def contrast_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
+    """Yield one record per comparison with the baseline on a task."""
+    for contrast in comparison.contrasts:
+        test = contrast.test
+        yield {
+            "task": contrast.task,
+            "method": contrast.method,
+            "baseline": comparison.baseline,
+            "pairs": test.n,
+            **_flat("difference", test.difference),
+            "better": test.better,
+            "effect": test.effect,
+            "p": test.p,
+            "p_holm": contrast.p_holm,
+            "least_p": least_p(test.n),
+        }
+
+
+def overall_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
+    """Yield one record per method over all tasks."""
+    for over in comparison.overall:
+        yield {
+            "method": over.method,
+            "baseline": comparison.baseline,
+            "tasks": over.test.n,
+            **_flat("ratio", over.ratio),
+            "better": over.test.better,
+            "effect": over.test.effect,
+            "p": over.test.p,
+            "p_holm": over.p_holm,
+        }
+
+
+def time_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
+    """Yield one record per method, task and share of the best known hypervolume."""
+    for time in comparison.times:
+        yield {
+            "task": time.task,
+            "method": time.method,
+            "level": time.level,
+            "hypervolume": time.hypervolume,
+            "reached": time.reached,
+            "runs": time.runs,
+            "median_trials": time.median,
+        }
+
+
+def proposer_records(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return one record per task and method that used a proposer: means over its runs."""
+    records: list[dict[str, Any]] = []
+    for task in comparison.tasks:
+        for method in comparison.methods:
+            runs = [run for run in comparison.of(method, task) if run.proposer]
+            if runs:
+                records.append({"task": task, "method": method, **_proposer_means(runs)})
+    return records
+
+
+def run_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
+    """Yield one record per run."""
+    best = {task: comparison.best_known(task) for task in comparison.tasks}
+    for run in [*comparison.runs, *comparison.left_out]:
+        known = best.get(run.task)
+        yield {
+            "task": run.task,
+            "method": run.method,
+            "seed": run.seed,
+            "e_hv": float(run.curve.mean()) if len(run.curve) else None,
+            "final": run.final,
+            "share_of_best_known": run.final / known if known else None,
+            "flagged": run.is_flagged,
+            "origin": run.proposer.get("origin"),
+            "folder": str(run.folder),
+        }
+
+
+def _flat(name: str, value: Interval | None) -> dict[str, float | None]:
+    if value is None:
+        return {name: None, f"{name}_low": None, f"{name}_high": None}
+    return {name: value.mean, f"{name}_low": value.low, f"{name}_high": value.high}
+
+
+def _proposer_means(runs: Sequence[Run]) -> dict[str, Any]:
+    habits = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats")
+    each: list[dict[str, Any]] = []
+    for run in runs:
+        summary, name = run.summary, run.proposer["name"]
+        credit = summary["credit"].get(name, {"trials": 0, "front": 0})
+        found: dict[str, Any] = {
+            "proposals": credit["trials"],
+            "front_share": credit["front"] / max(1, summary["front_size"]),
+            "gained_share": run.gained.get(name, 0.0),
+            "calls": run.proposer["calls"],
+            "failures": sum(run.proposer["failures"].values()),
+            "tokens": run.proposer["tokens"],
+            "cost_usd": run.proposer["cost_usd"],
+        }
+        for prefix, who in (("", "proposer"), ("black_box_", "black_box")):
+            habit: dict[str, Any] = summary["diagnostics"][who] or {}
+            found |= {f"{prefix}{key}": habit.get(key) for key in habits}
+        each.append(found)
+    return {"runs": len(runs)} | {key: _mean([found[key] for found in each]) for key in each[0]}
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
