@@ -129,7 +129,7 @@ def test_a_flagged_run_stands_for_nothing(runs: Path, tmp_path: Path) -> None:
     found = side_by_side([read_run_record(folder) for folder in find_runs([place])])
     method = next(m for m in found.methods if "rules" in m)
     assert [run.seed for run in found.of(method, "target-1")] == [0, 2]
-    assert "left out, as 50% of its proposals failed" in markdown(found, "x")
+    assert "excluded, because 50% of its proposals failed" in markdown(found, "x")
 
 
 def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> Non
     for text in (markdown(found, "x"), latex(found)):
         assert "[scripted]" in text
         assert "gpt-x" not in text
-        assert "no language model answered" in text
+        assert "a scripted stand-in answered instead of a language model" in text
 
 
 def test_what_cannot_be_compared_is_refused(runs: Path, tmp_path: Path) -> None:
@@ -189,7 +189,7 @@ def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest
         if run.proposer:
             assert sum(run.gained.values()) == pytest.approx(1.0)
     text = markdown(found, "x")
-    assert "mine: its runs had reference points of their own" in text
+    assert "mine: runs had different reference points" in text
     assert f"{shared[0]:.4g}, {shared[1]:.4g}" in text
     assert write_comparison_figures(tmp_path, found)
 

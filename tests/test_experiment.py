@@ -154,7 +154,7 @@ def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
     result = invoke("experiment", file, "--jobs", "2", "--no-figures")
     assert result.exit_code == 0, result.output
     assert "8 cells: 8 to run, 2 at a time, 0 finished before, 0 skipped" in result.output
-    assert "With fewer than six seeds no test at 5 % can reject" in result.output
+    assert "With fewer than six seeds, no test can reject at 5 %" in result.output
     out = in_folder / "experiments" / "small"
     rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
     assert {(row["task"], row["method"], row["runs"]) for row in rows} == {
