@@ -22,10 +22,11 @@ def main() -> None:
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])  # before any thread begins
     os.environ["WARP_CACHE_PATH"] = tempfile.mkdtemp(prefix="armwright-poses-")  # where nothing is compiled yet
     from armwright.batch_builder import stack_designs
-    from armwright.goals import AXIS, ORIENTATION, plain_goals, turned
     from armwright.kinematics.devices import load
     from armwright.kinematics.solve import LANES, solve_postures
+    from armwright.rotations import rotation_from_rpy
     from armwright.space import paper_space
+    from armwright.targets import AXIS, ORIENTATION, position_targets
 
     compiled = {}
     for rows in ("position", "pose"):
@@ -34,7 +35,7 @@ def main() -> None:
         compiled[rows] = time.process_time() - began
     rng = np.random.default_rng(0)
     points = rng.uniform(-0.5, 0.5, (TARGETS, 3))
-    rotation = np.array([turned(*angles) for angles in rng.uniform(-np.pi, np.pi, (TARGETS, 3))])
+    rotation = np.array([rotation_from_rpy(*angles) for angles in rng.uniform(-np.pi, np.pi, (TARGETS, 3))])
     print(f"designs/s on one core, {TARGETS} targets, 100 updates")
     for joints in (6, 7):
         space = paper_space(joints)
@@ -43,7 +44,7 @@ def main() -> None:
         best = np.full(len(kinds), np.inf)
         for _ in range(5):
             for i, rows in enumerate(kinds):
-                goals = replace(plain_goals(TARGETS), rows=np.array(rows), rotation=rotation)
+                goals = replace(position_targets(TARGETS), n_angular=np.array(rows), rotation=rotation)
                 began = time.process_time()
                 solve_postures(arms, points, goals=goals)
                 best[i] = min(best[i], time.process_time() - began)

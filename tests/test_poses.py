@@ -14,12 +14,13 @@ from armwright.arm import Arm, Joint, uniform_link
 from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate, evaluate_arrays
 from armwright.export.urdf import to_urdf
-from armwright.goals import Goals, plain_goals, pointing, turned
 from armwright.kinematics import solve
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.solve import solve_postures, update_once
 from armwright.modules import MOUNTS
+from armwright.rotations import rotation_from_rpy, rotation_to_axis
 from armwright.space import DesignSpace
+from armwright.targets import TargetArrays, position_targets
 from tests import reference, reference_poses
 from tests.arms import general_arms, paper_arms
 from tests.reference import Array
@@ -28,12 +29,12 @@ KINDS = pytest.mark.parametrize("rows", [2, 3])
 DOWN = (0.0, 0.0, -1.0)
 
 
-def goals(rows: list[int], seed: int = 0, restarts: int = 0) -> Goals:
+def goals(rows: list[int], seed: int = 0, restarts: int = 0) -> TargetArrays:
     """Targets of these kinds, with random orientations."""
-    rng, plain = np.random.default_rng(seed), plain_goals(len(rows), restarts)
+    rng, plain = np.random.default_rng(seed), position_targets(len(rows), restarts)
     rotations = np.linalg.qr(rng.normal(size=(len(rows), 3, 3)))[0]
     rotations *= np.linalg.det(rotations)[:, None, None]
-    return replace(plain, rows=np.array(rows), rotation=rotations)
+    return replace(plain, n_angular=np.array(rows), rotation=rotations)
 
 
 def tooled_arms(n: int, dof: int, seed: int) -> list[Arm]:
@@ -182,7 +183,7 @@ def test_a_point_beside_others_is_solved_as_alone() -> None:
 
 def test_points_alone_take_the_kernels_for_points() -> None:
     arms, points = stack_arms(paper_arms(50, 4, 3)), np.array([[0.3, 0.2, 0.4]] * 3)
-    plain, asked = solve_postures(arms, points), solve_postures(arms, points, goals=plain_goals(3))
+    plain, asked = solve_postures(arms, points), solve_postures(arms, points, goals=position_targets(3))
     assert np.array_equal(plain.q, asked.q)
     assert np.array_equal(plain.torque, asked.torque)
     assert not asked.angle.any()
@@ -230,7 +231,7 @@ def test_kept_posture_does_not_get_worse_and_keeps_the_limits(rows: int) -> None
     arms, asked = stack_arms(tooled_arms(300, 6, 13)), goals([rows] * 2, 5)
     points = np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     off = [
-        np.hypot(np.linalg.norm(p.reached - points, axis=-1), asked.trade * p.angle)
+        np.hypot(np.linalg.norm(p.reached - points, axis=-1), asked.metres_per_radian * p.angle)
         for p in (solve_postures(arms, points, updates, goals=asked) for updates in (0, 5, 50, 100))
     ]
     for before, after in pairwise(off):
@@ -280,7 +281,7 @@ def test_mirrored_arm_gives_the_mirrored_result() -> None:
     mirror = np.array([1.0, -1.0, 1.0])
     arms, points, asked = tooled_arms(300, 5, 13), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]]), goals([2, 2], 7)
     z = asked.rotation[:, :, 2] * mirror
-    mirrored_goals = replace(asked, rotation=np.array([pointing(tuple(axis)) for axis in z]))
+    mirrored_goals = replace(asked, rotation=np.array([rotation_to_axis(tuple(axis)) for axis in z]))
     mirrored_goals.rotation[:, :, 2] = z
     sign = np.array([[1.0 if joint.axis == "y" else -1.0 for joint in arm.joints] for arm in arms])
     plain = solve_postures(stack_arms(arms), points, goals=asked)
@@ -312,17 +313,17 @@ def test_half_a_turn_is_defined(rows: int, precision: str) -> None:
     pitch = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -3.1, 3.1),) * 3, (uniform_link((0, 0, 0.2), 0.1, 0.01),) * 3)
     points = np.array([[0.2, 0.0, 0.1]])
     halves = [
-        turned(np.pi, 0, 0),
-        turned(0, np.pi, 0),
-        turned(0, 0, np.pi),
+        rotation_from_rpy(np.pi, 0, 0),
+        rotation_from_rpy(0, np.pi, 0),
+        rotation_from_rpy(0, 0, np.pi),
         np.diag([1.0, -1, -1]),
         np.diag([-1.0, 1, -1]),
     ]
     for half in halves:
-        asked = replace(plain_goals(1), rows=np.array([rows]), rotation=half[None])
+        asked = replace(position_targets(1), n_angular=np.array([rows]), rotation=half[None])
         found = solve_postures(stack_arms([pitch], precision), points, goals=asked, precision=precision)
         assert all(np.isfinite(values).all() for values in (found.q, found.reached, found.torque, found.angle))
-    asked = replace(plain_goals(1), rows=np.array([2]), rotation=pointing(DOWN)[None])
+    asked = replace(position_targets(1), n_angular=np.array([2]), rotation=rotation_to_axis(DOWN)[None])
     found = solve_postures(stack_arms([pitch], precision), points, 1, goals=asked, precision=precision)
     assert found.q[0, 0].max() > 0.1, "it turns about y, which its joints can"
     assert found.angle[0, 0] < np.pi - 0.1
@@ -346,11 +347,11 @@ def test_restarts_never_make_it_worse_and_begin_with_the_usual_start() -> None:
     arms, points = stack_arms(general_arms(100, 5, 3)), np.random.default_rng(3).uniform(-0.6, 0.6, (4, 3))
     least = evaluate_arrays(arms, points).position_error
     for restarts in (1, 3):
-        more = evaluate_arrays(arms, points, goals=plain_goals(4, restarts))
+        more = evaluate_arrays(arms, points, goals=position_targets(4, restarts))
         assert np.all(more.position_error <= least)
         assert (more.position_error < least - 1e-3).any()
         least = more.position_error
-        assert np.array_equal(more.q, evaluate_arrays(arms, points, goals=plain_goals(4, restarts)).q)
+        assert np.array_equal(more.q, evaluate_arrays(arms, points, goals=position_targets(4, restarts)).q)
     assert np.all(more.q[np.broadcast_to((arms.motion == FIXED)[:, None], more.q.shape)] == 0.0)
 
 
@@ -382,7 +383,7 @@ def test_whole_solves_agree_with_scikit_robot(dof: int, rows: int) -> None:
     assert near.mean() >= 0.9
 
 
-def scikit_robot_errors(arm: Arm, points: Array, asked: Goals) -> list[tuple[float, float]]:
+def scikit_robot_errors(arm: Arm, points: Array, asked: TargetArrays) -> list[tuple[float, float]]:
     """For each target the errors [m], [rad] of the best posture of scikit-robot's solver in 100 iterations.
 
     Steps of 0.1 m (its own default is 100 m) and 0.5 rad, no stop at 1 mm, no scaling to the joints' speed. For an axis
@@ -412,7 +413,9 @@ def scikit_robot_errors(arm: Arm, points: Array, asked: Goals) -> list[tuple[flo
     robot.load_urdf(to_urdf(arm))
     links = [getattr(robot, f"link_{number}") for number in range(1, len(arm.joints) + 1)]
     best = []
-    for target, rows, rotation, trade in zip(points, asked.rows, asked.rotation, asked.trade, strict=True):
+    for target, rows, rotation, trade in zip(
+        points, asked.n_angular, asked.rotation, asked.metres_per_radian, strict=True
+    ):
         robot.errors, robot.rows, robot.wanted = [], rows, rotation
         robot.reset_joint_angle_limit_weight(links)
         for joint in robot.joint_list:

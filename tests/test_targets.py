@@ -11,11 +11,11 @@ from armwright.arm import Arm, Joint, uniform_link
 from armwright.documents import parse_document
 from armwright.evaluation import evaluate
 from armwright.exceptions import ArmError, SettingsError, TaskError
-from armwright.goals import turned
 from armwright.llm.prompt import load_prompt
 from armwright.misses import why_missed
 from armwright.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
 from armwright.problem import Problem
+from armwright.rotations import rotation_from_rpy
 from armwright.run_folder import read_config
 from armwright.space import paper_space
 from armwright.study import optimize
@@ -44,7 +44,7 @@ def test_records_become_positions_and_goals() -> None:
     assert one.targets == ((0.3, 0.0, 0.1), (0.3, 0.1, 0.4), (0.3, -0.2, 0.3), (0.2, -0.2, 0.3))
     assert one.points.shape == (4, 3)
     goals = one.goals
-    assert goals.rows.tolist() == [2, 0, 3, 0]
+    assert goals.n_angular.tolist() == [2, 0, 3, 0]
     assert goals.tolerance.tolist() == [1e-3, 1e-3, 2e-3, 1e-3]
     assert goals.angle_tolerance == pytest.approx([np.pi / 180, np.pi / 180, 0.05, np.pi / 180])
     assert goals.weight.tolist() == [1, 1, 2, 1]
@@ -55,7 +55,7 @@ def test_records_become_positions_and_goals() -> None:
 
 def test_roll_pitch_yaw_are_those_of_urdf() -> None:
     for angles in np.random.default_rng(0).uniform(-np.pi, np.pi, (50, 3)):
-        assert turned(*angles) == pytest.approx(pinocchio.rpy.rpyToMatrix(*angles))
+        assert rotation_from_rpy(*angles) == pytest.approx(pinocchio.rpy.rpyToMatrix(*angles))
 
 
 def test_a_task_is_written_as_it_was_read() -> None:

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from armwright.arm import Arm
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
-from armwright.goals import Goals, plain_goals
 from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
@@ -20,6 +19,7 @@ from armwright.kinematics.paths import Paths, follow
 from armwright.kinematics.solve import Postures, solve_postures
 from armwright.moves import NO_MOVES, Moves
 from armwright.obstacles import Obstacle
+from armwright.targets import TargetArrays, position_targets
 from armwright.workspace import Region, points_of
 
 
@@ -38,7 +38,7 @@ class Evaluation:
     position_error: Array  # (N, T) distance from the target [m]
     angle_error: Array  # (N, T) of the tool from the target's axis or orientation [rad]; 0 where it has none
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
-    goals: Goals  # how the targets are to be reached
+    goals: TargetArrays  # how the targets are to be reached
     obstacles: tuple[Obstacle, ...] = ()
     device: Device = "cpu"
     moves: Moves = NO_MOVES
@@ -161,7 +161,7 @@ def evaluate(
     device: Device = "cpu",
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
-    goals: Goals | None = None,
+    goals: TargetArrays | None = None,
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
@@ -190,7 +190,7 @@ def evaluate_arrays(
     start: ArrayLike | None = None,
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
-    goals: Goals | None = None,
+    goals: TargetArrays | None = None,
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
@@ -202,7 +202,7 @@ def evaluate_arrays(
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
     loads = _payloads(payload, len(targets))
-    goals = plain_goals(len(targets)) if goals is None else goals
+    goals = position_targets(len(targets)) if goals is None else goals
     if len(goals) != len(targets):
         raise TaskError(f"goals are of {len(goals)} targets, not of the {len(targets)} that are given")
     postures = _postures(arrays, targets, loads, goals, device, start)
@@ -228,7 +228,7 @@ def evaluate_arrays(
 
 
 def _postures(
-    arrays: ArmArrays, targets: Array, loads: Array, goals: Goals, device: Device, start: ArrayLike | None
+    arrays: ArmArrays, targets: Array, loads: Array, goals: TargetArrays, device: Device, start: ArrayLike | None
 ) -> Postures:
     return solve_postures(
         arrays, targets, start=start, payload=loads, goals=goals, precision=arrays.precision, device=device
@@ -245,12 +245,12 @@ def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
         yield np.where(arrays.motion == FIXED, 0.0, lower + share * (upper - lower))[:, None]
 
 
-def _nearer(first: Postures, second: Postures, targets: Array, goals: Goals) -> Postures:
+def _nearer(first: Postures, second: Postures, targets: Array, goals: TargetArrays) -> Postures:
     """Of each arm and target the posture of the smaller distance, angles counted; the first of equals."""
 
     def off(postures: Postures) -> Array:
         distance = np.linalg.norm(postures.reached.astype(np.float64) - targets, axis=-1)
-        return np.hypot(distance, goals.trade * postures.angle)
+        return np.hypot(distance, goals.metres_per_radian * postures.angle)
 
     better = off(second) < off(first)
     return Postures(

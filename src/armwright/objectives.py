@@ -9,8 +9,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.evaluation import Evaluation
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.goals import REACHED
 from armwright.kinematics.arm_arrays import FIXED, Actuation
+from armwright.targets import REACHED
 
 TORQUE_SCALE = 40.0  # α of the paper
 FAR = 1.0  # [m]; a clearance counts as no more

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import did_you_mean
+from armwright.rotations import rotation_to_axis
 
 Point = tuple[float, float, float]
 Shape = Literal["box", "sphere", "cylinder", "ground"]
@@ -106,16 +107,8 @@ class Cylinder(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @property
     def solid(self) -> Solid:
-        along = np.eye(3)["xyz".index(self.axis)] if isinstance(self.axis, str) else np.array(self.axis)
-        z = along / np.linalg.norm(along)
-        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)  # any direction across it
-        x /= np.linalg.norm(x)
-        return Solid(
-            "cylinder",
-            self.center,
-            np.column_stack([x, np.cross(z, x), z]),
-            (self.radius, self.radius, self.height / 2),
-        )
+        axis = np.eye(3)["xyz".index(self.axis)] if isinstance(self.axis, str) else np.array(self.axis)
+        return Solid("cylinder", self.center, rotation_to_axis(axis), (self.radius, self.radius, self.height / 2))
 
     def words(self) -> str:
         """What it is, on one line."""

@@ -342,7 +342,7 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
                     "q": evaluation.q[row, t, : len(member.arm.joints)].tolist(),
                     "reached": evaluation.reached[row, t].tolist(),
                     "position_error": float(evaluation.position_error[row, t]),
-                    **({"angle_error": float(evaluation.angle_error[row, t])} if evaluation.goals.rows[t] else {}),
+                    **({"angle_error": float(evaluation.angle_error[row, t])} if evaluation.goals.n_angular[t] else {}),
                     "missed": why_missed(member.arm, evaluation, row, t) or None,
                     "joint_torques": evaluation.joint_torques[row, t, : len(member.arm.joints)].tolist(),
                 }

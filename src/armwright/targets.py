@@ -1,20 +1,62 @@
-"""A target of a task file that says more than its point, and its checks."""
+"""Targets of a task: points, and which way the tool points, how exactly, and how much each counts."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, Field, GetJsonSchemaHandler, ValidationError, model_serializer, model_validator
 
+from armwright.arrays import Array
 from armwright.exceptions import did_you_mean
-from armwright.goals import ALIGNED, AXIS, ORIENTATION, REACHED, Goals, pointing, turned
+from armwright.rotations import rotation_from_rpy, rotation_to_axis
 
 Point = tuple[float, float, float]
 
 LARGEST_COORDINATE = 1000.0  # [m]
 LARGEST_WEIGHT = 1e6
+
+REACHED = 1e-3  # [m]; a target nearer than this counts as reached
+ALIGNED = math.radians(1.0)  # [rad]; likewise for a target's axis or orientation
+AXIS, ORIENTATION = 2, 3  # number of angles that a target asks for; 0 for a point
+
+
+@dataclass(frozen=True)
+class TargetArrays:
+    """How T targets are to be reached, beside their positions.
+
+    Attributes:
+        n_angular: (T,) number of angles that count: 0 for a point, AXIS if the tool's z counts, ORIENTATION if its x
+            does, too.
+        rotation: (T, 3, 3) the tool's own x, y and z in the world as columns; axes that do not count are arbitrary.
+        tolerance: (T,) distance from which on a target counts as unreached [m].
+        angle_tolerance: (T,) angle likewise [rad].
+        weight: (T,) factor of a target's share of a sum of errors.
+        restarts: number of further starts of the inverse kinematics.
+    """
+
+    n_angular: NDArray[np.intp]
+    rotation: Array
+    tolerance: Array
+    angle_tolerance: Array
+    weight: Array
+    restarts: int = 0
+
+    def __len__(self) -> int:
+        return len(self.n_angular)
+
+    @property
+    def oriented(self) -> bool:
+        """True if any target asks for more than its point."""
+        return bool(self.n_angular.any())
+
+    @property
+    def metres_per_radian(self) -> Array:
+        """(T,) length that an angle off counts as when a posture is kept [m/rad]: the ratio of the tolerances."""
+        return self.tolerance / self.angle_tolerance
 
 
 class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -61,16 +103,16 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return handler(_without_serializer(core_schema))
 
     @property
-    def rows(self) -> int:
-        """How many angles it asks for."""
+    def n_angular(self) -> int:
+        """Number of angles that it asks for."""
         return AXIS if self.axis is not None else ORIENTATION if self.orientation is not None else 0
 
     @property
     def rotation(self) -> np.ndarray:
-        """(3, 3) the tool's axes as they should be; what does not count is any."""
+        """(3, 3) the tool's axes as they should be; axes that do not count are arbitrary."""
         if self.axis is not None:
-            return pointing(self.axis)
-        return np.eye(3) if self.orientation is None else turned(*self.orientation)
+            return rotation_to_axis(self.axis)
+        return np.eye(3) if self.orientation is None else rotation_from_rpy(*self.orientation)
 
     @property
     def words(self) -> str:
@@ -128,14 +170,27 @@ def read_target(value: Any, number: int) -> Target:
 
 
 @lru_cache
-def goals_of(records: tuple[Target | None, ...], restarts: int) -> Goals:
-    """How targets are to be reached, as arrays; None: of a point alone."""
+def target_arrays(records: tuple[Target | None, ...], restarts: int) -> TargetArrays:
+    """Stack targets into arrays; None stands for a point alone."""
     targets = [record or Target(position=(0.0, 0.0, 0.0)) for record in records]
-    return Goals(
-        rows=np.array([target.rows for target in targets], dtype=np.intp),
+    return TargetArrays(
+        n_angular=np.array([target.n_angular for target in targets], dtype=np.intp),
         rotation=np.array([target.rotation for target in targets]),
         tolerance=np.array([target.tolerance for target in targets]),
         angle_tolerance=np.array([target.angle_tolerance for target in targets]),
         weight=np.array([target.weight for target in targets]),
+        restarts=restarts,
+    )
+
+
+@lru_cache
+def position_targets(n: int, restarts: int = 0) -> TargetArrays:
+    """Return the arrays of `n` points, whose tolerances and weights are the defaults."""
+    return TargetArrays(
+        n_angular=np.zeros(n, dtype=np.intp),
+        rotation=np.broadcast_to(np.eye(3), (n, 3, 3)),
+        tolerance=np.full(n, REACHED),
+        angle_tolerance=np.full(n, ALIGNED),
+        weight=np.ones(n),
         restarts=restarts,
     )

@@ -26,10 +26,17 @@ from pydantic import (
 from armwright.documents import parse_document, read_document
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.files import check_name
-from armwright.goals import Goals, plain_goals
 from armwright.moves import MOVE_STEP, Moves, check_moves, check_times
 from armwright.obstacles import MOST_OBSTACLES, Obstacle, check_obstacle
-from armwright.targets import LARGEST_COORDINATE, Point, Target, goals_of, read_target
+from armwright.targets import (
+    LARGEST_COORDINATE,
+    Point,
+    Target,
+    TargetArrays,
+    position_targets,
+    read_target,
+    target_arrays,
+)
 from armwright.workspace import MOST_POINTS, MOST_REGIONS, Region
 
 LARGEST_PAYLOAD = 1e4  # [kg]
@@ -192,11 +199,11 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return tuple(record or point for point, record in zip(self.targets, self._records, strict=True))
 
     @property
-    def goals(self) -> Goals:
+    def goals(self) -> TargetArrays:
         """How the targets are to be reached."""
         if not self._records:
-            return plain_goals(len(self.targets), self.restarts)
-        return goals_of(self._records, self.restarts)
+            return position_targets(len(self.targets), self.restarts)
+        return target_arrays(self._records, self.restarts)
 
     @property
     def is_plain(self) -> bool:

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armwright.exceptions import ArmError, FailureError, SettingsError
-from armwright.goals import ORIENTATION, Goals
 from armwright.kinematics.arm_arrays import (
     ARRAYS,
     FIXED,
@@ -29,6 +28,7 @@ from armwright.kinematics.arm_arrays import (
     check_precision,
 )
 from armwright.kinematics.devices import Device, cores, load, resolve_device
+from armwright.targets import ORIENTATION, TargetArrays
 
 UPDATES = 100  # of the inverse kinematics, docs/method.md §2
 BEFORE_THE_FIRST = 1e30  # stands for ∞, the limit gradient before the first update
@@ -58,7 +58,7 @@ def solve_postures(
     *,
     start: ArrayLike | None = None,
     payload: NDArray[np.float64] | None = None,
-    goals: Goals | None = None,
+    goals: TargetArrays | None = None,
     precision: Precision = "float32",
     device: Device = "cpu",
 ) -> Postures:
@@ -107,7 +107,7 @@ def solve_postures(
 
 
 def update_once(
-    arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats, goals: Goals | None = None
+    arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats, goals: TargetArrays | None = None
 ) -> tuple[Floats, Floats]:
     """One update of the inverse kinematics of each arm at a target of its own, from given angles, on the CPU.
 
@@ -130,18 +130,20 @@ def update_once(
     return _from_lanes(q_last.numpy())[:, 0], _from_lanes(h_last.numpy())[:, 0]
 
 
-def _kind_of(goals: Goals | None) -> TargetKind:
+def _kind_of(goals: TargetArrays | None) -> TargetKind:
     return "pose" if goals is not None and goals.oriented else "position"
 
 
-def _wanted(targets: NDArray[np.float64], payload: NDArray[np.float64], goals: Goals | None) -> NDArray[np.float64]:
+def _wanted(
+    targets: NDArray[np.float64], payload: NDArray[np.float64], goals: TargetArrays | None
+) -> NDArray[np.float64]:
     """(T, C) what the kernels are told of each target: C = 4 numbers of a point, 16 where any says more."""
     points = [targets, payload]
     if goals is None or not goals.oriented:
         return np.column_stack(points)
     frame = goals.rotation.swapaxes(1, 2).reshape(-1, 9)  # the x, then y, then z that the tool should have
-    asks, whole = np.float64(goals.rows > 0), np.float64(goals.rows == ORIENTATION)
-    return np.column_stack([*points, frame, asks, whole, goals.trade])
+    asks, whole = np.float64(goals.n_angular > 0), np.float64(goals.n_angular == ORIENTATION)
+    return np.column_stack([*points, frame, asks, whole, goals.metres_per_radian])
 
 
 def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:

@@ -210,7 +210,7 @@ def _angles(evaluation: Evaluation, row: int, shown: list[int]) -> str:
     if not goals.oriented:
         return ""
     degrees = np.degrees(evaluation.angle_error[row])
-    return "(" + ", ".join(f"{degrees[t]:.1f}" if goals.rows[t] else "-" for t in shown) + ")"
+    return "(" + ", ".join(f"{degrees[t]:.1f}" if goals.n_angular[t] else "-" for t in shown) + ")"
 
 
 def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:

@@ -15,7 +15,6 @@ from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 from armwright.arm import GRAVITY
 from armwright.control import LONGEST_HINT
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.goals import REACHED
 from armwright.history import History
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.kinematics.solve import UPDATES
@@ -26,7 +25,7 @@ from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
 from armwright.objectives import OF_THE_WAY, ORIENTATION_ERROR, POSITION_ERROR, UNREACHED_TARGETS, Objective
 from armwright.problem import Problem
-from armwright.targets import target_words
+from armwright.targets import REACHED, target_words
 from armwright.task import IN_ORDER, Task
 from armwright.tolerance import measured_columns
 

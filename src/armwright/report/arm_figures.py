@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from armwright.evaluation import Evaluation
-from armwright.goals import AXIS
 from armwright.history import FrontMember, History
 from armwright.kinematics.chain import joint_positions, link_lines, rails
 from armwright.objectives import TORQUE
@@ -31,6 +30,7 @@ from armwright.report.style import (
     WAY,
     look,
 )
+from armwright.targets import AXIS
 from armwright.workspace import Region
 
 ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
@@ -137,7 +137,7 @@ def _draw_workspace(axes: Any, workspace: Sequence[Region]) -> None:
 
 def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
     """Draw the required tool direction: an arrow along its z axis, and for a full orientation also along x and y."""
-    goal, rows = evaluation.targets[target], evaluation.goals.rows[target]
+    goal, rows = evaluation.targets[target], evaluation.goals.n_angular[target]
     if not rows:
         return
     for k in (2,) if rows == AXIS else (0, 1, 2):
@@ -148,7 +148,7 @@ def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> N
 
 def _describe_miss(evaluation: Evaluation, target: int) -> str:
     words = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
-    if not evaluation.goals.rows[target]:
+    if not evaluation.goals.n_angular[target]:
         return words
     return f"{words}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
 

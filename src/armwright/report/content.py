@@ -20,7 +20,6 @@ from armwright.comparison import method_words
 from armwright.decision import bounded_numbers, numbers_of
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
-from armwright.goals import Goals
 from armwright.history import POLISH, History
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.objectives import TORQUE, TORQUE_SCALE
@@ -31,6 +30,7 @@ from armwright.report.repeat import repeat_command
 from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.results import read_summary
 from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
+from armwright.targets import TargetArrays
 
 KINDS = ("revolute", "prismatic", "fixed")
 NO_JOINT = Joint("fixed", "z")  # padding of shorter arms
@@ -276,11 +276,11 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
     }
 
 
-def _goals(goals: Goals) -> dict[str, Any]:
+def _goals(goals: TargetArrays) -> dict[str, Any]:
     """Return the targets' orientation requirements; frames: tool axes as columns, stored row by row."""
     return {
         "oriented": goals.oriented,
-        "rows": goals.rows.tolist(),
+        "rows": goals.n_angular.tolist(),
         "frames": goals.rotation.reshape(-1, 9).tolist() if goals.oriented else [],
         "tolerance": goals.tolerance.tolist(),
         "angle_tolerance": goals.angle_tolerance.tolist(),
