@@ -4,13 +4,16 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
 
-.PHONY: demo test torture check gp docs docs-serve format bench package fuzz audit clean
+.PHONY: demo test test-all torture check gp docs docs-serve format bench package fuzz audit clean
 
 demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
 	$(BIN)/armwright optimize target-1 --seed 0
 
-test: .venv/.test  ## the whole suite
-	$(BIN)/python -m pytest
+test: .venv/.test  ## the fast tests: two minutes on two cores, without browser and other processes
+	$(BIN)/python -m pytest -m "not slow"
+
+test-all: .venv/.test package docs  ## what `make test` leaves out: browser, kills, fuzz, documentation, packages
+	$(BIN)/python -m pytest -m slow
 
 torture: .venv/.test  ## faults by the hundred, among them 200 kills; some ten minutes on two cores (docs/reliability.md)
 	$(BIN)/python -m pytest tests/torture --kills 200 --dist load --maxschedchunk 1

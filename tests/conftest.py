@@ -1,8 +1,15 @@
-"""Fixtures shared by all tests, and a home that is not the user's."""
+"""Fixtures shared by all tests, the two tiers of the suite, and a home that is not the user's.
+
+`make test` runs what is not slow, `make test-all` the rest. A test is slow if it is marked so, lies in one of
+SLOW_FOLDERS or uses one of SLOW_FIXTURES. A test that is not slow fails if it starts a process.
+"""
 
 import gc
+import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser
@@ -10,6 +17,15 @@ from playwright.sync_api import Browser
 from tests import browser as browsers
 from tests.chat_server import ChatServer
 from tests.postgres import PostgresServer, binaries
+
+SLOW_FOLDERS = frozenset({"torture", "fuzz", "packaging"})
+SLOW_FIXTURES = frozenset({"browser", "guide", "postgres"})
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let tests send Ctrl-C: a shell's background job ignores SIGINT, and so would the processes that it starts."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -67,6 +83,31 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests come first, so that no worker is left alone with them at the end."""
+    """Mark slow tests, and put them first, so that no worker is left alone with them at the end."""
+    for item in items:
+        folders = item.path.relative_to(Path(__file__).parent).parts
+        if SLOW_FOLDERS.intersection(folders) or SLOW_FIXTURES.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
+_started: list[str] = []
+
+
+def _note_process(event: str, arguments: tuple[Any, ...]) -> None:
+    if event == "subprocess.Popen" and arguments[1][0] != "uname":  # which Python's own `platform` asks
+        _started.append(str(arguments[1]))
+
+
+sys.addaudithook(_note_process)
+
+
+@pytest.fixture(autouse=True)
+def _no_process(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Keep the fast tier in one process."""
+    _started.clear()
+    yield
+    if request.node.get_closest_marker("slow") is None and _started:
+        pytest.fail(f"mark this test slow, as it starts a process: {_started[0]}")

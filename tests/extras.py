@@ -1,10 +1,13 @@
-"""Marks for tests of what an extra brings: skipped, with the way out, where it is not installed."""
+"""Marks for tests of what an extra brings: skipped, with the way out, if it is not installed."""
 
 import pytest
 
 from armwright.extras import missing_packages
 
-NEEDS_GP = pytest.mark.skipif(
-    bool(missing_packages("gp")),
-    reason='the sampler gp is not tested without its packages: pip install "armwright[gp]", here `make gp`',
+NEEDS_GP = (
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        bool(missing_packages("gp")),
+        reason='the sampler gp is not tested without its packages: pip install "armwright[gp]", here `make gp`',
+    ),
 )

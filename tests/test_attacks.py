@@ -22,7 +22,7 @@ from armwright.live import HEADERS
 from armwright.report.page import write_report
 from tests.browser import FLAGS, Tab, program
 from tests.fuzz.targets import a_server
-from tests.test_live import ask, served, wish
+from tests.live_server import ask, served, wish
 
 __all__ = ["served"]  # a fixture
 

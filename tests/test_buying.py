@@ -1,7 +1,6 @@
 """Buy or build: arms that exist on a task, beside the designs of a run."""
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -28,6 +27,7 @@ from armwright.task import Task
 from armwright.urdf.names import find_urdf
 from armwright.urdf.reading import read_urdf
 from tests.browser import Tab
+from tests.command_line import armwright
 from tests.robots import robot
 
 TASK = Task(name="feeder", targets=((0.4, -0.2, 0.1), (0.4, 0.2, 0.1), (0.1, 0.35, 0.5)), payload=(0.5, 0.5, 0.0))
@@ -186,6 +186,7 @@ def test_without_arms_nothing_is_drawn(run: Path, history: History) -> None:
     assert "existing arm" not in [text.get_text() for text in axes.get_legend().get_texts()]
 
 
+@pytest.mark.slow
 def test_what_is_not_known_of_an_arm_is_not_compared(tmp_path: Path) -> None:
     space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
     problem = aw.Problem(
@@ -246,6 +247,7 @@ def test_mistakes(run: Path, tmp_path: Path) -> None:
         compare_arms(TASK, [UR5], tmp_path / "none")
 
 
+@pytest.mark.slow
 def test_arms_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """robot_descriptions itself, with a repository that lies there already, as after the first time."""
     place = tmp_path / "cache" / "example-robot-data-here" / "example-robot-data"
@@ -267,6 +269,7 @@ def test_arms_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         find_urdf("viper_mj")
 
 
+@pytest.mark.slow
 def test_names_that_cannot_be_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A network that is not there, and a package that is not there."""
     monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))
@@ -280,20 +283,17 @@ def test_names_that_cannot_be_fetched(tmp_path: Path, monkeypatch: pytest.Monkey
         find_urdf("panda")
 
 
-def armwright(*args: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "armwright", "compare-arms", *map(str, args)]
-    return subprocess.run(command, capture_output=True, text=True, env={**os.environ, "COLUMNS": "80"})
-
-
 def test_the_command(run: Path, in_folder: Path) -> None:
     Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)))
-    done = armwright("task.yaml", UR5, PANDA, "--run", run)
+    done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run)
     assert done.returncode == 0, done.stderr
     assert "…" not in done.stdout
     for word in ("ur5_robot", "panda", "1,500 positions", "of the front, dominated by", 'tip is the link "ee_link"'):
         assert word in done.stdout
     assert (run / "figures" / "front.png").is_file()
-    told = json.loads(armwright("task.yaml", UR5, "--run", run, "--base", "0,0.1,0", "--no-figures", "--json").stdout)
+    told = json.loads(
+        armwright("compare-arms", "task.yaml", UR5, "--run", run, "--base", "0,0.1,0", "--no-figures", "--json").stdout
+    )
     assert told["arms"][0]["base"] == [0.0, 0.1, 0.0]
     assert told["designs"][0]["values"] == list(read_run(run)[1].front[0].values)
     (run / BOUGHT).unlink()
@@ -302,7 +302,7 @@ def test_the_command(run: Path, in_folder: Path) -> None:
         (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
         (("target-1", UR5, "--run", run), "with other targets or payloads"),
     ):
-        done = armwright(*args)
+        done = armwright("compare-arms", *args)
         assert done.returncode == 2
         (line,) = done.stderr.strip().splitlines()
         assert words in line

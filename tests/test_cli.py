@@ -1,10 +1,8 @@
-"""The command line as a user meets it: in a process of its own."""
+"""The command line as a user meets it."""
 
 import io
 import json
-import os
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -16,37 +14,42 @@ from rich.console import Console
 
 from armwright.cli import _same_command
 from armwright.console import show_result, watching
+from armwright.llm import chat
 from armwright.problem import Problem
 from armwright.study import optimize
 from armwright.task import load_task
 from tests.chat_server import Answer, ChatServer, Request, designer
+from tests.command_line import PATIENCE, armwright, press_ctrl_c, refused
+
+
+@pytest.fixture(autouse=True)
+def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
+
 
 DRAWN = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
 SHORT = ("--no-figures", *DRAWN)
+INTERRUPTING = '''
+import os, signal
+from itertools import count
+from pathlib import Path
+
+import armwright as aw
+
+calls = count()
+
+@aw.evaluator("size", "span [m]")
+def measure(arm, task):
+    """the size of an arm"""
+    if next(calls) == 14 and not Path("interrupted").exists():
+        Path("interrupted").touch()
+        os.kill(os.getpid(), signal.SIGINT)
+    return float(len(arm.joints)), sum(link.length for link in arm.links)
+'''
 
 
-def armwright(*args: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", *args],
-        capture_output=True,
-        text=True,
-        env={**os.environ, **environment},
-        stdin=subprocess.DEVNULL,
-    )
-
-
-def refused(code: int, *args: str, **environment: str) -> str:
-    """The one line of an error; never a traceback."""
-    done = armwright(*args, **environment)
-    assert done.returncode == code, done.stderr
-    lines = done.stderr.strip().splitlines()
-    assert len(lines) == 1, done.stderr
-    assert lines[0].startswith("armwright: ")
-    return lines[0]
-
-
-def test_optimize_end_to_end(in_folder: Path) -> None:
-    done = armwright("optimize", "target-1", *DRAWN)
+def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> None:
+    done = armwright("optimize", "target-1", *SHORT)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert done.stdout.splitlines()[0] == "proposer: rules (no language model is configured; --model names one)"
@@ -54,20 +57,17 @@ def test_optimize_end_to_end(in_folder: Path) -> None:
     assert "a toy" in done.stdout  # wherever N m are shown for the paper's masses
     run = in_folder / "runs" / "target-1-seed0"
     assert f"results: runs/{run.name}/" in done.stdout
-    figures = {path.name for path in (run / "figures").iterdir()}
-    for name in ("hypervolume", "samples", "credit", "front", "arms"):
-        assert {f"{name}.png", f"{name}.pdf"} <= figures
     assert list((run / "designs").glob("*/arm.urdf"))
 
-    again = armwright("optimize", "target-1", *DRAWN)
+    again = armwright("optimize", "target-1", *SHORT)
     assert "is finished" in again.stdout
     assert (
         done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4]
         == (again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4])
     )
-    longer = armwright("optimize", "target-1", *DRAWN[:-1], "9")
+    longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
     assert "resumed at trial 10 of 13" in longer.stdout
-    message = refused(2, "optimize", "target-1", *DRAWN[:-1], "9", "--seed", "0", "--proposer", "none")
+    message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
     assert "proposer.name: rules there, None asked" in message
 
 
@@ -84,10 +84,13 @@ def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer
     assert "Who found what" not in shown("none")
 
 
-def test_what_is_missing_of_a_finished_run_is_made_again(in_folder: Path) -> None:
+@pytest.mark.slow
+def test_missing_results_of_a_finished_run_are_made_again(in_folder: Path) -> None:
     armwright("optimize", "target-1", *DRAWN, "--out", "run")
     run = in_folder / "run"
     before = {path.relative_to(run) for path in run.rglob("*")}
+    for name in ("hypervolume", "samples", "credit", "front", "arms"):
+        assert {Path("figures", f"{name}.png"), Path("figures", f"{name}.pdf")} <= before
     shutil.rmtree(run / "figures")
     shutil.rmtree(run / "designs")
     (run / "front.csv").unlink()
@@ -274,19 +277,14 @@ def test_an_output_folder_that_cannot_be_written_is_code_1(in_folder: Path, plac
     assert f"cannot write {place}" in refused(1, "optimize", "target-1", *SHORT, "--out", place)
 
 
-def test_a_kernel_cache_that_cannot_be_written_is_code_1(in_folder: Path) -> None:
-    (in_folder / "file").write_text("")
-    place = str(in_folder / "file" / "cache")
-    assert "set WARP_CACHE_PATH" in refused(1, "optimize", "target-1", *SHORT, WARP_CACHE_PATH=place)
-
-
 def test_a_terminal_without_the_characters_shows_the_rest(in_folder: Path) -> None:
     (in_folder / "space.yaml").write_text("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}")
-    done = armwright("optimize", "target-1", "--space", "space.yaml", *SHORT, PYTHONIOENCODING="ascii")
+    done = armwright("optimize", "target-1", "--space", "space.yaml", *SHORT, encoding="ascii")
     assert done.returncode == 0, done.stderr
     assert "kg/m?" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [("tasks",), ("optimize", "target-1", *SHORT)])
 def test_output_that_cannot_be_written_is_one_line(in_folder: Path, command: tuple[str, ...]) -> None:
     with open("/dev/full", "w") as full:
@@ -313,35 +311,17 @@ def test_an_unknown_option_is_code_2() -> None:
     assert "--n-step" in done.stderr
 
 
-def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
-    settings = [
-        "optimize",
-        "target-1",
-        "--sampler",
-        "random",
-        "--proposer",
-        "none",
-        "--n-total",
-        "2000",
-        "--no-figures",
-        "--out",
-        "run",
-    ]
-    command = [sys.executable, "-m", "armwright", *settings]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    for line in process.stdout:
-        if line.startswith("iteration 10/"):
-            break
-    process.send_signal(signal.SIGINT)
-    output, errors = process.communicate()
-    assert process.returncode == 130
-    assert "Traceback" not in output + errors
-    assert f"Go on with:\n  python -m armwright {' '.join(settings)}" in output
+def test_ctrl_c_leaves_a_folder_that_can_be_resumed(in_folder: Path) -> None:
+    (in_folder / "mine.py").write_text(INTERRUPTING)
+    settings = ["optimize", "target-1", "--proposer", "none", "--sampler", "random", "--n-total", "20"]
+    settings += ["--no-figures", "--evaluator", "mine.py:measure", "--out", "run"]
+    stopped = armwright(*settings)
+    assert (stopped.returncode, stopped.stderr) == (130, "")
+    assert f"Go on with:\n  python -m armwright {' '.join(settings)}" in stopped.stdout
     kept = (in_folder / "run" / "trials.jsonl").read_text()
-    assert 20 <= len(kept.splitlines()) < 2010
+    assert len(kept.splitlines()) == 14
     done = armwright(*settings)
-    assert f"resumed at trial {len(kept.splitlines())} of 2010" in done.stdout
+    assert "resumed at trial 14 of 30" in done.stdout
     assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
 
 
@@ -350,28 +330,23 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(in_folder: Path) -> None:
 def test_ctrl_c_ends_the_calls_under_way(
     chat_server: ChatServer, in_folder: Path, overlap: list[str], refused: int
 ) -> None:
-    """While the server holds its answers back, the process ends, keeps what was paid for, and says how to go on."""
-    released, asked = threading.Event(), threading.Event()
+    """While the server holds its answers back, the command ends, keeps what was paid for, and says how to go on."""
+    released = threading.Event()
 
     def answer(request: Request) -> Answer:
         n = len(chat_server.requests)  # a check, the thoughts, and perhaps a design that is refused
         if n == 3 and refused:
             return "no design"
         if n > 2:
-            asked.set()
-            released.wait(60)
+            press_ctrl_c()
+            released.wait(PATIENCE)
         return designer(request)
 
     chat_server.answer = answer
-    command = [sys.executable, "-m", "armwright", "optimize", "target-1", "--model", "m", "--base-url", chat_server.url]
-    process = subprocess.Popen([*command, *overlap], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert asked.wait(60)
-    process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=60)
-    assert not released.is_set()
+    done = armwright("optimize", "target-1", "--model", "m", "--base-url", chat_server.url, *overlap)
     released.set()
-    assert (process.returncode, errors) == (130, "")
-    assert "Go on with:" in output
+    assert (done.returncode, done.stderr) == (130, "")
+    assert "Go on with:" in done.stdout
     transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
     kept = [(call["step"], call["requests"], call["fault"]) for call in map(json.loads, transcript)]
     assert kept == [("check", 1, None), ("reasoning", 1, None), ("parameters", 1, "cancelled")][: 2 + refused]
@@ -411,6 +386,7 @@ cli.main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_wish_to_end_that_python_drops_is_heeded(name: str) -> None:
     """As in finalisers and in callbacks of libraries, where no exception leads out."""
@@ -429,6 +405,7 @@ def test_progress_in_a_terminal(width: int) -> None:
     assert "None" not in shown
 
 
+@pytest.mark.slow
 def test_help_needs_no_heavy_import() -> None:
     heavy = {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}
     code = f"import sys; import armwright.cli; sys.exit(', '.join({heavy!r} & set(sys.modules)) or 0)"

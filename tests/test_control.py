@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -54,6 +52,7 @@ from armwright.proposers.replay import ReplayProposer
 from armwright.study import Progress, Run, optimize
 from armwright.task import load_task
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from tests.command_line import armwright
 from tests.fixed import FixedProblem, fixed_history
 
 PROBLEM = Problem(load_task("target-1"))
@@ -231,14 +230,13 @@ def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in
     chat_server.answer = answer
     settings = ["optimize", "target-1", "--model", "m", "--base-url", chat_server.url, "--n-total", "6", "--no-figures"]
     settings += ["--out", "run"]
-    command = [sys.executable, "-m", "armwright", *settings]
-    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    done = armwright(*settings)
     assert (done.returncode, done.stderr) == (130, "")
     assert f"stopped; every finished trial is in run/. Go on with:\n  python -m armwright {' '.join(settings)}" in (
         done.stdout
     )
     assert len(lines(out)) == 11  # the present design was evaluated
-    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    done = armwright(*settings)
     assert (done.returncode, done.stderr) == (0, "")
     assert "resumed at trial 11 of 16" in done.stdout
 

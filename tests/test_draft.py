@@ -2,9 +2,6 @@
 
 import json
 import re
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterable
 from pathlib import Path
@@ -24,8 +21,8 @@ from armwright.objectives import OBJECTIVES
 from armwright.task import task_template
 from tests import wires
 from tests.chat_server import Answer, ChatServer, Request
+from tests.command_line import PATIENCE, armwright, press_ctrl_c, refused
 from tests.faults import FAULTS
-from tests.test_cli import armwright, refused
 
 WORDS = "paint a 1 × 2 m wall from a cart, payload 0.5 kg, cheap servos"
 TASK = """\
@@ -440,25 +437,20 @@ def test_what_would_be_sent_is_shown_without_a_model(in_folder: Path) -> None:
 
 @pytest.mark.parametrize("refused", [0, 1])
 def test_ctrl_c_ends_the_call_and_writes_no_task(chat_server: ChatServer, in_folder: Path, refused: int) -> None:
-    released, asked = threading.Event(), threading.Event()
+    released = threading.Event()
 
     def answer(request: Request) -> Answer:
         if len(chat_server.requests) <= refused:
             return "no task"
-        asked.set()
-        released.wait(60)
+        press_ctrl_c()
+        released.wait(PATIENCE)
         return ANSWER
 
     chat_server.answer = answer
-    command = [sys.executable, "-m", "armwright", "draft", WORDS, "--model", "m", "--base-url", chat_server.url]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert asked.wait(60)
-    process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=60)
-    assert not released.is_set()
+    done = armwright("draft", WORDS, "--model", "m", "--base-url", chat_server.url)
     released.set()
-    assert (process.returncode, errors) == (130, "")
-    assert output.endswith("\nstopped; no task was written\n")
+    assert (done.returncode, done.stderr) == (130, "")
+    assert done.stdout.endswith("\nstopped; no task was written\n")
     assert files(in_folder) == ({DRAFTS} if refused else set())
 
 

@@ -55,6 +55,7 @@ def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
             assert all((EXAMPLES.parent / file).is_file() for file in said.groups() if file)
 
 
+@pytest.mark.slow
 def test_the_scikit_learn_example(chat_server: ChatServer) -> None:
     def answer(request: Request) -> Answer:
         if "response_format" not in request:
@@ -72,6 +73,7 @@ def test_the_scikit_learn_example(chat_server: ChatServer) -> None:
     assert "always with classifier = forest" in prompt
 
 
+@pytest.mark.slow
 def test_the_zdt1_example(chat_server: ChatServer) -> None:
     def answer(request: Request) -> Answer:
         if "response_format" not in request:
@@ -89,6 +91,7 @@ def test_the_zdt1_example(chat_server: ChatServer) -> None:
     )
 
 
+@pytest.mark.slow
 def test_without_a_model_an_example_says_so() -> None:
     """And that rules propose in its place."""
     said = run("optuna_zdt1.py", "--n-trials", "20")

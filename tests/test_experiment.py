@@ -149,6 +149,7 @@ def test_cells_without_a_model_are_skipped_and_said_so(tmp_path: Path) -> None:
     assert {cell.plan.model for cell in cells if cell.method == "llm"} == {"gpt-x"}
 
 
+@pytest.mark.slow
 def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
     file = file_of(in_folder)
     result = invoke("experiment", file, "--jobs", "2", "--no-figures")
@@ -170,6 +171,7 @@ def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
     assert json.loads(more.stdout)["cells"] == 6
 
 
+@pytest.mark.slow
 def test_a_changed_file_is_not_taken_for_the_run_that_lies_there(in_folder: Path) -> None:
     assert invoke("experiment", file_of(in_folder, seeds=1, tasks=["random-3"]), "--no-figures").exit_code == 0
     methods = {**SMALL["methods"], "rules": {**SMALL["methods"]["rules"], "n_step": 2}}
@@ -179,6 +181,7 @@ def test_a_changed_file_is_not_taken_for_the_run_that_lies_there(in_folder: Path
     assert "n_step: 3 there, 2 asked" in result.output
 
 
+@pytest.mark.slow
 def test_a_failing_cell_is_reported_and_does_not_stop_the_others(in_folder: Path) -> None:
     blocked = in_folder / "experiments/small/runs/rules/target-1"
     blocked.mkdir(parents=True)
@@ -197,6 +200,7 @@ def test_a_failing_cell_is_reported_and_does_not_stop_the_others(in_folder: Path
     assert "1 to run" in mended.output
 
 
+@pytest.mark.slow
 def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
     methods = {
         "bbo": {"label": "BBO", "sampler": "nsga2"},
@@ -219,6 +223,7 @@ def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
     assert all(run_cell(cell).resumed for cell in cells)
 
 
+@pytest.mark.slow
 def test_a_recorded_experiment_is_played_again_without_a_model(in_folder: Path, chat_server: ChatServer) -> None:
     settings: dict[str, Any] = {"tasks": ["random-3"], "methods": {"llm": asking(chat_server)}}
     file = file_of(in_folder, **settings)
@@ -250,6 +255,7 @@ def killing(server: ChatServer, workers: Iterator[int]) -> Any:
     return answer
 
 
+@pytest.mark.slow
 def test_a_killed_worker_s_cells_are_run_again(tmp_path: Path, chat_server: ChatServer) -> None:
     plan = plan_of(tasks=["random-3"], methods={"llm": asking(chat_server)})
     cells, _ = cells_of(plan, tmp_path, tmp_path)
@@ -262,6 +268,7 @@ def test_a_killed_worker_s_cells_are_run_again(tmp_path: Path, chat_server: Chat
     assert not {child.pid for child in multiprocessing.active_children()} - others
 
 
+@pytest.mark.slow
 def test_a_cell_that_always_kills_its_worker_is_given_up_and_the_others_are_not(
     tmp_path: Path, chat_server: ChatServer
 ) -> None:
@@ -281,6 +288,7 @@ def test_a_cell_that_always_kills_its_worker_is_given_up_and_the_others_are_not(
     assert "killed 3 times" in faults["llm"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT], ids=["kill", "Ctrl-C"])
 def test_workers_end_with_the_process_that_they_work_for(
     tmp_path: Path, chat_server: ChatServer, how: signal.Signals

@@ -5,28 +5,27 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_cli import SHORT, armwright, refused
+from tests.command_line import armwright, refused
+from tests.test_cli import SHORT
 
 
-def test_front_polish_and_verify_end_to_end(in_folder: Path) -> None:
-    done = armwright("front", "target-1", "--budget", "3000", "--seed", "4")
+def test_front_polish_and_verify(in_folder: Path) -> None:
+    done = armwright("front", "target-1", "--budget", "3000", "--seed", "4", "--no-figures")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     for words in ("of the best known hypervolume", "solid", "fragile", "the budget is spent", "a toy"):
         assert words in done.stdout
-    run = in_folder / "runs" / "target-1-front-seed4"
-    assert {"hypervolume.png", "front.png", "arms.pdf"} <= {path.name for path in (run / "figures").iterdir()}
+    assert (in_folder / "runs" / "target-1-front-seed4" / "summary.json").is_file()
     more = armwright("front", "target-1", "--budget", "4000", "--seed", "4", "--no-figures", "--json")
     summary = json.loads(more.stdout)
     assert summary["search"]["evaluations"] >= 4000
     assert summary["folder"] == "runs/target-1-front-seed4"
 
     armwright("optimize", "target-1", *SHORT, "--no-verify", "--out", "mine")
-    polished = armwright("polish", "mine", "--evaluations", "120")
+    polished = armwright("polish", "mine", "--evaluations", "120", "--no-figures")
     assert polished.returncode == 0, polished.stderr
     assert "became better" in polished.stdout
     assert " polish " in polished.stdout
-    assert (in_folder / "mine" / "figures" / "front.png").exists()
     verified = armwright("verify", "mine", "--json")
     record = json.loads(verified.stdout)["verification"]
     assert record["solid"] + record["fragile"] == json.loads(verified.stdout)["front_size"]
@@ -36,6 +35,16 @@ def test_front_polish_and_verify_end_to_end(in_folder: Path) -> None:
 
     begun = armwright("front", "target-1", "--budget", "500", "--from", "mine", "--no-figures", "--out", "begun")
     assert begun.returncode == 0, begun.stderr
+
+
+@pytest.mark.slow
+def test_front_and_polish_draw_their_figures(in_folder: Path) -> None:
+    armwright("front", "target-1", "--budget", "1000", "--out", "front")
+    armwright("optimize", "target-1", *SHORT, "--no-verify", "--out", "mine")
+    armwright("polish", "mine", "--evaluations", "60")
+    for folder in ("front", "mine"):
+        drawn = {path.name for path in (in_folder / folder / "figures").iterdir()}
+        assert {"hypervolume.png", "front.png", "arms.pdf"} <= drawn
 
 
 def test_robust_and_polish_every(in_folder: Path) -> None:

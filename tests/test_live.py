@@ -1,7 +1,5 @@
 """The live page: a real study in a process of its own, a real browser, a real server; each survives the others."""
 
-import http.client
-import json
 import os
 import re
 import signal
@@ -23,6 +21,10 @@ from armwright.llm.transcript import Transcript
 from armwright.run_folder import read_run
 from tests.browser import Tab
 from tests.chat_server import Answer, ChatServer, Request, designer, wants_design
+from tests.command_line import PATIENCE, refused, start
+from tests.live_server import ask, served, wish
+
+__all__ = ["served"]  # a fixture
 
 HINT = "a SCARA arm, please; <b>its base</b> behind the targets"
 
@@ -38,7 +40,7 @@ class Gate:
     def __call__(self, request: Request) -> Answer:
         self.asked += 1
         if self.asked > self.closed_after:
-            self.open.wait(60)
+            self.open.wait(PATIENCE)
         return designer(request)
 
 
@@ -76,7 +78,7 @@ class LiveStudy:
 
     def end(self) -> int:
         """Waits for its end."""
-        rest, _ = self.process.communicate(timeout=120)
+        rest, _ = self.process.communicate(timeout=PATIENCE)
         self.said.append(rest)
         return self.process.returncode
 
@@ -205,46 +207,6 @@ def test_a_killed_study_is_seen_to_be_gone(tmp_path: Path, tab: Tab, live: ExitS
     study.end()
 
 
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, int, str]]:
-    """A finished run on a server: its folder, the server's port, the page's token."""
-    folder = tmp_path_factory.mktemp("served") / "run"
-    aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=folder)
-    command = [sys.executable, "-m", "armwright", "live", str(folder)]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    address = server.stdout.readline().strip()
-    port = int(address.rstrip("/").rpartition(":")[2])
-    _, page = ask(port, "GET", "/")
-    (token,) = re.findall(r'name="armwright-token" content="([\w-]+)"', page.decode())
-    yield folder, port, token
-    server.send_signal(signal.SIGINT)
-    assert server.wait(timeout=20) == 0
-    server.stdout.close()
-
-
-def ask(port: int, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
-    """The status and body of an answer, with exactly these headers."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    given = {"Host": f"127.0.0.1:{port}"} | {name.replace("_", "-"): value for name, value in headers.items()}
-    connection.putrequest(method, path, skip_host=True)
-    if body is not None:
-        given["Content-Length"] = str(len(body))
-    for name, value in given.items():
-        connection.putheader(name, value)
-    connection.endheaders(body)
-    response = connection.getresponse()
-    found = response.status, response.read()
-    connection.close()
-    return found
-
-
-def wish(port: int, token: str, content: object = None, **headers: str) -> int:
-    """What the server says to a POST that is right but for these headers."""
-    right = {"Origin": f"http://127.0.0.1:{port}", "Content_Type": "application/json", "X_Armwright_Token": token}
-    body = content if isinstance(content, bytes) else json.dumps(content or {"action": "pause"}).encode()
-    return ask(port, "POST", "/control", body, **{k: v for k, v in (right | headers).items() if v})[0]
-
-
 def test_only_the_page_itself_may_ask_for_anything(served: tuple[Path, int, str]) -> None:
     folder, port, token = served
     assert wish(port, "") == 403
@@ -308,9 +270,15 @@ def test_nothing_listens_beyond_the_loopback(served: tuple[Path, int, str]) -> N
 
 
 def test_a_folder_without_a_run_is_said_at_once(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "armwright", "live", str(tmp_path)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 1
-    assert "is not a run folder" in done.stderr
-    assert "Traceback" not in done.stderr
+    assert "is not a run folder" in refused(1, "live", tmp_path)
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_the_server_in_order(tmp_path: Path) -> None:
+    aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
+    with start("live", tmp_path / "run") as server:
+        assert server.stdout is not None
+        assert server.stdout.readline().startswith("http://127.0.0.1:")
+        server.send_signal(signal.SIGINT)
+        _, errors = server.communicate(timeout=PATIENCE)
+    assert (server.returncode, errors) == (0, "")

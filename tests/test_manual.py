@@ -4,7 +4,6 @@ import json
 import os
 import queue
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,6 +21,7 @@ from armwright.proposers.replay import ReplayProposer
 from armwright.study import Run, optimize
 from armwright.task import load_task
 from tests.chat_server import GOOD_DESIGN
+from tests.command_line import armwright
 
 PROBLEM = Problem(load_task("target-1"))
 LINES = """\
@@ -48,12 +48,12 @@ def pending(folder: Path, out: Path, **how: str) -> AnswerPendingError:
 
 def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> None:
     command = (
-        *(sys.executable, "-m", "armwright", "optimize", "target-1", "--proposer", "manual:ask", "--once"),
+        *("optimize", "target-1", "--proposer", "manual:ask", "--once"),
         *("--n-init", "4", "--n-step", "3", "--n-total", "6", "--no-figures", "--out", "run"),
     )
 
     def go(*more: str) -> subprocess.CompletedProcess[str]:
-        done = subprocess.run([*command, *more], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        done = armwright(*command, *more)
         assert done.returncode == 0, done.stderr
         return done
 

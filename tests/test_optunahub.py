@@ -87,6 +87,7 @@ def test_the_example_of_the_readme_runs(monkeypatch: pytest.MonkeyPatch, capsys:
     assert capsys.readouterr().out.startswith("4 [")
 
 
+@pytest.mark.slow
 def test_the_example_runs() -> None:
     command = [sys.executable, "-W", "error", FOLDER / "example.py", "--n-trials", "30"]
     said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout

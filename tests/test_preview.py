@@ -1,8 +1,6 @@
 """`armwright prompt`: what it prints is, to the byte, what is sent."""
 
 import json
-import subprocess
-import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -20,6 +18,7 @@ from armwright.proposers.proposer import Proposer
 from armwright.study import Progress, Run, optimize
 from armwright.task import load_task
 from tests.chat_server import Answer, ChatServer, Request, designer
+from tests.command_line import armwright
 from tests.fixed import SIX_AXIS
 
 PROBLEM = Problem(load_task("target-1"))
@@ -217,8 +216,7 @@ def test_mistakes_are_one_line(in_folder: Path, args: list[str], message: str) -
 
 def test_a_mistake_in_a_template_is_one_line_on_stderr(in_folder: Path) -> None:
     (in_folder / "own.md").write_text("{{ ''.__class__ }}", encoding="utf-8")
-    command = [sys.executable, "-m", "armwright", "prompt", "target-1", "--prompt", "own.md"]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = armwright("prompt", "target-1", "--prompt", "own.md")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("armwright: prompt own.md, line 1 cannot be rendered: access to attribute")
     assert done.stderr.count("\n") == 1

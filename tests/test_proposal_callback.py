@@ -176,6 +176,7 @@ study.optimize(objective, n_trials=10, callbacks=[aw.ProposalCallback(proposer, 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["postgres", "journal"])
 def test_several_processes_on_one_storage_share_the_proposals(
     kind: str, chat_server: ChatServer, tmp_path: Path, request: pytest.FixtureRequest

@@ -17,21 +17,26 @@ from armwright.llm.secrets import redacted, without_keys
 from armwright.problem import Problem
 from armwright.study import optimize
 from armwright.task import load_task
+from tests import wires
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, wants_design
-from tests.wires import ANTHROPIC_KEY, OPENAI_KEY, SERVER_KEY, WIRES, environment, proposer
+from tests.command_line import armwright
+from tests.wires import ANTHROPIC_KEY, OPENAI_KEY, SERVER_KEY, WIRES, proposer
 
 SHORT = ("--n-init", "4", "--n-step", "1", "--n-total", "6")
+STUDY = ("optimize", "target-1", *SHORT, "--no-figures", "--out", "run")
 KEYS = (OPENAI_KEY, ANTHROPIC_KEY, SERVER_KEY)
 
 
-def armwright(server: ChatServer, *args: str, **more: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", *args],
-        capture_output=True,
-        text=True,
-        env={**os.environ, **environment(server), **more},
-        stdin=subprocess.DEVNULL,
-    )
+def run(server: ChatServer, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A command with all keys in its environment."""
+    return armwright(*arguments, **wires.environment(server))
+
+
+def run_alone(server: ChatServer, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The same in a process of its own, in which libraries read what they log."""
+    command = [sys.executable, "-m", "armwright", *arguments]
+    env = {**os.environ, **wires.environment(server), **environment}
+    return subprocess.run(command, capture_output=True, text=True, env=env, stdin=subprocess.DEVNULL)
 
 
 def model_of(wire: str, server: ChatServer) -> tuple[str, ...]:
@@ -86,16 +91,36 @@ def parrot(server: ChatServer) -> Callable[[Request], Answer]:
     return answer
 
 
-@pytest.mark.parametrize(
-    ("wire", "logs"),
-    [("own server", {}), ("openai", {"OPENAI_LOG": "debug"}), ("anthropic", {"ANTHROPIC_LOG": "debug"})],
-)
-def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wire: str, logs: dict[str, str]) -> None:
+@pytest.mark.parametrize("wire", WIRES)
+def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
     chat_server.answer = parrot(chat_server)
-    how = ("--json", "--no-figures") if logs else ()
-    done = armwright(
-        chat_server, "optimize", "target-1", *SHORT, *model_of(wire, chat_server), "--out", "run", *how, **logs
-    )
+    done = run(chat_server, *STUDY, *model_of(wire, chat_server))
+    check_for_keys(done, chat_server, in_folder, done.stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wire", ["openai", "anthropic"])
+def test_no_key_is_shown_by_libraries_that_log(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
+    chat_server.answer = parrot(chat_server)
+    logs = {f"{wire.upper()}_LOG": "debug"}
+    done = run_alone(chat_server, *STUDY, "--json", *model_of(wire, chat_server), **logs)
+    check_for_keys(done, chat_server, in_folder, done.stderr)
+    assert "DEBUG] HTTP Re" in done.stderr
+
+
+@pytest.mark.slow
+def test_no_key_is_on_the_page(chat_server: ChatServer, in_folder: Path) -> None:
+    chat_server.answer = parrot(chat_server)
+    study = [argument for argument in STUDY if argument != "--no-figures"]
+    done = run(chat_server, *study, *model_of("own server", chat_server))
+    assert "report.html" in {path.name for path in in_folder.rglob("*")}
+    check_for_keys(done, chat_server, in_folder, done.stdout)
+
+
+def check_for_keys(
+    done: subprocess.CompletedProcess[str], chat_server: ChatServer, in_folder: Path, shown: str
+) -> None:
+    """No key in what the study shows and writes, whatever the server answered."""
     assert done.returncode == 0, done.stderr
     summary = json.loads((in_folder / "run" / "summary.json").read_text())
     assert summary["proposer"]["failures"] == {"rejected": 1, "answer": 1, "server": 1, "key": 2}
@@ -106,8 +131,6 @@ def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wi
         no_key_in(words_of(path))
     no_key_in(done.stdout + done.stderr)
     assert "_API_KEY>" in (in_folder / "run" / "transcripts.jsonl").read_text()
-    shown = done.stderr if how else done.stdout
-    assert "DEBUG] HTTP Re" in shown or not logs
     assert "iteration 6/6" in shown
     assert "failed 5" in shown
     assert shown.count("no usable proposal") == 4  # the last fault is told once
@@ -119,7 +142,7 @@ def test_no_key_is_shown_where_the_first_call_fails(
     chat_server: ChatServer, in_folder: Path, command: tuple[str, ...]
 ) -> None:
     chat_server.answer = lambda request: (401, json.dumps({"error": {"message": f"bad: {sent_key(chat_server)}"}}))
-    done = armwright(chat_server, *command, *model_of("openai", chat_server))
+    done = run(chat_server, *command, *model_of("openai", chat_server))
     assert done.returncode == 1
     assert done.stderr.startswith("armwright: openai-chat:gpt-4o: bad: <OPENAI_API_KEY> (HTTP 401)")
     assert len(done.stderr.splitlines()) == 1
@@ -128,12 +151,13 @@ def test_no_key_is_shown_where_the_first_call_fails(
 
 def test_no_key_is_shown_where_the_first_call_repeats_it(chat_server: ChatServer, in_folder: Path) -> None:
     chat_server.answer = parrot(chat_server)
-    done = armwright(chat_server, "doctor", "--call", *model_of("anthropic", chat_server))
+    done = run(chat_server, "doctor", "--call", *model_of("anthropic", chat_server))
     assert done.returncode == 0, done.stderr
     assert '"Your key is <ANTHROPIC_API_KEY>' in done.stdout
     no_key_in(done.stdout + done.stderr)
 
 
+@pytest.mark.slow
 def test_no_key_is_on_a_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     """As every user of the machine sees them: of the study, and of the server of its page."""
     seen: set[str] = set()
@@ -146,7 +170,7 @@ def test_no_key_is_on_a_command_line(chat_server: ChatServer, in_folder: Path) -
 
     chat_server.answer = answer
     how = (*model_of("openai", chat_server), "--answer", "one-step", "--no-figures", "--live", "--out", "run")
-    done = armwright(chat_server, "optimize", "target-1", *SHORT, *how)
+    done = run_alone(chat_server, "optimize", "target-1", *SHORT, *how)
     assert done.returncode == 0, done.stderr
     own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]
     assert any("armwright live" in command for command in own)

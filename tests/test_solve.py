@@ -46,11 +46,13 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
 
 
+@pytest.mark.slow
 def test_first_use_by_many_threads_leaves_stderr_as_it_was() -> None:
     """Warp's native code is silenced while it starts, and only then."""
     assert run(THREADS).stderr.splitlines()[-1] == "still heard"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", ["", "import os; os.close(2)\n"])
 def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
     done = run(
@@ -59,6 +61,7 @@ def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_forked_child_solves_too() -> None:
     """It has the parent's pool, but not its threads."""
     assert run(FORK).returncode == 0
@@ -110,6 +113,7 @@ for kernel in kernels.values():
 """
 
 
+@pytest.mark.slow
 def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
     """To PTX, by the compiler that Warp brings. What they compute there, only a GPU can say."""
     command = [sys.executable, "-c", COMPILE_FOR_CUDA, str(tmp_path)]

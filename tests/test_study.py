@@ -198,8 +198,7 @@ def test_a_resumed_run_equals_an_uninterrupted_one(
     check_resume(tmp_path / "run", stop, proposer=proposer, sampler=sampler, n_init=5, n_step=4, n_total=20)
 
 
-@NEEDS_GP
-@pytest.mark.parametrize("proposer", ["none", "rules"])
+@pytest.mark.parametrize("proposer", [pytest.param(name, marks=NEEDS_GP) for name in ("none", "rules")])
 def test_a_resumed_run_with_gp_equals_an_uninterrupted_one(tmp_path: Path, proposer: str) -> None:
     """It draws by its model from the 11th trial on, some 0.3 s each: few trials, and a stop among them."""
     check_resume(tmp_path / "run", 12, proposer=proposer, sampler="gp", n_init=5, n_step=4, n_total=12)

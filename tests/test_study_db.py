@@ -375,6 +375,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL")
 def test_a_kill_while_it_is_written_leaves_a_whole_one(plain: Path, tmp_path: Path) -> None:
     for moment in range(3):
@@ -422,6 +423,7 @@ def test_what_cannot_be_written_is_said(plain: Path, tmp_path: Path) -> None:
     assert 'Did you mean "optuna"' in str(unknown.exception)
 
 
+@pytest.mark.slow
 def test_a_run_does_without_optunas_library_for_databases() -> None:
     """It takes half a second to load; and who reads runs needs no Optuna at all."""
     code = """
