@@ -18,7 +18,7 @@ from tests import browser as browsers
 from tests.chat_server import ChatServer
 from tests.postgres import PostgresServer, binaries
 
-SLOW_FOLDERS = frozenset({"torture", "fuzz", "packaging"})
+SLOW_FOLDERS = frozenset({"torture", "fuzz"})
 SLOW_FIXTURES = frozenset({"browser", "guide", "postgres"})
 
 

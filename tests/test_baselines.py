@@ -1,13 +1,13 @@
 """The stored baselines belong to the tasks and the best known fronts that they lie beside."""
 
 import runpy
-from pathlib import Path
 
 import pytest
 
 from armwright.baselines import baselines, baselines_of
 from armwright.best_known import best_known_hypervolume
 from armwright.task import builtin_tasks
+from tests import ROOT
 
 
 def test_every_task_has_its_baselines() -> None:
@@ -25,7 +25,6 @@ def test_every_task_has_its_baselines() -> None:
 
 
 def test_the_page_is_the_stored_one() -> None:
-    root = Path(__file__).parents[1]
-    script = runpy.run_path(str(root / "benchmarks" / "baselines.py"))
-    stored = (root / "docs" / "suite.md").read_text(encoding="utf-8")
+    script = runpy.run_path(str(ROOT / "benchmarks" / "baselines.py"))
+    stored = (ROOT / "docs" / "suite.md").read_text(encoding="utf-8")
     assert stored == script["page"](), "python benchmarks/baselines.py makes it anew"

@@ -23,7 +23,8 @@ from armwright.cli import app
 from armwright.experiment.plan import ExperimentPlan, cells_of, load_experiment
 from armwright.space import DesignSpace
 from armwright.task import Task
-from tests.documented import PAGES, ROOT, Block, Command, blocks, code_spans, commands
+from tests import ROOT
+from tests.documented import PAGES, Block, Command, blocks, code_spans, commands
 from tests.robots import robot
 
 # Commands that are not run, by what they match as a whole; the first that matches counts.
@@ -118,7 +119,7 @@ def test_what_is_not_run_is_there_to_be_excused() -> None:
     for pattern in NOT_RUN:
         assert any(re.fullmatch(pattern, command) for command in shown), pattern
     for page, file in PROGRAMS_RUN_IN.items():
-        assert Path(page).name in (Path(__file__).parent / file).read_text(), page
+        assert Path(page).name in next((ROOT / "tests").rglob(file)).read_text(), page
 
 
 def test_what_is_said_in_passing_exists() -> None:

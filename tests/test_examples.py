@@ -15,9 +15,10 @@ from armwright.cli import app
 from armwright.problem import Problem
 from armwright.study import optimize
 from armwright.task import load_task
+from tests import ROOT
 from tests.chat_server import Answer, ChatServer, Request
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = ROOT / "examples"
 
 
 def run(example: str, *options: str) -> str:

@@ -16,8 +16,8 @@ from armwright.experiment.running import run_on_dask
 from armwright.extras import EXTRAS, missing_packages, needed
 from armwright.live import begin_server, serve
 from armwright.urdf.names import find_urdf
+from tests import ROOT
 
-ROOT = Path(__file__).parents[1]
 STATED: dict[str, list[str]] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 
 

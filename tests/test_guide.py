@@ -21,8 +21,9 @@ from armwright.space import DesignSpace
 from armwright.targets import Target
 from armwright.task import Task
 from armwright.workspace import Region
+from tests import ROOT
 from tests.browser import Tab
-from tests.documented import ROOT, code_spans
+from tests.documented import code_spans
 
 KEYS: dict[str, tuple[type[BaseModel], ...]] = {
     "tasks.md": (Task, Target, Region, Box, Sphere, Cylinder, Ground),

@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -13,10 +12,10 @@ import pytest
 import yaml
 
 import armwright as aw
+from tests import ROOT
 from tests.chat_server import ChatServer
 from tests.test_proposal_callback import quiet as quiet
 
-ROOT = Path(__file__).parents[1]
 REGISTRY = ROOT / "optunahub" / "package"
 NAME = "callbacks/armwright_proposals"
 FOLDER = REGISTRY / NAME

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import armwright as aw
+from tests import ROOT
 
 
 def test_all_is_honest() -> None:
@@ -29,7 +30,7 @@ def test_type_checkers_see_the_same_names() -> None:
 
 
 def test_the_python_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    readme = (ROOT / "README.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
     names: dict[str, Any] = {}
     exec(code, names)

@@ -28,11 +28,11 @@ from armwright.history import History
 from armwright.problem import Problem
 from armwright.space import DesignSpace, load_space
 from armwright.task import Task, load_task
+from tests import ROOT
 from tests.fuzz.mutation import changed
 
 LONGEST_REFUSAL = 3000  # characters
 MOST_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and is no other code
-ROOT = Path(__file__).parents[2]
 
 
 class DefectError(AssertionError):
