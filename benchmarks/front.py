@@ -58,7 +58,9 @@ def main() -> None:
 def compare(name: str, budgets: list[int], options: argparse.Namespace) -> None:
     """One task's lines: ours, then pymoo's."""
     problem = Problem(builtin_tasks()[name])
-    reference_point = problem.reference_point or default_reference_point(problem.evaluate(problem.space.sample(10, 0)))
+    reference_point = problem.reference_point or default_reference_point(
+        problem.evaluate(problem.space.sample(10, 0)).values
+    )
     known = known_front(problem)
     assert known is not None
     best = hypervolume(known.values, reference_point)
@@ -87,7 +89,7 @@ def ours(problem: Problem, reference_point: tuple[float, ...], seed: int, budget
     def evaluate(rows: Array) -> Array:
         nonlocal kernels
         started = time.perf_counter()
-        values = problem.evaluate_matrix(rows)
+        values = problem.evaluate_matrix(rows).values
         kernels += time.perf_counter() - started
         return values
 

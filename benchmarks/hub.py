@@ -114,7 +114,7 @@ def problem_of(name: str, registry: Path) -> tuple[dict[str, BaseDistribution], 
         return (
             distributions(arms.space),
             ["minimize"] * 2,
-            lambda params: arms.evaluate([arms.space.design(params)])[0].tolist(),
+            lambda params: arms.evaluate([arms.space.design(params)]).values[0].tolist(),
         )
     made = local(f"benchmarks/{package}", registry).Problem(**arguments)
     return made.search_space, [direction.name.lower() for direction in made.directions], made.evaluate

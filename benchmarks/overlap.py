@@ -12,9 +12,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from armwright.arrays import Array
 from armwright.parameters import Design
-from armwright.problem import Problem
+from armwright.problem import Outcomes, Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.study import Run, optimize
 from armwright.task import load_task
@@ -28,7 +27,7 @@ GOAL = 1.1
 class SlowProblem(Problem):
     """Evaluates like a simulation that takes its time."""
 
-    def evaluate(self, designs: Sequence[Design]) -> Array:
+    def evaluate(self, designs: Sequence[Design]) -> Outcomes:
         time.sleep(EVALUATION * len(designs))
         return super().evaluate(designs)
 

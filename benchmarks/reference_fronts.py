@@ -56,7 +56,10 @@ def make(problem: Problem) -> None:
     known = known_front(problem)
     if known is not None:
         # Values of another machine are not taken on trust.
-        take("known before, by such searches", (problem.space.matrix(known.designs), problem.evaluate(known.designs)))
+        take(
+            "known before, by such searches",
+            (problem.space.matrix(known.designs), problem.evaluate(known.designs).values),
+        )
     for seed in SEEDS:
         take(f"search, seed {seed}, {EVALUATIONS:,} evaluations", searched(problem, reference, seed))
     take(f"search within each sequence, {PER_SEQUENCE:,} evaluations each", by_sequence(problem, reference))
@@ -66,7 +69,7 @@ def make(problem: Problem) -> None:
 
     # Rounded first, so that the values are those of the numbers in the file.
     everything = np.round(np.vstack(rows), DECIMALS)
-    worth = problem.evaluate_matrix(everything)
+    worth = problem.evaluate_matrix(everything).values
     on_front = front(worth, np.asarray(reference))
     kept = on_front[thinned(worth[on_front], np.asarray(reference), MOST)]
     kept = kept[np.argsort(worth[kept, 0])]
@@ -77,7 +80,7 @@ def make(problem: Problem) -> None:
 
 
 def searched(problem: Problem, reference: tuple[float, ...], seed: int) -> tuple[Array, Array]:
-    search = FrontSearch(problem.space.parameters, problem.evaluate_matrix, reference, seed)
+    search = FrontSearch(problem.space.parameters, lambda rows: problem.evaluate_matrix(rows).values, reference, seed)
     while search.evaluations < EVALUATIONS:
         search.step()
     return search.rows, search.values
@@ -97,7 +100,7 @@ def by_sequence(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, 
             return full
 
         search = FrontSearch(
-            [space.parameters[i] for i in real], lambda some: problem.evaluate_matrix(whole(some)), reference, 0
+            [space.parameters[i] for i in real], lambda some: problem.evaluate_matrix(whole(some)).values, reference, 0
         )
         while search.evaluations < PER_SEQUENCE:
             search.step()
@@ -108,7 +111,7 @@ def by_sequence(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, 
 
 def reference_point(problem: Problem) -> tuple[float, ...]:
     """The task's, else the one of ten random designs: it only says which part of the front is worth most."""
-    return problem.reference_point or default_reference_point(problem.evaluate(problem.space.sample(10, seed=0)))
+    return problem.reference_point or default_reference_point(problem.evaluate(problem.space.sample(10, seed=0)).values)
 
 
 def write(problem: Problem, rows: Array, values: Array, reference: tuple[float, ...], words: list[str]) -> None:

@@ -110,7 +110,7 @@ def bare(kind: str, n: int, folder: Path) -> list[Look]:
         alone.tell(asked, trial.values)
         if trial.same_as is None:
             started = time.process_time()
-            problem.judge([trial.design])
+            problem.evaluate([trial.design])
             evaluating += time.process_time() - started
         watcher.see(trial.number, evaluating)
     return watcher.looks

@@ -23,12 +23,13 @@ from armwright.workspace import points_of
 class FixedProblem(Problem):
     """The tip comes a part of the way to each target; joint j turns by j steps; torques fall from base to tip."""
 
-    def evaluation_of_rows(self, rows: Array) -> Evaluation:
+    def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
+        rows = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
         targets = self.task.points
-        designs = self.space.designs(rows)
-        n, t, d = len(designs), len(targets), self.space.most_joints
-        reach = np.array([sum(design.links) for design in designs])
-        base = np.array([design.origin for design in designs]).reshape(n, 3)
+        built = self.space.designs(rows)
+        n, t, d = len(built), len(targets), self.space.most_joints
+        reach = np.array([sum(design.links) for design in built])
+        base = np.array([design.origin for design in built]).reshape(n, 3)
         away = targets[None] - base[:, None]  # (N, T, 3)
         distance = np.linalg.norm(away, axis=-1)
         part = np.minimum(1.0, reach[:, None] / np.maximum(distance, 1e-9))
@@ -82,7 +83,8 @@ THREE_OBJECTIVES = (*PAPER_OBJECTIVES, LENGTH)
 def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Sequence[FinishedTrial] = ()) -> History:
     """`n` designs at random, then the given proposals (their numbers and values are filled in)."""
     designs = [*problem.space.sample(n, seed=1), *(trial.design for trial in proposals)]
-    values, broken = problem.judge(designs)
+    outcomes = problem.evaluate(designs)
+    values, violations = outcomes.values, outcomes.violations
     reference = problem.reference_point
     if reference is None and len(designs) >= n_init and values.shape[1] == 2:
         reference = default_reference_point(values[:n_init])
@@ -92,7 +94,7 @@ def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Se
             "random" if number < n_init else "bbo",
             design,
             tuple(row),
-            constraints=tuple(broken[number].tolist()),
+            constraints=tuple(violations[number].tolist()),
         )
         for number, (design, row) in enumerate(zip(designs, values.tolist(), strict=True))
     ]

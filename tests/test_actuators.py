@@ -64,7 +64,7 @@ def test_gravity_and_dynamics_are_pinocchio_s_and_mujoco_s() -> None:
     rng = np.random.default_rng(0)
     problem = Problem(TASK.model_copy(update={"payload": 0.0}), SPACE)
     designs = SPACE.sample(20, 3)
-    evaluation = problem.evaluation(designs)
+    evaluation = problem.physics(designs)
     for row, design in enumerate(designs):
         arm = SPACE.arm(design)
         reference, data = pinocchio_model(with_motors_as_links(arm))
@@ -86,7 +86,7 @@ def test_the_first_actuator_stands_with_the_base() -> None:
     design = SPACE.sample(1, 0)[0]
     swapped = [SPACE.design({**design.params, "motor_1": name}) for name in ("big", "mid", "small")]
     objectives = named_objectives(["peak_torque", "mass", "price"])
-    values = Problem(TASK, SPACE, objectives=objectives).evaluate(swapped)
+    values = Problem(TASK, SPACE, objectives=objectives).evaluate(swapped).values
     assert np.ptp(values[:, 0]) == 0.0
     assert np.diff(values[:, 1]) == pytest.approx([0.082 - 0.165, 0.0572 - 0.082], abs=1e-6)
     assert np.diff(values[:, 2]).tolist() == [-150.0, -200.0]
@@ -95,9 +95,9 @@ def test_the_first_actuator_stands_with_the_base() -> None:
 def test_torque_use_is_the_worst_share_of_the_allowed_torque() -> None:
     problem = Problem(TASK, SPACE, objectives=named_objectives(["torque_utilisation"]))
     designs = SPACE.sample(30, 5)
-    torques = np.abs(problem.evaluation(designs).joint_torques)
+    torques = np.abs(problem.physics(designs).joint_torques)
     allowed = {"big": 5.3, "mid": 2.05, "small": 0.75}
-    for use, row, design in zip(problem.evaluate(designs)[:, 0], torques, designs, strict=True):
+    for use, row, design in zip(problem.evaluate(designs).values[:, 0], torques, designs, strict=True):
         shares = [torque / allowed[name] for torque, name in zip(row.max(axis=0), design.motors, strict=True)]
         assert use == pytest.approx(max(shares))
 
@@ -161,7 +161,7 @@ def test_actuators_through_the_whole_house(tmp_path: Path) -> None:
     run = optimize(Problem(task, SPACE), proposer="rules", n_init=6, n_step=3, n_total=18, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")
     assert config.space == SPACE
-    assert np.array_equal(history.problem.evaluate([t.design for t in history]), history.values)
+    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
     assert {len(trial.design.motors) for trial in run.trials} == {4}
     proposed = [trial.design for trial in run.trials if trial.source == "rules"]
     assert proposed[0].motors == ("big", "big", "mid", "small")

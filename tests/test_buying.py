@@ -83,7 +83,7 @@ def test_a_design_that_is_bought_has_the_values_of_one_that_is_built(run: Path, 
 def test_numbers_are_those_of_the_arm_where_it_stands(compared: ArmComparison) -> None:
     """By the formulas of the objectives, from postures, masses of the URDF and the task's payloads."""
     for arm, placed in zip(compared.arms, compared.placed, strict=True):
-        evaluation = compared.problem.evaluate_arrays(stack_arms([placed]))
+        evaluation = compared.problem.physics_of_arms(stack_arms([placed]))
         torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
         efforts = [joint.effort for joint in placed.joints]
         assert arm.values == (arm.measures["position_error"], arm.measures["torque"])
@@ -94,7 +94,7 @@ def test_numbers_are_those_of_the_arm_where_it_stands(compared: ArmComparison) -
         assert arm.measures["peak_torque"] == pytest.approx(np.abs(torque).max())
         assert arm.measures["torque_utilisation"] == pytest.approx((np.abs(torque) / efforts).max())
         without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
-        lighter = without.evaluate_arrays(stack_arms([placed])).joint_torques[0]
+        lighter = without.physics_of_arms(stack_arms([placed])).joint_torques[0]
         assert not np.allclose(lighter[:2], torque[:2])
         assert np.array_equal(lighter[2], torque[2])
     assert [arm.name for arm in compared.arms] == ["ur5_robot", "panda"]
@@ -114,7 +114,7 @@ def test_the_base_is_searched_within_the_spaces_ranges(compared: ArmComparison) 
         assert np.subtract(first, arm.base) == pytest.approx(bought.base)
         others = rng.uniform((-0.5, -1.0, 0.0), (0.5, 1.0, 0.0), (1000, 3))
         moved = [replace(bought, base=tuple(np.add(bought.base, place).tolist())) for place in others]
-        evaluation = compared.problem.evaluate_arrays(stack_arms(moved))
+        evaluation = compared.problem.physics_of_arms(stack_arms(moved))
         missed = np.maximum(evaluation.position_error - 1e-3, 0.0).sum(axis=1)
         torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
         assert arm.measures["unreached_targets"] == 0

@@ -30,7 +30,7 @@ def values(problem: Problem, designs: list[Design], updates: int = 3) -> np.ndar
     evaluation = Evaluation(
         arms, points, problem.task.payloads, solved.q, solved.reached, error, angle, solved.torque, goals
     )
-    return problem.values(evaluation)
+    return problem.outcomes(evaluation).values
 
 
 def same_pair(space: DesignSpace, rng: np.random.Generator, kind: str) -> tuple[Design, Design]:

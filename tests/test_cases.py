@@ -34,13 +34,14 @@ def alone() -> list[Task]:
 def test_the_worst_of_all_cases_counts() -> None:
     problem = Problem(ROBUST, objectives=named_objectives(NAMES))
     rows = problem.space.matrix(problem.space.sample(60, 1))
-    each = [Problem(task, objectives=named_objectives(NAMES)).judge_matrix(rows) for task in alone()]
-    values, broken = problem.judge_matrix(rows)
-    assert np.array_equal(values, np.max([v for v, _ in each], axis=0))
-    assert np.array_equal(broken, np.max([b for _, b in each], axis=0))
+    each = [Problem(task, objectives=named_objectives(NAMES)).evaluate_matrix(rows) for task in alone()]
+    outcomes = problem.evaluate_matrix(rows)
+    values = outcomes.values
+    assert np.array_equal(values, np.max([case.values for case in each], axis=0))
+    assert np.array_equal(outcomes.violations, np.max([case.violations for case in each], axis=0))
     designs = problem.space.designs(rows)
-    assert np.array_equal(problem.judge(designs)[0], values)
-    assert np.any(values > each[0][0])
+    assert np.array_equal(problem.evaluate(designs).values, values)
+    assert np.any(values > each[0].values)
     exact = verify(problem, designs[:5], values[:5], (5.0, 5.0, 1.0)).exact
     assert np.all(np.abs(np.median(exact / values[:5]) - 1.0) < 0.05)  # float64 takes other ways at times
 
@@ -49,7 +50,7 @@ def test_it_goes_with_a_workshop_s_tolerance() -> None:
     problem = Problem(ROBUST, tolerance=1e-3)
     designs = problem.space.sample(5, 2)
     both, one, other = (
-        candidate.evaluate(designs) for candidate in (problem, Problem(ROBUST), Problem(PLAIN, tolerance=1e-3))
+        candidate.evaluate(designs).values for candidate in (problem, Problem(ROBUST), Problem(PLAIN, tolerance=1e-3))
     )
     assert np.all(both >= np.maximum(one, other))
 
@@ -62,7 +63,7 @@ def test_a_run_keeps_it(tmp_path: Path) -> None:
     run = optimize(Problem(load_task(file)), proposer="rules", n_total=10, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")
     assert config.task.target_noise == 0.01
-    assert np.array_equal(history.problem.evaluate([t.design for t in history]), history.values)
+    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
     assert run.summary["n_trials"] == 20
 
 

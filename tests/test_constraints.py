@@ -21,10 +21,17 @@ from armwright.constraints import QUANTITIES, Constraint, read_constraints
 from armwright.credit import credit_by_source
 from armwright.decision import numbers_of, pick
 from armwright.exceptions import FailureError, RunConflictError, RunFolderError, SettingsError, TaskError
-from armwright.feasibility import counted, feasible_mask, ranked, violation
 from armwright.front import find_front
 from armwright.history import FinishedTrial, History, found_reference_point
-from armwright.pareto import default_reference_point, front_numbers, hypervolume
+from armwright.pareto import (
+    default_reference_point,
+    feasible_mask,
+    front_numbers,
+    hypervolume,
+    masked_objectives,
+    penalised_objectives,
+    total_violation,
+)
 from armwright.polish import polish_run
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -114,8 +121,9 @@ def test_values_are_how_far_a_bound_is_broken() -> None:
     """Against plain formulas of the physics; of a bound of 0, in the quantity's own unit."""
     problem = Problem(task("worst_error <= 0.4", "length >= 0.5", "unreached_targets <= 0", "peak_torque <= 0.06"))
     designs = SPACE.sample(50, 3)
-    values, broken = problem.judge(designs)
-    evaluation = problem.evaluation(designs)
+    outcomes = problem.evaluate(designs)
+    values, broken = outcomes.values, outcomes.violations
+    evaluation = problem.physics(designs)
     lengths = np.array([sum(design.links) for design in designs])
     missed = np.sum(np.linalg.norm(evaluation.reached - evaluation.targets, axis=-1) >= 1e-3, axis=1)
     peak = np.abs(evaluation.joint_torques).max(axis=(1, 2))
@@ -126,7 +134,7 @@ def test_values_are_how_far_a_bound_is_broken() -> None:
         (peak - 0.06) / 0.06,
     ]
     assert broken == pytest.approx(np.column_stack(expected), rel=1e-5, abs=1e-6)
-    assert np.array_equal(values, Problem(task()).evaluate(designs))
+    assert np.array_equal(values, Problem(task()).evaluate(designs).values)
     measured = [problem.constraints[1].measured(b) for b in broken[:, 1].tolist()]
     assert measured == pytest.approx(lengths, rel=1e-6)
 
@@ -136,25 +144,25 @@ def test_rows_and_designs_have_the_same_constraints_and_the_worst_copy_counts() 
     exact = Problem(task(*BOUNDS))
     designs = SPACE.sample(20, 5)
     rows = SPACE.matrix(designs)
-    copies = [exact.judge_matrix(r)[1] for r in (rows, *moved(SPACE, rows))]
-    assert np.array_equal(problem.judge_matrix(rows)[1], np.max(copies, axis=0))
-    assert np.array_equal(problem.judge(designs)[1], np.max(copies, axis=0))
-    assert np.array_equal(exact.judge(designs)[1], exact.judge_matrix(rows)[1])
+    copies = [exact.evaluate_matrix(r).violations for r in (rows, *moved(SPACE, rows))]
+    assert np.array_equal(problem.evaluate_matrix(rows).violations, np.max(copies, axis=0))
+    assert np.array_equal(problem.evaluate(designs).violations, np.max(copies, axis=0))
+    assert np.array_equal(exact.evaluate(designs).violations, exact.evaluate_matrix(rows).violations)
 
 
 def test_a_number_that_is_not_finite_is_no_constraint() -> None:
     problem = Problem(task("mass <= 3"))
     lost = replace(problem.constraints[0].quantity, each=lambda evaluation: np.full(len(evaluation), np.nan))  # type: ignore[type-var]
     object.__setattr__(problem, "constraints", (Constraint(lost, "<=", 3.0),))
-    with pytest.raises(SettingsError, match=r"mass <= 3.* is nan for a design"):
-        problem.judge(SPACE.sample(1, 0))
+    with pytest.raises(SettingsError, match=r"mass <= 3.* of a design is nan"):
+        problem.evaluate(SPACE.sample(1, 0))
 
 
 @EXAMPLES
 @given(VALUES, st.data())
 def test_ranked_values_dominate_as_pymoo_says_of_constraints(values: np.ndarray, data: st.DataObject) -> None:
     broken = data.draw(arrays(float, (len(values), 2), elements=st.integers(-2, 2).map(lambda i: i / 3)))
-    ranks, total = ranked(values, broken), violation(broken)
+    ranks, total = penalised_objectives(values, broken), total_violation(broken)
     for a, b in product(range(len(values)), repeat=2):
         if total[a] == total[b] > 0.0:
             continue  # where pymoo looks at the objectives; Deb's rules call neither better
@@ -187,7 +195,7 @@ def test_a_looser_bound_never_takes_hypervolume_away(values: np.ndarray, data: s
     broken = data.draw(arrays(float, (len(values), 1), elements=st.floats(-1.0, 1.0)))
     before = -1.0
     for loosened in (0.0, 0.1, 0.5, 2.0):
-        volume = hypervolume(counted(values, broken - loosened), (10.0, 10.0))
+        volume = hypervolume(masked_objectives(values, broken - loosened), (10.0, 10.0))
         assert volume >= before
         before = volume
     assert before == hypervolume(values, (10.0, 10.0))
@@ -199,9 +207,10 @@ def test_a_looser_bound_of_a_task_never_takes_hypervolume_away() -> None:
     volumes = []
     for bound in (0.1, 0.3, 0.6, 5.0):
         problem = Problem(task(f"worst_error <= {bound}"))
-        volumes.append(hypervolume(counted(*problem.judge(designs)), (5.0, 5.0)))
+        outcomes = problem.evaluate(designs)
+        volumes.append(hypervolume(masked_objectives(outcomes.values, outcomes.violations), (5.0, 5.0)))
     assert volumes == sorted(volumes)
-    assert volumes[0] < volumes[-1] == hypervolume(Problem(task()).evaluate(designs), (5.0, 5.0))
+    assert volumes[0] < volumes[-1] == hypervolume(Problem(task()).evaluate(designs).values, (5.0, 5.0))
 
 
 def test_nothing_of_a_task_without_constraints_tells_of_any(tmp_path: Path) -> None:
@@ -229,14 +238,14 @@ def test_black_boxes_prefer_feasible_designs(sampler: str) -> None:
     for problem in (bound, Problem(task())):
         runs = [optimize(problem, proposer="none", sampler=sampler, n_total=100, seed=seed) for seed in range(3)]
         designs = [trial.design for run in runs for trial in run.trials[10:]]
-        shares.append(feasible_mask(bound.judge(designs)[1]).mean())
+        shares.append(feasible_mask(bound.evaluate(designs).violations).mean())
     assert shares[0] > 1.2 * shares[1]
 
 
 def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
     run = optimize(problem, proposer="rules", n_total=60, seed=1, out=tmp_path / "run")
-    _, broken = problem.judge([trial.design for trial in run.trials])
+    broken = problem.evaluate([trial.design for trial in run.trials]).violations
     assert np.array_equal(run.history.broken, broken)
     feasible = np.all(broken <= 0.0, axis=1)
     assert 0 < feasible.sum() < len(feasible)
@@ -262,14 +271,14 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     solid = summary["verification"]["solid_numbers"]
     designs = [history.trials[number].design for number in solid]
     rows = SPACE.matrix(designs)
-    off = np.max([problem.judge_matrix(copies)[1] for copies in moved(SPACE, rows)], axis=0)
+    off = np.max([problem.evaluate_matrix(copies).violations for copies in moved(SPACE, rows)], axis=0)
     assert np.all(off <= 0.06)  # 5 % in float64
     # what is polished stays feasible
     polished = polish_run(tmp_path / "run", 240)
     assert polished.added
     assert all(trial.is_feasible for trial in polished.history.trials[len(run.trials) :])
     refined = [trial.design for trial in polished.history]
-    assert np.array_equal(polished.history.broken, problem.judge(refined)[1])
+    assert np.array_equal(polished.history.broken, problem.evaluate(refined).violations)
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
@@ -337,7 +346,7 @@ def test_where_nothing_is_feasible_yet_the_nearest_is_told(tmp_path: Path, capsy
     run = optimize(problem, proposer="rules", n_total=12, polish_every=4, seed=1, out=tmp_path / "run")
     assert run.front == []
     assert run.hypervolume.tolist() == [0.0] * 12
-    _, broken = problem.judge([trial.design for trial in run.trials])
+    broken = problem.evaluate([trial.design for trial in run.trials]).violations
     nearest = int(np.argmin(np.maximum(broken, 0.0).sum(axis=1)))
     assert run.summary["feasibility"]["nearest"]["number"] == nearest
     assert run.summary["front_size"] == 0
@@ -365,7 +374,8 @@ def test_the_reference_point_comes_from_feasible_designs_where_these_have_a_fron
 def test_a_study_of_ones_own_says_how_far_its_trials_break_constraints() -> None:
     problem = Problem(task(*BOUNDS))
     designs = SPACE.sample(6, 0)
-    values, broken = problem.judge(designs)
+    outcomes = problem.evaluate(designs)
+    values, broken = outcomes.values, outcomes.violations
     box = BlackBox(SPACE, "random", 0, constraints=[constraint.words for constraint in problem.constraints])
     rows = zip(designs, values.tolist(), broken.tolist(), strict=True)
     trials = [FinishedTrial(i, "bbo", d, tuple(v), constraints=tuple(b)) for i, (d, v, b) in enumerate(rows)]
@@ -381,7 +391,7 @@ def test_a_search_for_the_front_keeps_the_bounds_and_goes_on_to_the_bit(tmp_path
     problem = Problem(task(*BOUNDS))
     whole = find_front(problem, budget=12_000, stop_at_stall=False, out=tmp_path / "whole")
     assert np.all(whole.history.feasible)
-    assert np.array_equal(whole.history.broken, problem.judge([m.design for m in whole.history.trials])[1])
+    assert np.array_equal(whole.history.broken, problem.evaluate([m.design for m in whole.history.trials]).violations)
     assert 0 < whole.summary["search"]["infeasible"] < whole.summary["search"]["evaluations"]
     free = find_front(Problem(task()), budget=12_000, stop_at_stall=False)
     assert 0.0 < whole.summary["hypervolume"]["final"] < free.summary["hypervolume"]["final"]
@@ -416,8 +426,9 @@ def test_pymoos_constrained_nsga2_finds_no_front_that_ours_misses_by_much() -> N
 
     class Arms(PymooProblem):
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
-            out["F"], out["G"] = problem.judge_matrix(np.where(categorical, np.floor(x), x))
-            found.append(counted(out["F"], out["G"]))
+            outcomes = problem.evaluate_matrix(np.where(categorical, np.floor(x), x))
+            out["F"], out["G"] = outcomes.values, outcomes.violations
+            found.append(masked_objectives(outcomes.values, outcomes.violations))
 
     theirs, ours = [], []
     for seed in range(3):
@@ -425,7 +436,7 @@ def test_pymoos_constrained_nsga2_finds_no_front_that_ours_misses_by_much() -> N
         arms = Arms(n_var=len(low), n_obj=2, n_ieq_constr=len(BOUNDS), xl=low, xu=high)
         minimize(arms, NSGA2(pop_size=100), ("n_eval", 40_000), seed=seed)
         theirs.append(hypervolume(np.vstack(found), (5.0, 5.0)))
-        search = FrontSearch(SPACE.parameters, problem.ranked_matrix, (5.0, 5.0), seed)
+        search = FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).penalised, (5.0, 5.0), seed)
         while search.evaluations < 40_000:
             search.step()
         ours.append(search.hypervolume)
@@ -443,4 +454,4 @@ def test_optuna_itself_calls_feasible_what_is_not_above_0() -> None:
     values, broken = np.array([[1.0, 2.0], [2.0, 1.0], [0.5, 0.5]]), np.array([[0.0], [-1.0], [1e-12]])
     for row, by in zip(values, broken[:, 0], strict=True):
         study.add_trial(optuna.create_trial(values=row.tolist(), constraints={"b": float(by)}))
-    assert [trial.number for trial in study.best_trials] == front_numbers(counted(values, broken))
+    assert [trial.number for trial in study.best_trials] == front_numbers(masked_objectives(values, broken))

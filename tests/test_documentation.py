@@ -267,7 +267,7 @@ def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
         file.write_text(named + some + block.text)
         space = DesignSpace(actuators=("XL430-W250",), joints=3)  # type: ignore[arg-type]
         problem = aw.Problem(aw.load_task("shown.yaml"), space)
-        assert len(problem.evaluate(problem.space.sample(2, 0))) == 2
+        assert len(problem.evaluate(problem.space.sample(2, 0)).values) == 2
     else:
         file.write_text(block.text)
         assert aw.load_space("shown.yaml").parameters

@@ -84,7 +84,7 @@ def test_words_become_a_task_and_a_space(
     assert (draft.task.payload, draft.task.objectives) == (0.5, tuple(task["objectives"]))
     assert draft.space == aw.load_space(tmp_path / "wall-space.yaml")
     assert [record.name for record in draft.space.actuators] == space["actuators"]
-    assert draft.problem.evaluate(draft.problem.space.sample(2, 0)).shape == (2, 3)
+    assert draft.problem.evaluate(draft.problem.space.sample(2, 0)).values.shape == (2, 3)
     assert draft.assumed == (
         "the wall stands 0.6 m in front of the cart",
         "its lower edge is 0.4 m above the floor, as a skirting board is lower",

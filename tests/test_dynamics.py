@@ -24,7 +24,7 @@ from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.dynamics import inverse_dynamics
 from armwright.kinematics.jacobian import frames_of, jacobian_rate, jacobians
 from armwright.moves import Moves, lines_of, moments, timing_of
-from armwright.objectives import OF_TIME, named_objectives
+from armwright.objectives import OF_MOVES, OF_TIME, named_objectives
 from armwright.problem import Problem
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
@@ -328,12 +328,12 @@ def test_constraints_bound_them() -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"]})
     names = ("dynamic_torque", "dynamic_utilisation", "speed_utilisation")
     designs = space.sample(30, 0)
-    values = Problem(task(move_time=0.5, objectives=names), space).evaluate(designs)
+    values = Problem(task(move_time=0.5, objectives=names), space).evaluate(designs).values
     sentences = [f"{name} <= {np.median(column):.6g}" for name, column in zip(names, values.T, strict=True)]
     problem = Problem(task(move_time=0.5, constraints=sentences), space)
-    broken = problem.judge(designs)[1]
-    assert problem.heeds_moves
-    assert problem.heeds_time
+    broken = problem.evaluate(designs).violations
+    assert problem.uses(*OF_MOVES)
+    assert problem.uses(*OF_TIME)
     assert np.array_equal((broken <= 0.0).sum(axis=0), [15, 15, 15])
     assert np.array_equal(broken > 0.0, values > np.median(values, axis=0))
 

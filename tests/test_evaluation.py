@@ -73,13 +73,13 @@ def test_objectives_are_the_sums_of_the_method() -> None:
     """E_pos = Σ |p - target| [m], E_torque = 40 Σ |τ|; `each` are their shares per target."""
     problem = Problem(load_task("target-1"))
     designs = problem.space.sample(20, 36)
-    result = problem.evaluation(designs)
-    values = problem.values(result)
+    result = problem.physics(designs)
+    values = problem.outcomes(result).values
     assert TORQUE_SCALE == 40.0
     assert values.shape == (20, 2)
     assert np.allclose(values[:, 0], np.linalg.norm(result.reached - problem.task.points, axis=2).sum(axis=1))
     assert np.allclose(values[:, 1], 40.0 * np.sqrt((result.joint_torques**2).sum(axis=2)).sum(axis=1))
-    assert np.array_equal(problem.evaluate(designs), values)
+    assert np.array_equal(problem.evaluate(designs).values, values)
     assert all(objective.each(result).shape == (20, 8) for objective in PAPER_OBJECTIVES)
 
 
@@ -110,4 +110,4 @@ def test_designs_as_rows_give_the_same_bits(joints: int, mass: dict[str, Any]) -
     matrix = space.matrix(designs)
     assert matrix.shape == (200, 2 * joints + 3)
     assert space.designs(matrix) == designs
-    assert problem.evaluate_matrix(matrix).tolist() == problem.evaluate(designs).tolist()
+    assert problem.evaluate_matrix(matrix).values.tolist() == problem.evaluate(designs).values.tolist()

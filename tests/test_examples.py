@@ -122,7 +122,7 @@ def test_the_mujoco_example_follows_our_postures() -> None:
     follow = aw.load_evaluator(f"{EXAMPLES}/mujoco_simulation.py:follow")
     problem = aw.Problem(aw.load_task("target-1"))
     designs = problem.space.sample(3, 0)
-    errors = problem.evaluate(designs)[:, 0]
+    errors = problem.evaluate(designs).values[:, 0]
     for design, error in zip(designs, errors, strict=True):
         distance, work = follow(problem.arm(design), problem.task)
         assert distance == pytest.approx(error, abs=0.02)  # m, of six to nine targets together

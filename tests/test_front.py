@@ -72,7 +72,7 @@ def test_the_trials_are_the_front(done: FrontRun) -> None:
     assert front_mask(values).all()
     assert np.all(np.diff(values[:, 0]) > 0)
     assert np.all(values < 5.0)
-    assert np.array_equal(PROBLEM.evaluate([trial.design for trial in done.history]), values)
+    assert np.array_equal(PROBLEM.evaluate([trial.design for trial in done.history]).values, values)
     assert {trial.source for trial in done.history} == {"front"}
     config, read = read_run(done.folder)
     assert config == done.config
@@ -218,7 +218,11 @@ def test_a_good_beginning_is_no_stall() -> None:
     known = known_front(PROBLEM)
     assert known is not None
     search = FrontSearch(
-        PROBLEM.space.parameters, PROBLEM.evaluate_matrix, (5.0, 5.0), 0, PROBLEM.space.matrix(known.designs[::4])
+        PROBLEM.space.parameters,
+        lambda rows: PROBLEM.evaluate_matrix(rows).values,
+        (5.0, 5.0),
+        0,
+        PROBLEM.space.matrix(known.designs[::4]),
     )
     while search.evaluations < 2000:
         search.step()
@@ -274,7 +278,7 @@ def test_best_known_fronts_are_fronts_of_their_tasks(name: str) -> None:
     known = known_front(problem)
     assert known is not None
     assert front_mask(known.values).all()
-    values = problem.evaluate(known.designs)
+    values = problem.evaluate(known.designs).values
     assert np.mean(np.abs(values - known.values).max(axis=1) < 1e-3) > 0.7
 
 

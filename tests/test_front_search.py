@@ -233,9 +233,11 @@ def test_numbers_beyond_a_range_are_reflected_into_it():
 
 def test_arms_are_found_far_better_than_at_random():
     problem = Problem(load_task("target-1"))
-    search = stepped(FrontSearch(SPACE.parameters, problem.evaluate_matrix, (5.0, 5.0), seed=0), 8)
+    search = stepped(
+        FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed=0), 8
+    )
     columns = Columns(SPACE.parameters)
-    random = problem.evaluate_matrix(columns.random(search.evaluations, np.random.default_rng(0)))
+    random = problem.evaluate_matrix(columns.random(search.evaluations, np.random.default_rng(0))).values
     assert search.hypervolume > 1.1 * hypervolume(random, (5.0, 5.0))
 
 
@@ -251,7 +253,7 @@ def test_pymoo_s_nsga2_finds_no_more_on_average_over_five_seeds():
 
     class Arms(PymooProblem):
         def _evaluate(self, x, out, *args, **kwargs):
-            out["F"] = problem.evaluate_matrix(np.where(categorical, np.floor(x), x))
+            out["F"] = problem.evaluate_matrix(np.where(categorical, np.floor(x), x)).values
             found.append(out["F"])
 
     theirs, ours = [], []
@@ -261,7 +263,7 @@ def test_pymoo_s_nsga2_finds_no_more_on_average_over_five_seeds():
         arms = Arms(n_var=len(bounds), n_obj=2, xl=low, xu=high)
         minimize(arms, NSGA2(pop_size=100), ("n_eval", 20_000), seed=seed)
         theirs.append(hypervolume(np.vstack(found), (5.0, 5.0)))
-        search = FrontSearch(SPACE.parameters, problem.evaluate_matrix, (5.0, 5.0), seed)
+        search = FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed)
         while search.evaluations < 20_000:
             search.step()
         ours.append(search.hypervolume)

@@ -41,8 +41,8 @@ def test_objectives_are_those_that_the_function_names() -> None:
     ]
     designs = SPACE.sample(4, 0)
     ours = aw.Problem(WHOLE, SPACE, objectives=(LENGTH,))
-    assert problem.evaluate(designs)[:, 0] == pytest.approx(ours.evaluate(designs)[:, 0], abs=1e-9)
-    assert problem.judge_one(designs[1]).values == tuple(problem.evaluate(designs)[1])
+    assert problem.evaluate(designs).values[:, 0] == pytest.approx(ours.evaluate(designs).values[:, 0], abs=1e-9)
+    assert problem.evaluate([designs[1]])[0] == problem.evaluate(designs)[1]
 
 
 def test_beside_our_objectives_and_constraints() -> None:
@@ -51,9 +51,10 @@ def test_beside_our_objectives_and_constraints() -> None:
     problem = aw.Problem(task, SPACE, objectives=(POSITION_ERROR, reach), evaluator=measured)
     plain = aw.Problem(task, SPACE)
     designs = SPACE.sample(5, 1)
-    values, broken = problem.judge(designs)
-    assert values[:, 0].tolist() == plain.judge(designs)[0][:, 0].tolist()
-    assert broken.tolist() == plain.judge(designs)[1].tolist()
+    outcomes = problem.evaluate(designs)
+    values, broken = outcomes.values, outcomes.violations
+    assert values[:, 0].tolist() == plain.evaluate(designs).values[:, 0].tolist()
+    assert broken.tolist() == plain.evaluate(designs).violations.tolist()
     assert values[:, 1] == pytest.approx([sum(link.length for link in problem.arm(d).links) for d in designs])
 
 
@@ -104,11 +105,11 @@ def test_one_number_needs_no_tuple() -> None:
 def test_a_function_that_fails_counts_the_worst_where_that_is_stated() -> None:
     design = SPACE.sample(1, 0)[0]
     careful = aw.evaluator("energy [J]", worst=[50])(raising(OSError("no licence")).measure)
-    judged = aw.Problem(WHOLE, SPACE, evaluator=careful).judge_one(design)
-    assert judged.values == (50.0,)
-    assert "OSError: no licence" in judged.failure
+    outcome = aw.Problem(WHOLE, SPACE, evaluator=careful).evaluate([design])[0]
+    assert outcome.values == (50.0,)
+    assert "OSError: no licence" in outcome.failure
     with pytest.raises(EvaluatorError, match="no licence"):
-        aw.Problem(WHOLE, SPACE, evaluator=raising(OSError("no licence"))).judge_one(design)
+        aw.Problem(WHOLE, SPACE, evaluator=raising(OSError("no licence"))).evaluate([design])
 
 
 @pytest.mark.parametrize(

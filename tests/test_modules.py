@@ -256,6 +256,6 @@ def test_a_built_in_space_goes_by_its_name() -> None:
 def test_all_of_it_is_searched() -> None:
     problem = Problem(load_task("slideopt-arm"), load_space("slideopt"))
     rows = problem.space.matrix(problem.space.sample(200, 0))
-    values = problem.evaluate_matrix(rows)
-    assert np.array_equal(values, problem.evaluate(problem.space.designs(rows)))
+    values = problem.evaluate_matrix(rows).values
+    assert np.array_equal(values, problem.evaluate(problem.space.designs(rows)).values)
     assert values[:, 0].min() < 1.0

@@ -22,7 +22,7 @@ from armwright.kinematics.clearance import clearances
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.kinematics.solve import solve_postures
 from armwright.moves import Moves, lines_of
-from armwright.objectives import OF_MOVES, named_objectives
+from armwright.objectives import OF_MOVES, UNCOVERED_FRACTION, named_objectives
 from armwright.obstacles import Sphere
 from armwright.problem import Problem
 from armwright.space import DesignSpace, paper_space
@@ -142,7 +142,7 @@ def test_moves_begin_in_the_kept_posture_and_go_on_from_sample_to_sample() -> No
     space = paper_space(5)
     arms = stack_designs(space, space.matrix(space.sample(40, 3)))
     targets, pairs = np.array(CORNERS), ((0, 1), (2, 1), (1, 0))
-    evaluation = Problem(task(moves=[(a + 1, b + 1) for a, b in pairs], move_step=0.05), space).evaluate_arrays(arms)
+    evaluation = Problem(task(moves=[(a + 1, b + 1) for a, b in pairs], move_step=0.05), space).physics_of_arms(arms)
     paths = evaluation.paths
     for (start, _), first, beyond in zip(pairs, paths.lines.first, paths.lines.first[1:], strict=False):
         q = evaluation.q[:, start][:, None]
@@ -240,18 +240,23 @@ def test_torque_use_counts_the_way() -> None:
     still = Problem(task(objectives=["torque_utilisation"]), space)
     moving = Problem(task(objectives=["torque_utilisation"], moves="in_order"), space)
     effort = designs and space.arm(designs[0]).joints[0].actuator.effort  # type: ignore[union-attr]
-    expected = np.abs(moving.evaluation(designs).paths.joint_torques).max(axis=(1, 2)) / effort
-    assert moving.evaluate(designs)[:, 0] == pytest.approx(np.maximum(still.evaluate(designs)[:, 0], expected))
-    assert np.any(moving.evaluate(designs) > 1.01 * still.evaluate(designs))
+    expected = np.abs(moving.physics(designs).paths.joint_torques).max(axis=(1, 2)) / effort
+    assert moving.evaluate(designs).values[:, 0] == pytest.approx(
+        np.maximum(still.evaluate(designs).values[:, 0], expected)
+    )
+    assert np.any(moving.evaluate(designs).values > 1.01 * still.evaluate(designs).values)
 
 
 def test_moves_cost_nothing_where_nothing_asks_for_them() -> None:
     designs = paper_space().sample(20, 0)
     plain, moving = Problem(task()), Problem(task(moves="in_order"))
-    evaluation = moving.evaluation(designs)
-    assert np.array_equal(moving.values(evaluation), plain.evaluate(designs))
+    evaluation = moving.physics(designs)
+    assert np.array_equal(moving.outcomes(evaluation).values, plain.evaluate(designs).values)
     assert "paths" not in vars(evaluation)
-    assert [moving.heeds_moves, Problem(task(moves="in_order"), objectives=OF_MOVES[:1]).heeds_moves] == [False, True]
+    assert [
+        moving.uses(*OF_MOVES),
+        Problem(task(moves="in_order"), objectives=OF_MOVES[:1]).uses(*OF_MOVES),
+    ] == [False, True]
 
 
 def test_objectives_of_moves_need_moves() -> None:
@@ -263,9 +268,9 @@ def test_objectives_of_moves_need_moves() -> None:
 def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Problem(task(moves="in_order", objectives=["position_error", "path_error"]))
     designs = problem.space.sample(50, 5)
-    values = problem.evaluate(designs)
+    values = problem.evaluate(designs).values
     monkeypatch.setattr("armwright.problem.POSTURES_AT_ONCE", {"cpu": 700})
-    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)), values)
+    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
 
 
 # From the file on
@@ -343,8 +348,8 @@ def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:
         task(moves="in_order", workspace=box, constraints=[*sentences, "anisotropy <= 0.99"]), paper_space(6)
     )
     designs = problem.space.sample(40, 1)
-    evaluation, broken = problem.evaluation(designs), problem.judge(designs)[1]
-    assert (problem.heeds_moves, problem.heeds_workspace) == (True, True)
+    evaluation, broken = problem.physics(designs), problem.evaluate(designs).violations
+    assert (problem.uses(*OF_MOVES), problem.uses(UNCOVERED_FRACTION)) == (True, True)
     measured = np.column_stack(
         [
             evaluation.paths.error.max(axis=1),

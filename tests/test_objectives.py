@@ -119,7 +119,7 @@ def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, probl
         with pytest.raises(RunFolderError, match="an objective of its own"):
             history.problem.evaluate(designs)
     else:
-        assert np.array_equal(history.problem.evaluate(designs), problem.evaluate(designs))
+        assert np.array_equal(history.problem.evaluate(designs).values, problem.evaluate(designs).values)
     assert (tmp_path / "run" / "trials.csv").read_text().splitlines()[0].endswith(",".join(names))
 
 
@@ -156,9 +156,9 @@ def test_the_named_objectives_are_what_they_say() -> None:
     problem = Problem(LOADED, objectives=named_objectives(names[:5]))
     rest = Problem(LOADED, objectives=named_objectives(names[5:]))
     designs = problem.space.sample(50, 1)
-    evaluation = problem.evaluation(designs)
+    evaluation = problem.physics(designs)
     error, torque = evaluation.position_error, evaluation.joint_torques
-    told = dict(zip(names, np.hstack([problem.evaluate(designs), rest.evaluate(designs)]).T, strict=True))
+    told = dict(zip(names, np.hstack([problem.evaluate(designs).values, rest.evaluate(designs).values]).T, strict=True))
     norms = np.linalg.norm(torque, axis=2)
     for row, design in enumerate(designs):
         arm = problem.arm(design)
@@ -218,7 +218,7 @@ def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: t
     assert result.exit_code == 0, result.output
     config, history = read_run(tmp_path / "run")
     assert tuple(objective.name for objective in config.objectives) == names
-    assert np.array_equal(history.problem.evaluate([t.design for t in history]), history.values)
+    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
     for name in names:
         assert name.replace("_", " ") in result.output
     prompt = CliRunner().invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
@@ -267,10 +267,10 @@ def test_torques_with_a_payload_are_pinocchio_s(dof: int) -> None:
 
 def test_a_payload_changes_torques_and_nothing_else() -> None:
     designs = paper_space().sample(50, 2)
-    bare, loaded = (Problem(LOADED.model_copy(update={"payload": kg})).evaluation(designs) for kg in (0.0, 1.0))
+    bare, loaded = (Problem(LOADED.model_copy(update={"payload": kg})).physics(designs) for kg in (0.0, 1.0))
     assert np.array_equal(bare.q, loaded.q)
     assert np.array_equal(bare.position_error, loaded.position_error)
-    doubled = Problem(LOADED.model_copy(update={"payload": 2.0})).evaluation(designs)
+    doubled = Problem(LOADED.model_copy(update={"payload": 2.0})).physics(designs)
     gain = loaded.joint_torques - bare.joint_torques
     assert doubled.joint_torques - bare.joint_torques == pytest.approx(2.0 * gain, abs=1e-4 * np.abs(gain).max())
 

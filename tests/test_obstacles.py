@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from armwright.cli import app
 from armwright.documents import parse_document
 from armwright.exceptions import RunConflictError, TaskError
-from armwright.objectives import CLEARANCES, FAR, OBJECTIVES, named_objectives
+from armwright.objectives import CLEARANCES, FAR, OBJECTIVES, OF_CLEARANCE, named_objectives
 from armwright.obstacles import SHAPES, Box, Cylinder
 from armwright.problem import Problem
 from armwright.report.page import write_report
@@ -121,14 +121,14 @@ def test_objectives_of_clearance() -> None:
     task = task_of(RECORDS, objectives=["collision", "clearance_shortfall"])
     problem = Problem(task)
     designs = problem.space.sample(40, 3)
-    evaluation, values = problem.evaluation(designs), problem.evaluate(designs)
+    evaluation, values = problem.physics(designs), problem.evaluate(designs).values
     free = evaluation.clearance
     assert np.any(free < 0.0)
     assert np.any(free.min(axis=1) > 0.0)
     for row in range(40):
         assert values[row, 0] == pytest.approx(sum(max(0.0, -at) for at in free[row]))
         assert values[row, 1] == pytest.approx(max(max(0.0, 0.1 - at) for at in free[row]))
-    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)), values)
+    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
     for quantity in CLEARANCES:
         least = getattr(evaluation, quantity.name).min(axis=1)
         assert np.array_equal(quantity(evaluation), np.minimum(least, FAR))
@@ -136,16 +136,16 @@ def test_objectives_of_clearance() -> None:
     alone = Problem(
         Task(name="alone", targets=task.targets), objectives=named_objectives(["collision", "clearance_shortfall"])
     )
-    assert np.all(np.isfinite(alone.evaluate(designs)))
-    assert np.all(alone.evaluate(designs) <= values)
+    assert np.all(np.isfinite(alone.evaluate(designs).values))
+    assert np.all(alone.evaluate(designs).values <= values)
 
 
 def test_the_paper_s_objectives_do_not_see_them() -> None:
     with_, without = task_of(RECORDS), task_of([])
     designs = Problem(without).space.sample(20, 0)
-    assert np.array_equal(Problem(with_).evaluate(designs), Problem(without).evaluate(designs))
-    assert not Problem(with_).heeds_clearance
-    assert Problem(with_, objectives=(OBJECTIVES["collision"],)).heeds_clearance
+    assert np.array_equal(Problem(with_).evaluate(designs).values, Problem(without).evaluate(designs).values)
+    assert not Problem(with_).uses(*OF_CLEARANCE)
+    assert Problem(with_, objectives=(OBJECTIVES["collision"],)).uses(*OF_CLEARANCE)
 
 
 def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
     assert "count in none of the objectives" not in output
     config, history = read_run(tmp_path / "run")
     assert config.task.obstacles == load_task(file).obstacles
-    assert np.array_equal(history.problem.evaluate([trial.design for trial in history]), history.values)
+    assert np.array_equal(history.problem.evaluate([trial.design for trial in history]).values, history.values)
     prompt = armwright("prompt", "--after", tmp_path / "run")
     assert all(f"\n- {words}\n" in prompt for words in WORDS)
     assert "Orientation does not matter. The inverse kinematics steers around nothing" in prompt

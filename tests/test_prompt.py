@@ -317,10 +317,10 @@ def test_feedback_is_true_to_the_evaluation() -> None:
     feedback = Feedback(history, 0)
     for record in feedback.records([*feedback.front, *feedback.others], range(9)):
         design = history.trials[record["number"]].design
-        arm = problem.evaluation([design])
+        arm = problem.physics([design])
         each = np.array(numbers(record["e_each"])).reshape(9, 2)
         assert each.sum(axis=0) == pytest.approx(numbers(record["e_all"]), abs=9 * 0.0006)
-        assert numbers(record["e_all"]) == pytest.approx(problem.evaluate([design])[0], abs=0.0006)
+        assert numbers(record["e_all"]) == pytest.approx(problem.evaluate([design]).values[0], abs=0.0006)
         assert numbers(record["p_ik"]) == pytest.approx(arm.reached[0].ravel(), abs=0.0006)
         torques = np.array(numbers(record["tau_ik"])).reshape(9, 4)
         assert torques.ravel() == pytest.approx(arm.joint_torques[0].ravel(), abs=0.00006)

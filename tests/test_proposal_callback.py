@@ -329,7 +329,7 @@ def arms(problem: Problem, study: optuna.Study, n_trials: int, callback: Proposa
 
     def evaluate(trial: optuna.Trial) -> tuple[float, ...]:
         design = Design({name: trial._suggest(name, distribution) for name, distribution in space.items()})
-        return tuple(problem.evaluate([design])[0].tolist())
+        return tuple(problem.evaluate([design]).values[0].tolist())
 
     study.optimize(evaluate, n_trials=n_trials, callbacks=None if callback is None else [callback])
     return study

@@ -43,19 +43,19 @@ def test_finds_the_front_of_bowls() -> None:
 def test_never_worse_and_counted(budget: int) -> None:
     designs = PROBLEM.space.sample(20, seed=1)
     rows = PROBLEM.space.matrix(designs)
-    values = PROBLEM.evaluate(designs)
+    values = PROBLEM.evaluate(designs).values
     counted: list[int] = []
 
     def evaluate(samples: Array) -> Array:
         counted.append(len(samples))
-        return PROBLEM.evaluate_matrix(samples)
+        return PROBLEM.evaluate_matrix(samples).values
 
     refined = refine(PROBLEM.space.parameters, evaluate, rows, values, (5.0, 5.0), budget, 3)
     assert refined.evaluations == sum(counted) == 20 * POPULATION * (budget // POPULATION)
     assert np.all(refined.values[refined.improved] < values[refined.improved])
     assert np.array_equal(refined.rows[~refined.improved], rows[~refined.improved])
     # What it says is what comes out, and it is in the space, with the joints as they were.
-    assert np.array_equal(PROBLEM.evaluate_matrix(refined.rows), refined.values)
+    assert np.array_equal(PROBLEM.evaluate_matrix(refined.rows).values, refined.values)
     for before, after in zip(designs, PROBLEM.space.designs(refined.rows), strict=True):
         assert PROBLEM.space.design(after.params) == after
         assert after.joints == before.joints

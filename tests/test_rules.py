@@ -27,13 +27,13 @@ def task(*points: tuple[float, float, float], reference_point: tuple[float, floa
 
 def history_of(problem: Problem, n: int, seed: int = 0) -> History:
     designs = problem.space.sample(n, seed)
-    values = problem.evaluate(designs).tolist() if designs else []
+    values = problem.evaluate(designs).values.tolist() if designs else []
     trials = [FinishedTrial(i, RANDOM, d, tuple(v)) for i, (d, v) in enumerate(zip(designs, values, strict=True))]
     return History(problem, trials, max(n, 1))
 
 
 def with_proposal(history: History, proposal: Proposal) -> History:
-    values = tuple(history.problem.evaluate([proposal.design])[0].tolist())
+    values = tuple(history.problem.evaluate([proposal.design]).values[0].tolist())
     trial = FinishedTrial(len(history), "rules", proposal.design, values, proposal.id)
     return History(history.problem, [*history.trials, trial], history.n_init)
 
@@ -179,7 +179,7 @@ def test_structures_fit_any_number_of_joints(n: int) -> None:
 def test_the_first_proposal_beats_the_median_random_design() -> None:
     problem = Problem(load_task("target-1"))
     first = RulesProposer().propose(history_of(problem, 10), 0, 10).design
-    random = [hypervolume(row[None], (5.0, 5.0)) for row in problem.evaluate(problem.space.sample(500, 1))]
-    alone = hypervolume(problem.evaluate([first]), (5.0, 5.0))
+    random = [hypervolume(row[None], (5.0, 5.0)) for row in problem.evaluate(problem.space.sample(500, 1)).values]
+    alone = hypervolume(problem.evaluate([first]).values, (5.0, 5.0))
     assert alone > np.median(random)
     assert alone > 1.0

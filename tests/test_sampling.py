@@ -34,7 +34,7 @@ LEARNING = ["tpe", "tpe-multivariate", "nsga2", pytest.param("gp", marks=NEEDS_G
 
 
 def finished(number: int, design: Design, source: str = RANDOM) -> FinishedTrial:
-    values = PROBLEM.evaluate([design])[0].tolist()
+    values = PROBLEM.evaluate([design]).values[0].tolist()
     return FinishedTrial(number, source, design, tuple(values))
 
 
@@ -205,7 +205,7 @@ def test_a_target_out_of_reach_is_a_finite_objective_not_a_failure() -> None:
     problem = Problem(Task(name="far", targets=((50.0, 0.0, 0.0),)))
     box = BlackBox(SPACE, "tpe", seed=0)
     trial, design = box.draw(0, RANDOM)
-    box.tell(trial, problem.evaluate([design])[0].tolist())
+    box.tell(trial, problem.evaluate([design]).values[0].tolist())
     assert box.study.trials[0].state is TrialState.COMPLETE
     assert 40.0 < box.study.trials[0].values[0] < 60.0
 

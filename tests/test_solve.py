@@ -156,12 +156,12 @@ def test_chunks_do_not_change_the_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither those of the solver, bounded by bytes, nor those of designs whose postures are in memory at a time."""
     asked = Problem(load_task("target-2"))
     matrix = asked.space.matrix(asked.space.sample(100, 3))
-    whole = asked.evaluate_matrix(matrix)
-    assert np.array_equal(whole, asked.evaluate(asked.space.designs(matrix)))
+    whole = asked.evaluate_matrix(matrix).values
+    assert np.array_equal(whole, asked.evaluate(asked.space.designs(matrix)).values)
     monkeypatch.setitem(solve.LARGEST_CHUNK, "cpu", 1)
     monkeypatch.setitem(problem.POSTURES_AT_ONCE, "cpu", 200)
-    assert np.array_equal(asked.evaluate_matrix(matrix), whole)
-    assert asked.evaluate_matrix(matrix[:0]).shape == (0, 2)
+    assert np.array_equal(asked.evaluate_matrix(matrix).values, whole)
+    assert asked.evaluate_matrix(matrix[:0]).values.shape == (0, 2)
 
 
 def test_many_targets_are_a_question_of_memory_alone() -> None:
@@ -182,7 +182,7 @@ def test_threads_are_no_more_than_openmp_s(monkeypatch: pytest.MonkeyPatch, said
 
 def test_threads_that_solve_other_numbers_of_arms_at_other_tasks_get_the_same_bits() -> None:
     problems = [Problem(load_task(name)) for name in ("target-1", "target-2", "autodesign-1")]
-    known = [(rows := p.space.matrix(p.space.sample(700, 0)), p.evaluate_matrix(rows)) for p in problems]
+    known = [(rows := p.space.matrix(p.space.sample(700, 0)), p.evaluate_matrix(rows).values) for p in problems]
     wrong: list[tuple[int, int]] = []
 
     def work(seed: int) -> None:
@@ -192,7 +192,7 @@ def test_threads_that_solve_other_numbers_of_arms_at_other_tasks_get_the_same_bi
             rows, values = known[which]
             first = int(rng.integers(0, 700 - n))
             part = slice(first, first + n)
-            if not np.array_equal(problems[which].evaluate_matrix(rows[part]), values[part]):
+            if not np.array_equal(problems[which].evaluate_matrix(rows[part]).values, values[part]):
                 wrong.append((which, n))
 
     threads = [threading.Thread(target=work, args=(seed,)) for seed in range(3)]

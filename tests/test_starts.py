@@ -23,7 +23,7 @@ def test_the_first_trials_are_theirs(tmp_path: Path) -> None:
     run = optimize(PROBLEM, proposer=None, n_init=5, n_total=10, start=GIVEN, out=tmp_path / "run")
     assert [trial.source for trial in run.trials] == ["start"] * 2 + ["random"] * 3 + ["bbo"] * 10
     assert [trial.design for trial in run.trials[:2]] == GIVEN
-    assert [trial.values for trial in run.trials[:2]] == [tuple(row) for row in PROBLEM.evaluate(GIVEN).tolist()]
+    assert [trial.values for trial in run.trials[:2]] == [tuple(row) for row in PROBLEM.evaluate(GIVEN).values.tolist()]
     without = optimize(PROBLEM, proposer=None, n_init=5, n_total=10)
     assert [t.design for t in run.trials[2:5]] == [t.design for t in without.trials[2:5]]  # drawn by their numbers
     config, history = read_run(tmp_path / "run")

@@ -65,7 +65,7 @@ def test_every_trial_can_be_the_proposers() -> None:
 def test_values_are_those_of_the_problem_and_the_curve_is_moocores() -> None:
     run = short(n_total=30)
     values = np.array([trial.values for trial in run.trials])
-    assert values == pytest.approx(PROBLEM.evaluate([trial.design for trial in run.trials]), abs=0)
+    assert values == pytest.approx(PROBLEM.evaluate([trial.design for trial in run.trials]).values, abs=0)
     expected = [
         moocore.hypervolume(np.minimum(values[: 5 + i], 5.0), ref=[5.0, 5.0]) for i in range(1, 31)
     ]  # a point moved onto the reference point's lines dominates no area
@@ -357,4 +357,4 @@ def test_more_joints_and_other_masses_run_too() -> None:
 
 def test_history_evaluates_finished_trials_again_to_the_same_values() -> None:
     history = short().history
-    assert PROBLEM.values(history.evaluation(range(13))).tolist() == [list(trial.values) for trial in history]
+    assert PROBLEM.outcomes(history.evaluation(range(13))).values.tolist() == [list(trial.values) for trial in history]

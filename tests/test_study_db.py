@@ -274,7 +274,7 @@ def test_one_goes_on_with_it_and_loses_nothing_when_the_run_goes_on_too(tmp_path
                 else trial.suggest_categorical(name, each.choices)
                 for name, each in space.items()
             }
-            return tuple(problem.evaluate([problem.space.completed(given)])[0].tolist())
+            return tuple(problem.evaluate([problem.space.completed(given)]).values[0].tolist())
 
         study.optimize(objective, n_trials=3)
         save_note(study, "mine")

@@ -111,7 +111,7 @@ def test_orientation_counts_without_being_named_and_only_where_it_is_asked_for()
 
 def test_objectives_heed_weights_and_tolerances() -> None:
     problem = Problem(task(), paper_space(6))
-    found = problem.evaluation(problem.space.sample(200, 0))
+    found = problem.physics(problem.space.sample(200, 0))
     weight = np.array([1.0, 1.0, 2.0, 1.0])
     assert OBJECTIVES["position_error"](found) == pytest.approx(found.position_error @ weight)
     assert OBJECTIVES["orientation_error"](found) == pytest.approx(found.angle_error @ weight)
@@ -132,7 +132,7 @@ def test_verification_uses_the_same_goals() -> None:
     """In float64 a design is as good as in the search, by and large, and its orientation counts."""
     problem = Problem(task(), paper_space(6))
     designs = problem.space.sample(30, 0)
-    values = problem.evaluate(designs)
+    values = problem.evaluate(designs).values
     verified = verify(problem, designs, values, (1.0, 10.0, 3.0))
     assert np.median(np.abs(verified.exact - values)) < 1e-3
     assert (verified.exact[:, 2] > 0.0).all()
@@ -197,5 +197,5 @@ def test_a_run_keeps_it_all(tmp_path: Path) -> None:
     records = json.loads(first.read_text())["targets"]
     assert ["angle_error" in record for record in records] == [True, False, True, False]
     number = int(first.parent.name)
-    missed = problem.evaluation([run.history.trials[number].design]).missed[0]
+    missed = problem.physics([run.history.trials[number].design]).missed[0]
     assert [record["missed"] is not None for record in records] == missed.tolist()

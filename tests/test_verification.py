@@ -43,7 +43,7 @@ def designs() -> list[Design]:
 
 
 def test_exact_values_are_the_references(designs: list[Design]) -> None:
-    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs), BOX)
+    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
     agree(found.exact, values_of(PROBLEM, designs))
 
 
@@ -55,13 +55,13 @@ def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None
         off = np.abs(copy - rows)
         assert np.all(np.count_nonzero(off > 1e-12, axis=1) == 1)
         assert off.max(axis=1) == pytest.approx(1e-3)
-    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs), BOX)
+    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
     worst = np.max([values_of(PROBLEM, PROBLEM.space.designs(copy)) for copy in copies], axis=0)
     agree(found.moved, worst)
 
 
 def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
-    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs), BOX)
+    found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
     shape = STARTS, len(PROBLEM.task.targets), PROBLEM.space.joints
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
     worst = np.max([values_of(PROBLEM, designs, start) for start in starts], axis=0)
@@ -69,7 +69,7 @@ def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
 
 
 def test_what_is_solid_follows_from_the_worst_cases(designs: list[Design]) -> None:
-    values = PROBLEM.evaluate(designs)
+    values = PROBLEM.evaluate(designs).values
     found = verify(PROBLEM, designs, values, BOX)
     allowed = values + np.maximum(0.05 * values, 0.005 * np.array(BOX))
     for i in range(len(designs)):
@@ -85,7 +85,7 @@ def test_an_arm_that_needs_luck_is_fragile() -> None:
     lucky = Problem(at_reach).space.clipped((0.0, 0.0, 0.0), "RPRP", (0.1, 0.1, 0.1, 0.1))
     easy = Problem(at_reach).space.clipped((0.2, 0.0, 0.2), "YPPP", (0.15, 0.15, 0.15, 0.15))
     problem = Problem(at_reach)
-    found = verify(problem, [lucky, easy], problem.evaluate([lucky, easy]), (0.1, 20.0))
+    found = verify(problem, [lucky, easy], problem.evaluate([lucky, easy]).values, (0.1, 20.0))
     assert found.moved[0, 0] == pytest.approx(1e-3, abs=1e-6)
     assert found.solid.tolist() == [False, True]
 
@@ -93,9 +93,9 @@ def test_an_arm_that_needs_luck_is_fragile() -> None:
 def test_robust_values_are_the_worst_case(designs: list[Design]) -> None:
     robust = Problem(PROBLEM.task, tolerance=1e-3)
     rows = PROBLEM.space.matrix(designs)
-    worst = np.max([PROBLEM.evaluate_matrix(r) for r in (rows, *moved(PROBLEM.space, rows))], axis=0)
-    assert np.array_equal(robust.evaluate_matrix(rows), worst)
-    assert np.array_equal(robust.evaluate(designs), worst)
+    worst = np.max([PROBLEM.evaluate_matrix(r).values for r in (rows, *moved(PROBLEM.space, rows))], axis=0)
+    assert np.array_equal(robust.evaluate_matrix(rows).values, worst)
+    assert np.array_equal(robust.evaluate(designs).values, worst)
 
 
 def test_verify_run_marks_the_front(tmp_path: Path) -> None:
@@ -120,5 +120,5 @@ def test_a_history_without_a_box_is_not_verified() -> None:
 
     problem = Problem(Task(name="open", targets=((0.3, 0.0, 0.3),)))
     (design,) = problem.space.sample(1, seed=0)
-    trial = FinishedTrial(0, "random", design, tuple(problem.evaluate([design])[0].tolist()))
+    trial = FinishedTrial(0, "random", design, tuple(problem.evaluate([design]).values[0].tolist()))
     assert verify_front(History(problem, [trial], 10)) is None

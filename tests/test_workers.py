@@ -116,7 +116,7 @@ def test_many_workers_evaluate_each_trial_once(tmp_path: Path) -> None:
     proposals = [trial.proposal for trial in found.trials if trial.source == "numbered"]
     assert len(proposals) == len(set(proposals)) == 10
     for trial in found.trials:
-        assert trial.values == problem.judge_one(trial.design).values
+        assert trial.values == problem.evaluate([trial.design])[0].values
     _, history = read_run(tmp_path / "run")
     assert [trial.values for trial in history] == [trial.values for trial in found.trials]
 

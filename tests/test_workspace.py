@@ -16,7 +16,7 @@ from armwright.documents import parse_document
 from armwright.evaluation import Evaluation, evaluate
 from armwright.exceptions import SettingsError, TaskError
 from armwright.objectives import OBJECTIVES, UNCOVERED_FRACTION
-from armwright.problem import Problem
+from armwright.problem import Outcomes, Problem
 from armwright.space import paper_space
 from armwright.task import Task, load_task, random_task
 from armwright.workspace import Region, points_of
@@ -83,8 +83,8 @@ def test_points_are_tried_like_targets() -> None:
     designs = problem.space.sample(30, 2)
     arms = [problem.arm(design) for design in designs]
     as_targets = evaluate(arms, points_of(problem.task.workspace))
-    assert np.array_equal(problem.evaluation(designs).workspace_error, as_targets.position_error)
-    assert problem.evaluate(designs)[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
+    assert np.array_equal(problem.physics(designs).workspace_error, as_targets.position_error)
+    assert problem.evaluate(designs).values[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
 
 
 def test_longer_arms_cover_no_less() -> None:
@@ -115,13 +115,11 @@ def test_a_workspace_costs_nothing_where_nothing_asks_for_it() -> None:
     designs = paper_space().sample(10, 0)
     target_1 = load_task("target-1")
     with_ = target_1.model_copy(update={"workspace": task().workspace})
-    evaluation = Problem(with_).evaluation(designs)
-    assert np.array_equal(Problem(with_).values(evaluation), Problem(target_1).evaluate(designs))
+    evaluation = Problem(with_).physics(designs)
+    assert np.array_equal(Problem(with_).outcomes(evaluation).values, Problem(target_1).evaluate(designs).values)
     assert "workspace_error" not in vars(evaluation)
-    assert [Problem(with_).heeds_workspace, Problem(task(), objectives=(UNCOVERED_FRACTION,)).heeds_workspace] == [
-        False,
-        True,
-    ]
+    assert not Problem(with_).uses(UNCOVERED_FRACTION)
+    assert Problem(task(), objectives=(UNCOVERED_FRACTION,)).uses(UNCOVERED_FRACTION)
 
 
 def test_without_a_workspace_nothing_is_unreached() -> None:
@@ -134,17 +132,17 @@ def test_without_a_workspace_nothing_is_unreached() -> None:
 def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Problem(task(objectives=["uncovered_fraction", "torque"]))
     designs = problem.space.sample(30, 5)
-    values = problem.evaluate(designs)
+    values = problem.evaluate(designs).values
     sizes: list[int] = []
-    values_of = Problem.values
+    outcomes_of = Problem.outcomes
 
-    def counted(self: Problem, evaluation: Evaluation, *measured: Mapping[str, Array]) -> Array:
+    def counted(self: Problem, evaluation: Evaluation, *measured: Mapping[str, Array]) -> Outcomes:
         sizes.append(len(evaluation))
-        return values_of(self, evaluation, *measured)
+        return outcomes_of(self, evaluation, *measured)
 
     monkeypatch.setattr("armwright.problem.POSTURES_AT_ONCE", {"cpu": 1000})
-    monkeypatch.setattr(Problem, "values", counted)
-    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)), values)
+    monkeypatch.setattr(Problem, "outcomes", counted)
+    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
     assert max(sizes) * (200 + 8) <= 1000
 
 

@@ -29,7 +29,7 @@ import armwright as aw
 
 if __name__ == "__main__":
     problem = aw.Problem(space=aw.paper_space(joints=4), task=aw.load_task("target-1"))
-    assert problem.evaluate(problem.space.sample(100, seed=0)).shape == (100, 2)
+    assert problem.evaluate(problem.space.sample(100, seed=0)).values.shape == (100, 2)
     run = aw.optimize(problem, proposer="rules", n_total=20, seed=0, out="python")
     assert run.hypervolume[-1] > 0
     assert aw.to_urdf(run.front[0].arm).startswith("<?xml")

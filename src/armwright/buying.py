@@ -242,7 +242,7 @@ def _searched(problem: Problem, arm: Arm, seed: int) -> Vector:
         losses = np.empty((len(places), 1))
         for first in range(0, len(places), size):
             rows = slice(first, first + size)
-            evaluation = problem.evaluate_arrays(stack_arms([_moved(arm, place) for place in places[rows].tolist()]))
+            evaluation = problem.physics_of_arms(stack_arms([_moved(arm, place) for place in places[rows].tolist()]))
             missed = np.maximum(evaluation.position_error - REACHED, 0.0).sum(axis=1)
             torque = TORQUE(evaluation)
             losses[rows, 0] = np.where(missed > 0.0, 1.0 + missed, torque / (1.0 + torque))
@@ -259,7 +259,7 @@ def _searched(problem: Problem, arm: Arm, seed: int) -> Vector:
 def _compared(
     problem: Problem, history: History | None, name: str, arm: Arm, base: Vector, notes: Sequence[str] = ()
 ) -> ComparedArm:
-    evaluation = problem.evaluate_arrays(stack_arms([arm]))
+    evaluation = problem.physics_of_arms(stack_arms([arm]))
     values = tuple(_known(objective, evaluation) for objective in problem.objectives)
     bounds = [(constraint, _known(constraint.quantity, evaluation)) for constraint in problem.constraints]
     breaks = tuple(

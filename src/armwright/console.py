@@ -24,7 +24,7 @@ from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
 from armwright.front import FrontProgress, FrontRun
 from armwright.history import FrontMember, History
-from armwright.objectives import OF_MOVES, POSITION_ERROR, TORQUE, TORQUE_SCALE
+from armwright.objectives import OF_CLEARANCE, OF_MOVES, POSITION_ERROR, TORQUE, TORQUE_SCALE, UNCOVERED_FRACTION
 from armwright.polish import Polished
 from armwright.problem import Problem
 from armwright.results import REPORT, unmet
@@ -424,14 +424,14 @@ def stderr_console() -> Console:
 
 def _obstacle_note(problem: Problem) -> str:
     """That a task's obstacles count for nothing, where that is so."""
-    if not problem.task.obstacles or problem.heeds_clearance:
+    if not problem.task.obstacles or problem.uses(*OF_CLEARANCE):
         return ""
     return "; the task's obstacles count in none of the objectives (collision and clearance_shortfall heed them)"
 
 
 def _move_note(problem: Problem) -> str:
     """That a task's moves count for nothing, where that is so."""
-    if not problem.task.lines or problem.heeds_moves:
+    if not problem.task.lines or problem.uses(*OF_MOVES):
         return ""
     names = ", ".join(objective.name for objective in OF_MOVES)
     return f"; the task's moves count in none of the objectives (these heed them: {names})"
@@ -439,7 +439,7 @@ def _move_note(problem: Problem) -> str:
 
 def _workspace_note(problem: Problem) -> str:
     """That a task's workspace counts for nothing, where that is so."""
-    if not problem.task.workspace or problem.heeds_workspace:
+    if not problem.task.workspace or problem.uses(UNCOVERED_FRACTION):
         return ""
     return "; the task's workspace counts in none of the objectives (uncovered_fraction heeds it)"
 

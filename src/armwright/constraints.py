@@ -1,6 +1,6 @@
 """Constraints: bounds that a design has to keep, as plain sentences such as `torque_utilisation <= 0.8`.
 
-What `armwright.feasibility` says holds here, too: a constraint's value is how far it is broken, feasible is <= 0.
+A constraint's value is its violation, divided by the bound's size: satisfied at <= 0.
 """
 
 import math

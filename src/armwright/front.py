@@ -19,9 +19,9 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.feasibility import FAR
 from armwright.history import FRONT, FinishedTrial, FrontMember, History, found_reference_point
 from armwright.kinematics.solve import MANY_ARMS
+from armwright.pareto import PENALTY
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, read_summary, results_are_there, summarize_front, write_results
@@ -240,8 +240,8 @@ class _Search:
 
     def _ranked(self, rows: Array) -> Array:
         """(N, M) what the search compares designs by."""
-        ranks = self.problem.ranked_matrix(rows)
-        self.infeasible += int(np.any(ranks >= FAR, axis=1).sum())
+        ranks = self.problem.evaluate_matrix(rows).penalised
+        self.infeasible += int(np.any(ranks >= PENALTY, axis=1).sum())
         return ranks
 
     def _finish(self, ended: str, resumed: int) -> FrontRun:
@@ -249,7 +249,8 @@ class _Search:
         designs, values = self.problem.space.designs(self.search.rows[kept]), self.search.values[kept]
         broken = np.empty((len(designs), 0))
         if self.problem.constraints:  # the search knows their ranks alone
-            values, broken = self.problem.judge_matrix(self.search.rows[kept])
+            outcomes = self.problem.evaluate_matrix(self.search.rows[kept])
+            values, broken = outcomes.values, outcomes.violations
         trials = [
             FinishedTrial(
                 number, FRONT, design, tuple(values[number].tolist()), constraints=tuple(broken[number].tolist())
@@ -281,7 +282,8 @@ class _Search:
 
 def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
     """For a task that states none: from a few random designs."""
-    return found_reference_point(*problem.judge(problem.space.sample(N_SAMPLE, seed)))
+    found = problem.evaluate(problem.space.sample(N_SAMPLE, seed))
+    return found_reference_point(found.values, found.violations)
 
 
 def _trials_of(problem: Problem, folder: RunFolder) -> list[FinishedTrial]:

@@ -12,9 +12,16 @@ from numpy.typing import NDArray
 from armwright.arm import Arm
 from armwright.arrays import Array
 from armwright.evaluation import Evaluation
-from armwright.feasibility import counted, feasible_mask, violation
 from armwright.parameters import Design
-from armwright.pareto import FrontTracker, default_reference_point, front_mask, front_numbers
+from armwright.pareto import (
+    FrontTracker,
+    default_reference_point,
+    feasible_mask,
+    front_mask,
+    front_numbers,
+    masked_objectives,
+    total_violation,
+)
 from armwright.problem import Problem
 
 RANDOM = "random"
@@ -143,11 +150,11 @@ class History:
             return self.values
         known, _ = self._known("counted", np.empty((0, len(self.problem.objectives))))
         n = len(known)
-        return np.vstack([known, counted(self.values[n:], self.broken[n:])])
+        return np.vstack([known, masked_objectives(self.values[n:], self.broken[n:])])
 
     def nearest(self, most: int) -> list[int]:
         """The numbers of so many designs at most that break the constraints least, summed; the nearest first."""
-        return np.argsort(violation(self.broken), kind="stable")[:most].tolist()
+        return np.argsort(total_violation(self.broken), kind="stable")[:most].tolist()
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:
@@ -220,7 +227,7 @@ class History:
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
         """The physics of these trials' designs, computed again (the kernels give the same bits)."""
-        return self.problem.evaluation([self.trials[number].design for number in numbers])
+        return self.problem.physics([self.trials[number].design for number in numbers])
 
 
 def found_reference_point(values: Array, broken: Array) -> tuple[float, ...]:
@@ -228,5 +235,5 @@ def found_reference_point(values: Array, broken: Array) -> tuple[float, ...]:
 
     A front of fewer is the worst of itself in some objective: within 1.1 times its values there is hardly any room.
     """
-    feasible = counted(values, broken)
+    feasible = masked_objectives(values, broken)
     return default_reference_point(feasible if front_mask(feasible).sum() >= values.shape[1] else values)

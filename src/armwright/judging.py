@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from armwright.history import FinishedTrial
-from armwright.problem import Judgement, Problem
+from armwright.problem import Outcome, Problem
 
 
 @dataclass(frozen=True)
 class Judged:
     """A design's judgement, and the time that it took [s]."""
 
-    judgement: Judgement
+    judgement: Outcome
     seconds: float
 
 
@@ -67,5 +67,5 @@ class Here(Judging):
 def judged(problem: Problem, trial: FinishedTrial) -> Judged:
     """A trial's judgement."""
     started = time.perf_counter()
-    judgement = problem.judge_one(trial.design)
+    judgement = problem.evaluate([trial.design])[0]
     return Judged(judgement, time.perf_counter() - started)

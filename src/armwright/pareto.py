@@ -1,4 +1,9 @@
-"""Pareto fronts and hypervolume, all objectives minimised: arrays in, arrays out, on moocore."""
+"""Pareto fronts, hypervolume and constrained domination of arrays, all objectives minimised.
+
+A constraint is satisfied at a violation <= 0. Deb's rules (Deb et al., A fast and elitist multiobjective genetic
+algorithm: NSGA-II, IEEE Trans. Evol. Comput. 6(2), 2002) compare designs: a feasible design dominates an infeasible
+one; of two infeasible designs, the one with the smaller total violation; of two feasible ones, by their objectives.
+"""
 
 from collections.abc import Sequence
 
@@ -8,11 +13,13 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 
+PENALTY = 1e100  # of infeasible designs; larger than any objective
+
 
 def front_mask(values: Array) -> NDArray[np.bool_]:
     """(N,) True where no other row of `values` (N, M) is better or equal in all and better in one.
 
-    Of equal rows the first is kept. Infinite rows, as of infeasible designs (`armwright.feasibility`), are not on it.
+    Of equal rows the first is kept. Infinite rows, as of infeasible designs (`masked_objectives`), are not on it.
 
     Examples:
         >>> front_mask([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0]])
@@ -124,3 +131,28 @@ def solution_numbers(values: Array, reference_point: Sequence[float]) -> tuple[i
     """
     numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
     return (numbers[0], min(numbers, key=lambda n: values[n, -1])) if numbers else None
+
+
+def feasible_mask(violations: Array) -> NDArray[np.bool_]:
+    """Return (N,) True for designs that satisfy all constraints; violations: (N, C)."""
+    return np.all(violations <= 0.0, axis=1)
+
+
+def total_violation(violations: Array) -> Array:
+    """Return (N,) the sum of the positive violations (N, C); 0 for feasible designs."""
+    return np.maximum(violations, 0.0).sum(axis=1)
+
+
+def masked_objectives(values: Array, violations: Array) -> Array:
+    """Return the objectives (N, M), infinite for infeasible designs, so that these have no part in any front."""
+    feasible = feasible_mask(violations)
+    return values if feasible.all() else np.where(feasible[:, None], values, np.inf)
+
+
+def penalised_objectives(values: Array, violations: Array) -> Array:
+    """Return (N, M) numbers whose plain domination is constrained domination by Deb's rules.
+
+    Feasible designs keep their values. Infeasible ones are worse than all of these, in the order of their violation.
+    """
+    penalty = PENALTY * (1.0 + total_violation(violations))
+    return np.where(feasible_mask(violations)[:, None], values, penalty[:, None])

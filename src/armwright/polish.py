@@ -86,14 +86,14 @@ def _trials(history: History, members: Sequence[FrontMember], refined: Refined) 
     """
     better = np.flatnonzero(refined.improved).tolist()
     designs = history.problem.space.designs(refined.rows[better])
-    _, broken = history.problem.judge_matrix(refined.rows[better])
+    violations = history.problem.evaluate_matrix(refined.rows[better]).violations
     return [
         FinishedTrial(
             len(history) + k,
             POLISH,
             design,
             tuple(refined.values[i].tolist()),
-            constraints=tuple(broken[k].tolist()),
+            constraints=tuple(violations[k].tolist()),
             reason=f"refines trial {members[i].number}",
             refines=members[i].number,
             evaluations=refined.evaluations * (k + 1) // len(better) - refined.evaluations * k // len(better),

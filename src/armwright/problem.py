@@ -1,6 +1,6 @@
-"""The problem: a design space, a task, and what is minimised."""
+"""The problem: a design space, a task, and the objectives to minimise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,57 +8,89 @@ import numpy as np
 from armwright.arm import Arm
 from armwright.arrays import Array
 from armwright.batch_builder import stack_designs
-from armwright.constraints import Constraint, read_constraints
+from armwright.constraints import Constraint, Quantity, read_constraints
 from armwright.evaluation import Evaluation, evaluate_arrays
 from armwright.exceptions import EvaluatorError, SettingsError, TaskError
-from armwright.feasibility import ranked
 from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.measuring import Evaluator
-from armwright.objectives import (
-    OF_CLEARANCE,
-    OF_MOVES,
-    OF_ORIENTATION,
-    OF_TIME,
-    ORIENTATION_ERROR,
-    PAPER_OBJECTIVES,
-    UNCOVERED_FRACTION,
-    Objective,
-    named_objectives,
-)  # fmt: skip
+from armwright.objectives import OF_ORIENTATION, ORIENTATION_ERROR, PAPER_OBJECTIVES, Objective, named_objectives
 from armwright.parameters import Design
+from armwright.pareto import penalised_objectives
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
 from armwright.tolerance import moved
 
-NOTHING_MEASURED: Mapping[str, Array] = {}
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
+NO_MEASUREMENTS: Mapping[str, Array] = {}
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """What one design comes to.
+class Outcome:
+    """Hold the result of evaluating one design.
 
-    values: its objectives.  constraints: how far it breaks each, <= 0: not at all.
-    failure: why its evaluator gave no values, so that it counts the worst; empty where it gave some.
+    Attributes:
+        values: the M objectives, minimised.
+        violations: of the C constraints; satisfied at <= 0.
+        failure: why the evaluator gave no values, so that its worst ones stand here; empty if it gave some.
     """
 
     values: tuple[float, ...]
-    constraints: tuple[float, ...]
+    violations: tuple[float, ...] = ()
     failure: str = ""
 
 
 @dataclass(frozen=True)
-class Problem:
-    """Which arm of `space` serves `task` best, by position error and torque.
+class Outcomes:
+    """Hold the results of evaluating N designs.
 
-    tolerance: [m] of a workshop; above 0, a design counts by the worst that comes of it, in each objective, when it is
-        built exactly or with its base or one link off by so much (`armwright.tolerance`).
-    device: where arms are evaluated; `resolve_device` says which there are.
-    objectives: what is minimised, of one's own too; without them, the task's, else the paper's, and the orientation
-        error where a target says which way the tool points.
-    evaluator: a function of one's own that measures objectives in place of ours (`armwright.measuring`).
-    constraints: what a design has to keep, as the task says it.
+    Attributes:
+        values: (N, M) objectives, minimised.
+        violations: (N, C) constraint violations; satisfied at <= 0.
+        failures: why the evaluator gave no values, by row.
+    """
+
+    values: Array
+    violations: Array
+    failures: Mapping[int, str] = field(default_factory=dict[int, str])
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, row: int) -> Outcome:
+        """Return the outcome of one design."""
+        return Outcome(
+            tuple(self.values[row].tolist()), tuple(self.violations[row].tolist()), self.failures.get(row, "")
+        )
+
+    def __iter__(self) -> Iterator[Outcome]:
+        return (self[row] for row in range(len(self)))
+
+    @property
+    def penalised(self) -> Array:
+        """Return (N, M) objectives that a search without constraints can compare designs by (Deb's rules)."""
+        return penalised_objectives(self.values, self.violations)
+
+
+def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
+    """Return the largest of each objective and violation, each by itself, of the same designs in several cases."""
+    return Outcomes(np.max([o.values for o in outcomes], axis=0), np.max([o.violations for o in outcomes], axis=0))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Find the arms of a design space that serve a task best.
+
+    Attributes:
+        task: targets, moves, payloads, obstacles and constraints.
+        space: the designs to choose from.
+        tolerance: build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms
+            with the base or one link off by this much.
+        device: where arms are evaluated; see `resolve_device`.
+        objectives: what is minimised; by default the task's, else the paper's, with the orientation error if a
+            target states an orientation.
+        evaluator: a custom function that measures objectives, such as a simulation.
+        constraints: the task's, parsed.
 
     Examples:
         >>> import armwright as aw
@@ -66,7 +98,7 @@ class Problem:
         >>> [objective.name for objective in problem.objectives]
         ['position_error', 'torque']
         >>> designs = problem.space.sample(1000, seed=0)
-        >>> problem.evaluate(designs).shape
+        >>> problem.evaluate(designs).values.shape
         (1000, 2)
     """
 
@@ -79,17 +111,15 @@ class Problem:
     constraints: tuple[Constraint, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
-        """Settles device, objectives and constraints.
+        """Resolve device, objectives and constraints.
 
-        TaskError where the task's reference point is for other objectives, or a constraint cannot be understood.
+        Raises:
+            TaskError: the reference point is for other objectives, or a constraint cannot be parsed.
+            SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
         object.__setattr__(self, "constraints", read_constraints(self.task.constraints))
         if not self.objectives:
-            names = self.task.objectives
-            usual = (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.goals.oriented else PAPER_OBJECTIVES
-            if self.evaluator is not None:
-                usual = self.evaluator.objectives
-            object.__setattr__(self, "objectives", usual if names is None else named_objectives(names))
+            object.__setattr__(self, "objectives", self._default_objectives())
         if self.evaluator is not None and self.tolerance > 0.0:
             raise SettingsError(
                 f"a tolerance does not go with the evaluator {self.evaluator.name}, which measures an arm as it is"
@@ -102,6 +132,16 @@ class Problem:
                 )
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
+        self._check_reference_point()
+
+    def _default_objectives(self) -> tuple[Objective, ...]:
+        if self.task.objectives is not None:
+            return named_objectives(self.task.objectives)
+        if self.evaluator is not None:
+            return self.evaluator.objectives
+        return (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.goals.oriented else PAPER_OBJECTIVES
+
+    def _check_reference_point(self) -> None:
         point, names = self.reference_point, [objective.name for objective in self.objectives]
         if point is not None and len(point) != len(names):
             given = ", ".join(f"{value:g}" for value in point)
@@ -113,178 +153,119 @@ class Problem:
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:
-        """The worst values that count for the hypervolume, where the task states them."""
+        """Return the worst values that count for the hypervolume, if the task states them."""
         return self.task.reference_point
 
-    def counts(self, quantity: Objective) -> bool:
-        """Whether it is an objective, or bounded by a constraint."""
-        counted = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
-        return quantity.name in counted
+    def uses(self, *quantities: Quantity) -> bool:
+        """Return whether any of these is an objective or bounded by a constraint."""
+        used = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
+        return any(quantity.name in used for quantity in quantities)
 
-    @property
-    def heeds_clearance(self) -> bool:
-        """Whether it counts where the arm is in an obstacle or in itself."""
-        return any(map(self.counts, OF_CLEARANCE))
+    def arm(self, design: Design) -> Arm:
+        """Return the physical arm that a design builds."""
+        return self.space.arm(design)
 
-    @property
-    def heeds_moves(self) -> bool:
-        """Whether it counts what the arm does on its moves."""
-        return any(map(self.counts, OF_MOVES))
+    def evaluate(self, designs: Sequence[Design]) -> Outcomes:
+        """Evaluate N designs: objectives and constraint violations, the worst of all cases and tolerances.
 
-    @property
-    def heeds_time(self) -> bool:
-        """Whether it counts how fast the moves are."""
-        return any(map(self.counts, OF_TIME))
+        Raises:
+            EvaluatorError: the custom evaluator failed and states no `worst`.
+            SettingsError: an objective or a violation is not a finite number.
+        """
+        measured, failures = self._measure(designs)
+        found = self._evaluate(self.space.matrix(designs), measured)
+        return Outcomes(found.values, found.violations, failures)
 
-    @property
-    def heeds_workspace(self) -> bool:
-        """Whether it counts how much of the workspace is covered."""
-        return self.counts(UNCOVERED_FRACTION)
+    def evaluate_matrix(self, matrix: Array) -> Outcomes:
+        """Evaluate a large number of designs, given as rows.
+
+        Args:
+            matrix: (N, P) as `DesignSpace.matrix` returns it. Custom evaluators are not called.
+        """
+        return self._evaluate(self.space.settled(matrix), NO_MEASUREMENTS)
+
+    def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
+        """Return the kinematics and statics of designs at all targets, exact and in the task's first case.
+
+        Args:
+            designs: N designs, or (N, P) their matrix, which may lie outside the ranges of the space.
+        """
+        matrix = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
+        return self.physics_of_arms(stack_designs(self.space, matrix))
+
+    def physics_of_arms(self, arms: ArmArrays, case: int = 0) -> Evaluation:
+        """Return the kinematics and statics of arms at all targets, in one case of the task."""
+        task = self.task
+        points, payloads = task.cases[case]
+        known = (payloads, task.obstacles, task.goals, task.lines, task.workspace)
+        return evaluate_arrays(arms, points, self.device, None, *known)
+
+    def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
+        """Return objectives and violations of evaluated arms.
+
+        Args:
+            evaluation: physics of N arms.
+            measured: (N,) of each objective that the custom evaluator measures.
+
+        Raises:
+            SettingsError: one is not a finite number.
+        """
+        values = [measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives]
+        violations = [constraint(evaluation) for constraint in self.constraints]
+        return Outcomes(
+            _finite(values, [f"objective {o.name}" for o in self.objectives], len(evaluation)),
+            _finite(violations, [f'constraint "{c.words}"' for c in self.constraints], len(evaluation)),
+        )
+
+    def _evaluate(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
+        """Evaluate settled rows, with only the postures of one chunk in memory at a time."""
+        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
+        values = np.empty((len(matrix), len(self.objectives)))
+        violations = np.empty((len(matrix), len(self.constraints)))
+        for first in range(0, len(matrix), size):
+            rows = slice(first, first + size)
+            chunk = {name: column[rows] for name, column in measured.items()}
+            found = worst_case([self.outcomes(physics, chunk) for physics in self._variants(matrix[rows])])
+            values[rows], violations[rows] = found.values, found.violations
+        return Outcomes(values, violations)
+
+    def _variants(self, matrix: Array) -> Iterator[Evaluation]:
+        """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
+        for rows in (matrix, *(moved(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
+            yield self.physics(rows)
+            for case in range(1, len(self.task.cases)):
+                yield self.physics_of_arms(stack_designs(self.space, rows), case)
 
     @property
     def _postures(self) -> int:
-        """Of each arm, at most."""
+        """Return the largest number of postures of one arm."""
         task = self.task
-        return (
-            len(task.points)
-            + sum(task.lines.steps(task.points))
-            + len(task.lines)
-            + sum(r.points for r in task.workspace)
+        along = sum(task.lines.steps(task.points)) + len(task.lines)
+        return len(task.points) + along + sum(region.points for region in task.workspace)
+
+    def _measure(self, designs: Sequence[Design]) -> tuple[Mapping[str, Array], Mapping[int, str]]:
+        """Return (N,) of each objective that the custom evaluator measures, and its failures by row."""
+        if self.evaluator is None:
+            return NO_MEASUREMENTS, {}
+        failures: dict[int, str] = {}
+        table = np.empty((len(designs), len(self.evaluator.objectives)))
+        for row, design in enumerate(designs):
+            try:
+                table[row] = self.evaluator(self.arm(design), self.task)
+            except EvaluatorError as fault:
+                if self.evaluator.worst is None:
+                    raise
+                table[row], failures[row] = self.evaluator.worst, str(fault)
+        return {o.name: column for o, column in zip(self.evaluator.objectives, table.T, strict=True)}, failures
+
+
+def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:
+    """Return (n, K) of K columns; SettingsError if one holds anything but finite numbers."""
+    table = np.column_stack(columns) if columns else np.empty((n, 0))
+    if not np.all(np.isfinite(table)):
+        row, column = np.argwhere(~np.isfinite(table))[0]
+        raise SettingsError(
+            f"{names[column]} of a design is {table[row, column]}; expected a finite number for every design, a large "
+            "one for a bad design"
         )
-
-    def arm(self, design: Design) -> Arm:
-        """The physical chain that a design builds."""
-        return self.space.arm(design)
-
-    def evaluation(self, designs: Sequence[Design]) -> Evaluation:
-        """The physics of N designs at all targets."""
-        return self.evaluation_of_rows(self.space.matrix(designs))
-
-    def evaluation_of_rows(self, rows: Array) -> Evaluation:
-        """The same of designs as rows (N, P), which may lie outside the space: what is built knows no ranges."""
-        return self.evaluate_arrays(stack_designs(self.space, rows))
-
-    def evaluate_arrays(self, arms: ArmArrays, start: Array | None = None) -> Evaluation:
-        """The physics of N arms at all targets, with their payloads; start: as of `evaluate_arrays`."""
-        return self._of_case(arms, *self.task.cases[0], start)
-
-    def _of_case(self, arms: ArmArrays, points: Array, payloads: Array, start: Array | None = None) -> Evaluation:
-        task = self.task
-        known = (payloads, task.obstacles, task.goals, task.lines, task.workspace)
-        return evaluate_arrays(arms, points, self.device, start, *known)
-
-    def _judged_rows(self, rows: Array, measured: Mapping[str, Array] = NOTHING_MEASURED) -> Array:
-        """(n, M + C) of designs as rows: the worst, in each by itself, of the cases that the task may come to.
-
-        measured: (n,) of each objective that an evaluator measures.
-        """
-        worst, others = self.judged(self.evaluation_of_rows(rows), measured), self.task.cases[1:]
-        arms = stack_designs(self.space, rows) if others else None
-        for case in others:
-            assert arms is not None
-            worst = np.maximum(worst, self.judged(self._of_case(arms, *case), measured))
-        return worst
-
-    def evaluate_matrix(self, matrix: Array) -> Array:
-        """(N, M) as `evaluate`, for designs as rows (`DesignSpace.matrix`): the way for a great many."""
-        return self.judge_matrix(matrix)[0]
-
-    def judge_matrix(self, matrix: Array) -> tuple[Array, Array]:
-        """(N, M) and (N, C) as `judge`, for designs as rows.
-
-        Only the postures of a chunk of them are in memory at a time.
-        """
-        matrix = self.space.settled(matrix)
-        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
-        found = np.empty((len(matrix), len(self.objectives) + len(self.constraints)))
-        for first in range(0, len(matrix), size):
-            rows = slice(first, first + size)
-            found[rows] = self._judged_rows(matrix[rows])
-            if self.tolerance > 0.0:
-                for copies in moved(self.space, matrix[rows], self.tolerance):
-                    found[rows] = np.maximum(found[rows], self._judged_rows(copies))
-        return self.split(found)
-
-    def ranked_matrix(self, matrix: Array) -> Array:
-        """(N, M) of designs as rows: their objectives, or for infeasible ones numbers that lie behind all of these.
-
-        What a search compares designs by, where it knows nothing of constraints.
-        """
-        values, broken = self.judge_matrix(matrix)
-        return ranked(values, broken) if self.constraints else values
-
-    def values(self, evaluation: Evaluation, measured: Mapping[str, Array] = NOTHING_MEASURED) -> Array:
-        """(N, M): the objectives of evaluated designs, minimised; SettingsError where one is not a finite number.
-
-        measured: (N,) of each objective that an evaluator measures.
-        """
-        values = np.column_stack([measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives])
-        if not np.all(np.isfinite(values)):
-            row, column = np.argwhere(~np.isfinite(values))[0]
-            raise SettingsError(
-                f"objective {self.objectives[column].name} of a design is {values[row, column]}; it must be a finite "
-                "number for every design, a large one for a bad design"
-            )
-        return values
-
-    def judged(self, evaluation: Evaluation, measured: Mapping[str, Array] = NOTHING_MEASURED) -> Array:
-        """(N, M + C): the objectives of evaluated designs, then how far each constraint is broken."""
-        values = self.values(evaluation, measured)
-        if not self.constraints:
-            return values
-        broken = np.column_stack([constraint(evaluation) for constraint in self.constraints])
-        if not np.all(np.isfinite(broken)):
-            row, column = np.argwhere(~np.isfinite(broken))[0]
-            raise SettingsError(
-                f'constraint "{self.constraints[column].words}" is {broken[row, column]} for a design; it must be a '
-                "finite number for every design"
-            )
-        return np.hstack([values, broken])
-
-    def split(self, judged: Array) -> tuple[Array, Array]:
-        """(N, M) and (N, C): the objectives and the constraints of `judged`."""
-        return judged[:, : len(self.objectives)], judged[:, len(self.objectives) :]
-
-    def judge(self, designs: Sequence[Design]) -> tuple[Array, Array]:
-        """(N, M) and (N, C): the objectives of N designs, and how far they break each constraint, <= 0: not at all.
-
-        With a tolerance, or other cases of the task, the worst of each by itself.
-        """
-        rows = self.space.matrix(designs)
-        found = self._judged_rows(rows, self._measured([self._measurement(design)[0] for design in designs]))
-        if self.tolerance > 0.0:
-            for copies in moved(self.space, rows, self.tolerance):
-                found = np.maximum(found, self._judged_rows(copies))
-        return self.split(found)
-
-    def judge_one(self, design: Design) -> Judgement:
-        """What one design comes to; EvaluatorError where its evaluator fails and has no `worst`."""
-        if self.evaluator is None:
-            values, broken = self.judge([design])
-            return Judgement(tuple(values[0].tolist()), tuple(broken[0].tolist()))
-        measured, failure = self._measurement(design)
-        values, broken = self.split(self._judged_rows(self.space.matrix([design]), self._measured([measured])))
-        return Judgement(tuple(values[0].tolist()), tuple(broken[0].tolist()), failure)
-
-    def _measurement(self, design: Design) -> tuple[tuple[float, ...], str]:
-        """What the evaluator, where there is one, measures of a design, and why it could not."""
-        if self.evaluator is None:
-            return (), ""
-        try:
-            return self.evaluator(self.arm(design), self.task), ""
-        except EvaluatorError as failure:
-            if self.evaluator.worst is None:
-                raise
-            return self.evaluator.worst, str(failure)
-
-    def _measured(self, rows: Sequence[Sequence[float]]) -> Mapping[str, Array]:
-        """The evaluator's numbers of N designs by objective."""
-        if self.evaluator is None:
-            return NOTHING_MEASURED
-        names = [objective.name for objective in self.evaluator.objectives]
-        table = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
-        return {name: table[:, column] for column, name in enumerate(names)}
-
-    def evaluate(self, designs: Sequence[Design]) -> Array:
-        """(N, M): the objectives of N designs, minimised; of the paper: position error [m], torque [α-scaled]."""
-        return self.judge(designs)[0]
+    return table

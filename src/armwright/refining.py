@@ -65,7 +65,7 @@ def refine_members(history: History, members: Sequence[FrontMember], seed: int, 
     assert history.reference_point is not None
     return refine(
         problem.space.parameters,
-        problem.ranked_matrix,
+        lambda matrix: problem.evaluate_matrix(matrix).penalised,
         problem.space.matrix([member.design for member in members]),
         values,
         history.reference_point,

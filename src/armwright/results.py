@@ -25,11 +25,10 @@ from armwright.credit import credit_by_source
 from armwright.diagnostics import diagnose
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
-from armwright.feasibility import violation
 from armwright.files import replace_folder
 from armwright.history import FinishedTrial, FrontMember, History
 from armwright.misses import why_missed
-from armwright.pareto import hypervolume
+from armwright.pareto import hypervolume, total_violation
 from armwright.proposers.proposer import ProposerSummary
 from armwright.run_folder import FrontMethod, RunConfig, RunFolder, read_run
 from armwright.study_db import MOST_AT_END, discard_study, write_study
@@ -206,7 +205,11 @@ def _feasibility_record(history: History) -> dict[str, Any]:
     if len(history) and not history.feasible.any():
         (number,) = history.nearest(1)
         measured = {c.words: c.measured(value) for c, value in zip(constraints, history.broken[number], strict=True)}
-        nearest = {"number": number, "violation": float(violation(history.broken[[number]])[0]), "measured": measured}
+        nearest = {
+            "number": number,
+            "violation": float(total_violation(history.broken[[number]])[0]),
+            "measured": measured,
+        }
     return {
         "feasibility": {
             "infeasible": int((~history.feasible).sum()),

@@ -21,7 +21,7 @@ from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMe
 from armwright.judging import Here, Judged, Judging
 from armwright.parameters import Design
 from armwright.pareto import FrontTracker
-from armwright.problem import Judgement, Problem
+from armwright.problem import Outcome, Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.refining import Refinement, refine_one
@@ -392,13 +392,13 @@ class Study:
     def _tell(self, begun: _Begun, judged: Judged) -> None:
         """Lets the black box learn from a trial at once, whatever is before it."""
         started = time.perf_counter()
-        noted = self.black_box.tell(begun.trial, judged.judgement.values, judged.judgement.constraints)
+        noted = self.black_box.tell(begun.trial, judged.judgement.values, judged.judgement.violations)
         begun.sampling += time.perf_counter() - started
         begun.judged = judged
         begun.finished = replace(
             begun.finished,
             values=judged.judgement.values,
-            constraints=judged.judgement.constraints,
+            constraints=judged.judgement.violations,
             failure=judged.judgement.failure,
             sampler_notes=noted,
             seconds={
@@ -413,7 +413,7 @@ class Study:
         """Whether the trial that is recorded next has its values; if it is an earlier one's arm, they are known."""
         if begun.judged is None and begun.finished.same_as is not None:
             known = self.trials[begun.finished.same_as]
-            self._tell(begun, Judged(Judgement(known.values, known.constraints, known.failure), 0.0))
+            self._tell(begun, Judged(Outcome(known.values, known.constraints, known.failure), 0.0))
         return begun.judged is not None
 
     def _record(self, begun: _Begun, turns: Turns) -> None:

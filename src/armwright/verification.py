@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate_arrays
-from armwright.feasibility import counted
 from armwright.history import History
 from armwright.parameters import Design
-from armwright.problem import Problem
+from armwright.pareto import masked_objectives
+from armwright.problem import Outcomes, Problem, worst_case
 from armwright.tolerance import moved
 
 STARTS = 20
@@ -67,24 +67,23 @@ def verify(
     values: (N, M) what the search found.  reference_point: (M,) sets the scale of what is allowed.
     """
     rows = problem.space.matrix(designs)
-    exact, exactly_broken = problem.split(_judged(problem, rows))
-    copies = np.max([_judged(problem, copies) for copies in moved(problem.space, rows)], axis=0)
-    off, broken_off = problem.split(copies)
+    exact = _outcomes(problem, rows)
+    off = worst_case([_outcomes(problem, copies) for copies in moved(problem.space, rows)])
     dof = stack_designs(problem.space, rows).dof
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), dof))
-    started, broken_started = problem.split(np.max([_judged(problem, rows, start) for start in starts], axis=0))
+    started = worst_case([_outcomes(problem, rows, start) for start in starts])
     worst = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
-    built = np.maximum(exactly_broken, broken_off)
-    solid = np.all((exact <= worst) & (off <= worst), axis=1) & np.all(built <= ALLOWED_SHARE, axis=1)
-    from_any_start = solid & np.all(started <= worst, axis=1) & np.all(broken_started <= ALLOWED_SHARE, axis=1)
-    as_built = counted(np.max([values, exact, off], axis=0), built)
-    return Verification(values, exact, off, started, solid, from_any_start, as_built)
+    built = worst_case([exact, off])
+    solid = np.all(built.values <= worst, axis=1) & np.all(built.violations <= ALLOWED_SHARE, axis=1)
+    holds = np.all(started.values <= worst, axis=1) & np.all(started.violations <= ALLOWED_SHARE, axis=1)
+    as_built = masked_objectives(np.maximum(values, built.values), built.violations)
+    return Verification(values, exact.values, off.values, started.values, solid, solid & holds, as_built)
 
 
-def _judged(problem: Problem, rows: Array, start: Array | None = None) -> Array:
-    """(N, M + C) in float64.  start: (T, D) angles [rad]; None for the straight start."""
+def _outcomes(problem: Problem, rows: Array, start: Array | None = None) -> Outcomes:
+    """Evaluate designs in float64; start: (T, D) angles [rad], None for the straight start."""
     arrays = stack_designs(problem.space, rows, "float64")
     task = problem.task
     known = (task.obstacles, task.goals, task.lines, task.workspace)
     found = [evaluate_arrays(arrays, points, "cpu", start, loads, *known) for points, loads in task.cases]
-    return np.max([problem.judged(case) for case in found], axis=0)
+    return worst_case([problem.outcomes(case) for case in found])

@@ -183,7 +183,7 @@ def used(problem: Problem) -> None:
         if problem.space.design(design.params) != design:
             raise DefectError(f"a design that is not in its space: {design.params}")
     if _postures(problem) <= MOST_POSTURES:
-        problem.judge(designs)
+        problem.evaluate(designs)
     load_prompt("plus").render(History(problem, [], 1, problem.reference_point), 0)
 
 
@@ -394,7 +394,7 @@ def run_draft(data: bytes) -> None:
             if outside or len(inside) > 2:
                 raise DefectError(f"written elsewhere: {outside} {inside}")
     if _postures(draft.problem) <= MOST_POSTURES:
-        draft.problem.judge(draft.problem.space.sample(1, 0))
+        draft.problem.evaluate(draft.problem.space.sample(1, 0))
     json.dumps(draft.record(), allow_nan=False)
 
 

@@ -173,7 +173,7 @@ def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTria
     if missing:
         raise SettingsError(
             f'trial {trial.number} of the study does not say how far it breaks "{missing[0]}": '
-            f'trial.set_constraint("{missing[0]}", ...) with the value of problem.judge'
+            f'trial.set_constraint("{missing[0]}", ...) with its value in problem.evaluate([design]).violations'
         )
     return FinishedTrial(
         number,

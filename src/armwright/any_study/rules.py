@@ -21,7 +21,7 @@ from armwright.any_study.proposals import StudyProposal, StudyProposer
 from armwright.any_study.standing import best_trials, minimised, violation
 from armwright.any_study.unit import from_unit, is_number, to_unit
 from armwright.exceptions import DesignError, ProposalError
-from armwright.feasibility import ranked
+from armwright.pareto import penalised_objectives
 from armwright.proposers.rule_helpers import MIDDLE, change_until_new, draw_gap, proposal_id, rule_of
 
 T = TypeVar("T")
@@ -108,10 +108,10 @@ def standing_of(study: optuna.Study, space: Space, name: str) -> Standing:
     chosen = {trial.number for trial in best_trials(complete, study.directions)}
     rows = [i for i in by_rising(values[:, 0]) if complete[i].number in chosen]
     if len(rows) < 2:  # a lonely best one has no neighbour but the next best
-        rows = by_rising(ranked(values, broken)[:, 0])[:2] if len(complete) > 1 else []
+        rows = by_rising(penalised_objectives(values, broken)[:, 0])[:2] if len(complete) > 1 else []
     tried = tuple({**t.system_attrs.get("fixed_params", {}), **t.params} for t in trials)
     params = tuple(params for _, params in known)
-    return Standing(space, tuple(complete), params, ranked(values, broken), tuple(rows), tried, name)
+    return Standing(space, tuple(complete), params, penalised_objectives(values, broken), tuple(rows), tried, name)
 
 
 def in_order(violations: Sequence[float]) -> NDArray[np.float64]:

@@ -23,7 +23,17 @@ from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
-from armwright.objectives import OF_THE_WAY, ORIENTATION_ERROR, POSITION_ERROR, UNREACHED_TARGETS, Objective
+from armwright.objectives import (
+    OF_CLEARANCE,
+    OF_MOVES,
+    OF_THE_WAY,
+    OF_TIME,
+    ORIENTATION_ERROR,
+    POSITION_ERROR,
+    UNCOVERED_FRACTION,
+    UNREACHED_TARGETS,
+    Objective,
+)
 from armwright.problem import Problem
 from armwright.targets import REACHED, target_words
 from armwright.task import IN_ORDER, Task
@@ -290,13 +300,13 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
         "restricted": [p for p in problem.space.parameters if p.name in dict(problem.space.restrict)],
         "payload": _payload_words(problem.task),
         "obstacles": [obstacle.words() for obstacle in problem.task.obstacles],
-        "collisions": problem.heeds_clearance,
+        "collisions": problem.uses(*OF_CLEARANCE),
         "oriented": problem.task.goals.oriented,
         "restarts": problem.task.restarts,
-        "moves": _move_words(problem.task) if problem.heeds_moves else "",
-        "move_times": _time_words(problem.task) if problem.heeds_time else "",
-        "workspace": [region.words() for region in problem.task.workspace] if problem.heeds_workspace else [],
-        "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.counts(quantity)],
+        "moves": _move_words(problem.task) if problem.uses(*OF_MOVES) else "",
+        "move_times": _time_words(problem.task) if problem.uses(*OF_TIME) else "",
+        "workspace": [region.words() for region in problem.task.workspace] if problem.uses(UNCOVERED_FRACTION) else [],
+        "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.uses(quantity)],
         "updates_of_step": UPDATES_OF_STEP,
         "n_targets": len(problem.task.points),
         "updates": UPDATES,

@@ -26,7 +26,7 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 from armwright.exceptions import MissingExtraError, SettingsError, StorageError
 from armwright.extras import command
 from armwright.files import writable
-from armwright.problem import Judgement
+from armwright.problem import Outcome
 from armwright.sampling import quietly
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ BEGUN = "armwright"  # the trial as it was begun (`run_folder.begun_record`)
 NUMBER = "number"  # the search's own, which stays where it is posted again
 ERROR = "error"  # why its evaluator failed
 GIVEN_BACK = "given_back"  # its worker was stopped, and nothing is wrong with the trial
-FAILURE = "failure"  # as of `Judgement`
+FAILURE = "failure"  # as of `Outcome`
 SECONDS = "seconds"  # that its evaluation took
 FINISHED = "finished"  # of the study: there is nothing more to do
 
@@ -60,7 +60,7 @@ class Posted:
     number: int
     state: TrialState
     begun: Any
-    judgement: Judgement | None
+    judgement: Outcome | None
     seconds: float
     error: str
     is_given_back: bool
@@ -203,9 +203,9 @@ class Board:
         id_ = self._id(posted.place)
         return Heartbeats(lambda: self._database.record_heartbeat(id_), self._heartbeat)
 
-    def tell(self, posted: Posted, judgement: Judgement, seconds: float) -> bool:
+    def tell(self, posted: Posted, judgement: Outcome, seconds: float) -> bool:
         """Writes a trial's values; False where they came too late, and others were told for it."""
-        constraints = dict(zip(self._constraints, judgement.constraints, strict=True))
+        constraints = dict(zip(self._constraints, judgement.violations, strict=True))
         attributes: dict[str, Any] = {SECONDS: round(seconds, 6)}
         if judgement.failure:
             attributes[FAILURE] = writable(judgement.failure)
@@ -250,7 +250,7 @@ class Board:
         judgement = None
         if trial.state == TrialState.COMPLETE:
             broken = tuple(float(trial.system_attrs[f"constraints:{name}"]) for name in self._constraints)
-            judgement = Judgement(tuple(trial.values), broken, str(told.get(FAILURE, "")))
+            judgement = Outcome(tuple(trial.values), broken, str(told.get(FAILURE, "")))
         return Posted(
             place=trial.number,
             number=told[NUMBER],
