@@ -15,8 +15,8 @@ from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
 from armwright.kinematics.arm_arrays import Precision, stack_arms
-from armwright.kinematics.chain import link_lines
 from armwright.kinematics.clearance import clearances
+from armwright.kinematics.forward import link_lines
 from armwright.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
 from armwright.space import DesignSpace, paper_space
 from tests.arms import moving_arms

@@ -11,7 +11,8 @@ from armwright.batch_builder import stack_designs
 from armwright.evaluation import evaluate
 from armwright.export.urdf import to_urdf
 from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.jacobian import frames_of, jacobians
+from armwright.kinematics.forward import forward_kinematics
+from armwright.kinematics.jacobian import jacobians
 from armwright.objectives import named_objectives
 from armwright.problem import Problem
 from armwright.space import DesignSpace, paper_space
@@ -39,7 +40,7 @@ def postures(arms: list[Arm], t: int, dof: int, seed: int = 0) -> Array:
 def test_the_jacobian_is_pinocchio_s(arms: list[Arm]) -> None:
     stacked = stack_arms(arms, "float64")
     q = postures(arms, 3, stacked.dof)
-    ours, frames = jacobians(stacked, q), frames_of(stacked, q)
+    ours, frames = jacobians(stacked, q), forward_kinematics(stacked, q)
     for i, arm in enumerate(arms):
         model = pinocchio.buildModelFromXML(to_urdf(arm))
         data = model.createData()

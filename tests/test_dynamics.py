@@ -22,7 +22,8 @@ from armwright.export.shapes import inertia_tensor
 from armwright.export.urdf import to_urdf
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.dynamics import inverse_dynamics
-from armwright.kinematics.jacobian import frames_of, jacobian_rate, jacobians
+from armwright.kinematics.forward import forward_kinematics
+from armwright.kinematics.jacobian import jacobian_rate, jacobians
 from armwright.moves import Moves, lines_of, moments, timing_of
 from armwright.objectives import OF_MOVES, OF_TIME, named_objectives
 from armwright.problem import Problem
@@ -139,7 +140,7 @@ def test_power_is_the_change_of_energy() -> None:
         # v' M v / 2 from torques without gravity, of an acceleration v; and height from gravity as the only force
         speed = v + a * t
         kinetic = 0.5 * (speed * inverse_dynamics(arrays, at, 0.0 * v, speed, load, 0.0)).sum(axis=(1, 2))
-        frames = frames_of(arrays, at)
+        frames = forward_kinematics(arrays, at)
         bodies = arrays.bodies
         heights = (frames.place + (frames.rotation @ bodies.total_com[:, None, :, :, None])[..., 0])[..., 2]
         potential = 9.81 * ((bodies.total_mass[:, None] * heights).sum(axis=2) + load * frames.tip[..., 2])
@@ -155,7 +156,7 @@ def test_the_jacobian_s_rate_is_its_difference() -> None:
     arrays, q, v, _ = motions(any_arms(60, 7), 3, 8)
     h = 1e-6
     difference = (jacobians(arrays, q + h * v) - jacobians(arrays, q - h * v)) / (2 * h)
-    assert jacobian_rate(arrays, frames_of(arrays, q), v) == pytest.approx(difference, abs=1e-7)
+    assert jacobian_rate(arrays, forward_kinematics(arrays, q), v) == pytest.approx(difference, abs=1e-7)
 
 
 # Along timed lines

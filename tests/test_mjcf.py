@@ -12,7 +12,7 @@ import pytest
 from armwright.arm import Arm, Joint, Link, uniform_link
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
-from armwright.kinematics.chain import joint_positions
+from armwright.kinematics.forward import joint_positions
 from tests import reference
 from tests.arms import general_arms, paper_arms
 from tests.reference import Array

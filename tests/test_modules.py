@@ -17,7 +17,7 @@ from armwright.exceptions import DesignError, SpaceError
 from armwright.export.mjcf import to_mjcf
 from armwright.export.urdf import to_urdf
 from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.chain import joint_positions
+from armwright.kinematics.forward import joint_positions
 from armwright.kinematics.solve import solve_postures
 from armwright.modules import MODULES, MOUNTS
 from armwright.problem import Problem

@@ -19,7 +19,7 @@ from armwright.best_known import known_front
 from armwright.decision import pick_from, read_condition
 from armwright.exceptions import RunFolderError
 from armwright.history import History
-from armwright.kinematics.chain import joint_positions
+from armwright.kinematics.forward import joint_positions
 from armwright.pareto import front_numbers
 from armwright.report.page import program, write_report
 from armwright.run_folder import read_run

@@ -12,7 +12,7 @@ from armwright.arm import Arm, Joint, Link, uniform_link
 from armwright.exceptions import ArmError
 from armwright.export.limits import limits_of
 from armwright.export.sdf import to_sdf
-from armwright.kinematics.chain import joint_positions
+from armwright.kinematics.forward import joint_positions
 from tests import reference
 from tests.exported import ARMS, MIXED, full, load, moving, peer_of, postures
 from tests.reference import Array

@@ -14,7 +14,7 @@ from armwright.arm import Arm, Joint
 from armwright.export.mjcf import to_mjcf
 from armwright.export.sdf import to_sdf
 from armwright.export.xacro import to_xacro
-from armwright.kinematics.chain import joint_positions
+from armwright.kinematics.forward import joint_positions
 from tests.exported import ARMS, Peer, full, peer_of, postures, processed
 from tests.reference import Array
 

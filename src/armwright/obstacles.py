@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import did_you_mean
-from armwright.rotations import rotation_to_axis
+from armwright.rotations import rotation_from_rpy, rotation_to_axis
 
 Point = tuple[float, float, float]
 Shape = Literal["box", "sphere", "cylinder", "ground"]
@@ -61,7 +61,7 @@ class Box(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @property
     def solid(self) -> Solid:
         x, y, z = self.size
-        return Solid("box", self.center, _turned(*(self.rpy or (0.0, 0.0, self.yaw))), (x / 2, y / 2, z / 2))
+        return Solid("box", self.center, rotation_from_rpy(*(self.rpy or (0.0, 0.0, self.yaw))), (x / 2, y / 2, z / 2))
 
     def words(self) -> str:
         """What it is, on one line."""
@@ -154,15 +154,6 @@ def check_obstacle(record: Any, number: int) -> None:
             raise ValueError(
                 f'obstacle {number}: a {kind} has no "{key}".{did_you_mean(str(key), keys)} Keys: {", ".join(keys)}'
             )
-
-
-def _turned(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
-    """(3, 3): about the world's x, then y, then z."""
-    (a, b, c), (d, e, f) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, a, -d], [0.0, d, a]])
-    about_y = np.array([[b, 0.0, e], [0.0, 1.0, 0.0], [-e, 0.0, b]])
-    about_z = np.array([[c, -f, 0.0], [f, c, 0.0], [0.0, 0.0, 1.0]])
-    return about_z @ about_y @ about_x
 
 
 def _point(values: Point) -> str:

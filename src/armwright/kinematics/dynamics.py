@@ -15,7 +15,8 @@ import numpy as np
 from armwright.arm import GRAVITY
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, ArmArrays
-from armwright.kinematics.jacobian import Frames, frames_of, jacobian_of, jacobian_rate
+from armwright.kinematics.forward import Frames, forward_kinematics
+from armwright.kinematics.jacobian import jacobian_of, jacobian_rate
 from armwright.kinematics.paths import Paths, largest_of
 from armwright.moves import Moves, Timing, timing_of
 
@@ -31,7 +32,7 @@ def inverse_dynamics(
     q, velocity, acceleration: (N, K, D) [rad] or [m], each second.  payload: (K,) a point mass at the tip [kg].
     gravity: along -z [m/s²].
     """
-    return _newton_euler(arms, frames_of(arms, q), velocity, acceleration, payload, gravity)
+    return _newton_euler(arms, forward_kinematics(arms, q), velocity, acceleration, payload, gravity)
 
 
 def _newton_euler(
@@ -105,7 +106,7 @@ def driven(arms: ArmArrays, paths: Paths) -> Drives:
 def _driven(arms: ArmArrays, paths: Paths, rows: slice, line: Array, timing: Timing) -> tuple[Array, Array]:
     """(N, F, D) torques and speeds of the arms in these rows of the paths; line: (S, 3) [m]."""
     q = paths.q[rows]
-    frames = frames_of(arms, q)
+    frames = forward_kinematics(arms, q)
     way, bend = _course(arms, q, frames, line)
     push = _newton_euler(arms, frames, np.zeros(way.shape), way, paths.payload, 0.0)
     drag = _newton_euler(arms, frames, way, bend, paths.payload, 0.0)

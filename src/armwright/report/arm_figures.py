@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from armwright.evaluation import Evaluation
 from armwright.history import FrontMember, History
-from armwright.kinematics.chain import joint_positions, link_lines, rails
+from armwright.kinematics.forward import joint_positions, link_lines, rails
 from armwright.objectives import TORQUE
 from armwright.obstacles import Ground
 from armwright.report.solids import draw_obstacles
