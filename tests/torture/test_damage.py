@@ -4,7 +4,7 @@ import json
 import random
 import shutil
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -57,10 +57,10 @@ def doubled(content: bytes, chance: random.Random) -> bytes:
     return content[:other] + content[one:]
 
 
-DAMAGE = (cut, spoilt, doubled)
-FILES = (
-    "trials.jsonl",
-    "config.yaml",
+Damage = Callable[[bytes, random.Random], bytes]
+DAMAGE: tuple[Damage, ...] = (cut, spoilt, doubled)
+NEEDED = ("trials.jsonl", "config.yaml")  # a run cannot be resumed without them
+DERIVED = (
     "status.json",
     "control.json",
     "summary.json",
@@ -71,34 +71,62 @@ FILES = (
 )
 
 
-def goes_on(folder: Path, name: str, go_on: Callable[[Path], object]) -> str:
-    """`resumed`, or `refused` in one line that names the file or what in it cannot be."""
+def resume(folder: Path, name: str, go_on: Callable[[Path], object]) -> str:
+    """`resumed`, or `refused` in one line that names the file or the setting that differs."""
     try:
         go_on(folder)
     except ArmwrightError as refusal:
-        words = str(refusal)
-        assert "\n" not in words
-        assert name in words or "other settings" in words, words
+        message = str(refusal)
+        assert "\n" not in message
+        assert name in message or "other settings" in message, message
         return "refused"
     return "resumed"
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_damaged_files(tmp_path: Path, intact: Path, name: str, kills: int, record_property: Tell) -> None:
+def damaged_copies(intact: Path, tmp_path: Path, name: str, n: int) -> Iterator[tuple[Path, Damage]]:
+    """Copies of a run with one file cut short, overwritten in part or doubled in part, at random places."""
     chance = random.Random(name)
-    came_to: Counter[str] = Counter()
-    for n in range(kills):
-        folder = tmp_path / f"run{n}"
+    for number in range(n):
+        folder = tmp_path / f"run{number}"
         shutil.copytree(intact, folder)
-        before = (intact / name).read_bytes() or b" "
-        damage = DAMAGE[n % len(DAMAGE)]
-        (folder / name).write_bytes(damage(before, chance))
-        came_to[goes_on(folder, name, short)] += 1
-        if (damage is cut or name not in ("trials.jsonl", "config.yaml")) and came_to["resumed"] and folder.exists():
-            there = trials(folder)
-            assert there == trials(intact)[: len(there)]
+        damage = DAMAGE[number % len(DAMAGE)]
+        (folder / name).write_bytes(damage((intact / name).read_bytes() or b" ", chance))
+        yield folder, damage
         shutil.rmtree(folder)
-    record_property(f"damaged {name}", f"{kills} times: {came_to['resumed']} resumed, {came_to['refused']} refused")
+
+
+def count(outcomes: Counter[str]) -> str:
+    return f"{outcomes.total()} times: {outcomes['resumed']} resumed, {outcomes['refused']} refused"
+
+
+@pytest.mark.parametrize("name", DERIVED)
+def test_a_damaged_derived_file_does_not_change_a_resumed_run(
+    tmp_path: Path, intact: Path, name: str, kills: int, record_property: Tell
+) -> None:
+    for folder, _ in damaged_copies(intact, tmp_path, name, kills):
+        assert resume(folder, name, short) == "resumed"
+        assert trials(folder) == trials(intact)
+    record_property(f"damaged {name}", f"{kills} times: all resumed")
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_a_damaged_needed_file_is_refused_by_name_or_harmless(
+    tmp_path: Path, intact: Path, name: str, kills: int, record_property: Tell
+) -> None:
+    """Trials whose numbers changed to other valid ones are not noticed: there are no checksums."""
+    outcomes: Counter[str] = Counter()
+    for folder, damage in damaged_copies(intact, tmp_path, name, kills):
+        before = (folder / "trials.jsonl").read_bytes()
+        outcome = resume(folder, name, short)
+        outcomes[outcome] += 1
+        if outcome == "refused":
+            assert (folder / "trials.jsonl").read_bytes() == before
+        elif name == "config.yaml" or damage is cut:
+            assert trials(folder) == trials(intact)
+        else:
+            assert [trial["number"] for trial in trials(folder)] == list(range(len(trials(intact))))
+    assert outcomes["refused"]
+    record_property(f"damaged {name}", count(outcomes))
 
 
 def test_trials_cut_at_any_byte_are_made_again(tmp_path: Path, intact: Path, kills: int) -> None:
@@ -122,7 +150,7 @@ def test_a_config_cut_at_any_line_is_refused_or_the_same_run(tmp_path: Path, int
         folder = tmp_path / f"run{n}"
         shutil.copytree(intact, folder)
         (folder / "config.yaml").write_text("".join(lines[:n]))
-        if goes_on(folder, "config.yaml", short) == "resumed":
+        if resume(folder, "config.yaml", short) == "resumed":
             assert n > len(lines) - 12, lines[n]  # versions that are not told
             assert trials(folder) == trials(intact)
 
@@ -150,47 +178,44 @@ def test_damaged_transcripts(tmp_path: Path, chat_server: ChatServer, kills: int
     def ask(folder: Path) -> Run:
         return short(folder, proposer=LlmProposer("m", chat_server.url))
 
-    intact, chance = tmp_path / "intact", random.Random("transcripts")
+    intact = tmp_path / "intact"
     ask(intact)
-    content = (intact / "transcripts.jsonl").read_bytes()
-    came_to: Counter[str] = Counter()
-    for n in range(kills):
-        folder = tmp_path / f"run{n}"
-        shutil.copytree(intact, folder)
+    outcomes: Counter[str] = Counter()
+    for folder, damage in damaged_copies(intact, tmp_path, "transcripts.jsonl", kills):
         # Half of the trials are still to come; what was answered is in the transcript, as far as it is intact.
         lines = (intact / "trials.jsonl").read_bytes().splitlines(keepends=True)
         (folder / "trials.jsonl").write_bytes(b"".join(lines[:5]))
-        damage = DAMAGE[n % len(DAMAGE)]
-        (folder / "transcripts.jsonl").write_bytes(damage(content, chance))
-        came_to[goes_on(folder, "transcripts.jsonl", ask)] += 1
+        outcome = resume(folder, "transcripts.jsonl", ask)
+        outcomes[outcome] += 1
         if damage is cut:
+            assert outcome == "resumed"
             assert trials(folder) == trials(intact)
-    record_property(
-        "damaged transcripts.jsonl", f"{kills} times: {came_to['resumed']} resumed, {came_to['refused']} refused"
-    )
+        kept = len(lines) if outcome == "resumed" else 5
+        assert [trial["number"] for trial in trials(folder)] == list(range(kept))
+    record_property("damaged transcripts.jsonl", count(outcomes))
 
 
 def test_a_damaged_search(tmp_path: Path, kills: int, record_property: Tell) -> None:
     def search(folder: Path, budget: str = "3000") -> object:
         return find_front(PROBLEM, budget=budget, seed=1, stop_at_stall=False, out=folder)
 
-    intact, chance = tmp_path / "intact", random.Random("search")
+    intact, extended, restarted = (tmp_path / name for name in ("intact", "extended", "restarted"))
     search(intact, "2000")
-    content = (intact / "search.npz").read_bytes()
-    came_to: Counter[str] = Counter()
-    for n in range(max(3, kills // 10)):
-        folder = tmp_path / f"run{n}"
-        shutil.copytree(intact, folder)
-        (folder / "search.npz").write_bytes(DAMAGE[n % 2](content, chance))
-        if goes_on(folder, "search.npz", search) == "refused":
-            came_to["refused"] += 1
-            (folder / "search.npz").unlink()  # as the words say
+    for undamaged in (extended, restarted):
+        shutil.copytree(intact, undamaged)
+    (restarted / "search.npz").unlink()
+    search(extended)
+    search(restarted)
+    outcomes: Counter[str] = Counter()
+    for folder, _ in damaged_copies(intact, tmp_path, "search.npz", max(3, kills // 10)):
+        outcome = resume(folder, "search.npz", search)
+        outcomes[outcome] += 1
+        if outcome == "refused":
+            (folder / "search.npz").unlink()  # as the message says
             search(folder)
-        else:
-            came_to["resumed"] += 1
-    record_property(
-        "damaged search.npz", f"{came_to.total()} times: {came_to['resumed']} resumed, {came_to['refused']} refused"
-    )
+        assert trials(folder) == trials(restarted if outcome == "refused" else extended)
+    assert outcomes["refused"]
+    record_property("damaged search.npz", count(outcomes))
 
 
 def test_a_run_of_an_older_version_goes_on(tmp_path: Path) -> None:
