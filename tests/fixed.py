@@ -27,7 +27,7 @@ class FixedProblem(Problem):
         rows = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
         targets = self.task.points
         built = self.space.designs(rows)
-        n, t, d = len(built), len(targets), self.space.most_joints
+        n, t, d = len(built), len(targets), self.space.max_joints
         reach = np.array([sum(design.links) for design in built])
         base = np.array([design.origin for design in built]).reshape(n, 3)
         away = targets[None] - base[:, None]  # (N, T, 3)
@@ -37,7 +37,7 @@ class FixedProblem(Problem):
         lower, upper = self.space.joint_range
         steps = 0.4 * np.arange(1, d + 1) * (1 + np.arange(t)[:, None] % 3) - 1.5  # (T, D)
         q = np.broadcast_to(np.clip(steps, lower, upper), (n, t, d)).copy()
-        mass = self.space.most_joints * self.space.mass.mass(self.space.link[1])
+        mass = self.space.max_joints * self.space.mass.mass(self.space.link[1])
         lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
         arms = stack_designs(self.space, rows)

@@ -114,10 +114,10 @@ def test_a_single_actuator_is_no_parameter() -> None:
     ("space", "words"),
     [
         ({"actuators": ["XM430-W35"]}, 'unknown actuator "XM430-W35".*Did you mean'),
-        ({"actuators": [BIG, dict(BIG)]}, "names one twice"),
+        ({"actuators": [BIG, dict(BIG)]}, "actuators has duplicates"),
         ({"actuators": [MID], "actuator_torque": "rated"}, "mid has no rated torque, its stall torque is known"),
         ({"actuators": [{"name": "x", "mass": -1.0}]}, "mass"),
-        ({"actuators": "XM430-W350"}, "actuators is a list"),
+        ({"actuators": "XM430-W350"}, "expected a list of names"),
         ({"actuators": [MID], "safety_factor": 0.0}, "safety_factor"),
     ],
 )

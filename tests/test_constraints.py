@@ -23,6 +23,7 @@ from armwright.decision import numbers_of, pick
 from armwright.exceptions import FailureError, RunConflictError, RunFolderError, SettingsError, TaskError
 from armwright.front import find_front
 from armwright.history import FinishedTrial, History, found_reference_point
+from armwright.parameters import CategoricalParameter, FloatParameter
 from armwright.pareto import (
     default_reference_point,
     feasible_mask,
@@ -41,7 +42,7 @@ from armwright.results import verify_run
 from armwright.run_folder import read_run
 from armwright.sampling import BlackBox
 from armwright.search.front import FrontSearch
-from armwright.space import CategoricalParameter, FloatParameter, paper_space
+from armwright.space import paper_space
 from armwright.study import optimize
 from armwright.task import Task, load_task, task_template
 from armwright.tolerance import moved

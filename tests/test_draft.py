@@ -478,7 +478,7 @@ def test_what_the_prompt_shows_as_finished_is_valid() -> None:
     assert aw.Task.model_validate(yaml.safe_load(shown)) == aw.load_task("shelf")
     space = aw.DesignSpace.model_validate(yaml.safe_load(SPACE_EXAMPLE))
     farthest = max(sum(c * c for c in point) ** 0.5 for point in aw.load_task("shelf").targets)
-    assert space.longest_reach / farthest == pytest.approx(1.4, abs=0.05)  # as its comment says
+    assert space.max_reach / farthest == pytest.approx(1.4, abs=0.05)  # as its comment says
 
 
 @pytest.mark.parametrize("text", ["`" * 100_000, "```\n" * 24_999, "- " * 50_000, "TASK\n" * 20_000, "{" * 100_000])

@@ -172,9 +172,9 @@ def test_designs_keep_what_matters_through_rows_and_files(seed: int) -> None:
     assert len(design.joints) == len(design.links) == len(design.directions) == n
     for j, letter in enumerate(design.joints, start=1):
         module = MODULES[letter]  # pyright: ignore[reportArgumentType]
-        assert (f"stroke_{j}" in design.params) == module.slides
-        assert (f"limit_{j}" in design.params) == module.turns
-        assert (f"motor_{j}" in design.params) == module.moves
+        assert (f"stroke_{j}" in design.params) == module.is_prismatic
+        assert (f"limit_{j}" in design.params) == module.is_revolute
+        assert (f"motor_{j}" in design.params) == module.is_actuated
     every = {p.name: MIXED.parameters[i] for i, p in enumerate(MIXED.parameters)}
     filled = {**{name: p.choices[0] if hasattr(p, "choices") else p.low for name, p in every.items()}, **design.params}  # pyright: ignore
     assert MIXED.design(filled) == design  # what does not matter may be given, and is left out
@@ -185,12 +185,12 @@ def test_what_a_sampler_draws_is_what_matters() -> None:
     for number in range(25):
         trial, design = box.draw(number, "random" if number < 10 else "bbo")
         assert MIXED.design(design.params) == design
-        assert trial.params == MIXED.searched(design)
+        assert trial.params == MIXED.free_values(design)
         box.tell(trial, (float(number), 1.0 / (1 + number)))
     (given_design,) = MIXED.sample(1, 99)
     trial, design = box.inject(given_design, 25, "rules", "rules-0025")
     assert design == given_design
-    assert trial.params == MIXED.searched(design)
+    assert trial.params == MIXED.free_values(design)
 
 
 def test_ties_and_grids() -> None:
@@ -202,14 +202,14 @@ def test_ties_and_grids() -> None:
         assert design.origin[2] in (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
         assert all(length == round(length, 2) for length in design.links)
         assert space.design(design.params) == design
-        assert space.completed(space.searched(design)) == design
+        assert space.from_free_values(space.free_values(design)) == design
     box = BlackBox(space, "tpe", 0)
     for number in range(15):
         trial, design = box.draw(number, "random" if number < 10 else "bbo")
         assert space.design(design.params) == design
         assert "link_3" not in trial.params
         box.tell(trial, (design.links[0], design.origin[2]))
-    free = space.searched(design)
+    free = space.free_values(design)
     assert space.design(free) == design
     with pytest.raises(DesignError, match="tied"):
         space.design({**design.params, "link_3": 0.03 if design.links[1] != 0.03 else 0.04})
@@ -220,20 +220,20 @@ def test_ties_and_grids() -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"joints": [3, 2]}, "fewest and the most"),
+        ({"joints": [3, 2]}, "the smallest and the largest"),
         ({"joints": [1, 9]}, "from 1 to 8"),
-        ({"joint_types": ["F"]}, "joints that move"),
+        ({"joint_types": ["F"]}, "at least one type must move"),
         ({"stroke": 0.001}, "stroke"),
-        ({"stroke": [0.3, 0.1], "joint_types": ["S"]}, "upside down"),
+        ({"stroke": [0.3, 0.1], "joint_types": ["S"]}, "is reversed"),
         ({"limit": [0.0, 2.0]}, "limit"),
         ({"mount": ["sky"]}, "mount"),
-        ({"mount": ["floor", "floor"]}, "twice"),
+        ({"mount": ["floor", "floor"]}, "mount has duplicates"),
         ({"tool": [0.0, 2000.0, 0.0]}, "tool"),
-        ({"tie": {"link_9": "link_1"}}, 'no parameter "link_9"'),
+        ({"tie": {"link_9": "link_1"}}, 'unknown parameter "link_9"'),
         ({"tie": {"link_2": "origin_x"}}, "different ranges"),
         ({"tie": {"link_2": "link_3", "link_3": "link_4"}}, "tied itself"),
-        ({"tie": {"link_2": "link_3"}, "joints": [2, 3]}, "other way round"),
-        ({"grid": {"joint_1": 1.0}}, "no real parameter"),
+        ({"tie": {"link_2": "link_3"}, "joints": [2, 3]}, "reverse the tie"),
+        ({"grid": {"joint_1": 1.0}}, "unknown real parameter"),
         ({"grid": {"link": 0.0}}, "above 0"),
     ],
 )
@@ -259,3 +259,9 @@ def test_all_of_it_is_searched() -> None:
     values = problem.evaluate_matrix(rows).values
     assert np.array_equal(values, problem.evaluate(problem.space.designs(rows)).values)
     assert values[:, 0].min() < 1.0
+
+
+def test_an_empty_matrix_gives_no_arms() -> None:
+    for space in (paper_space(), MIXED):
+        assert space.designs(space.matrix([])) == []
+        assert len(stack_designs(space, space.matrix([])).base) == 0

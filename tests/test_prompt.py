@@ -256,7 +256,7 @@ def test_every_problem_is_told_whole_and_short(
     assert exact(space.link[0]) in text
     assert exact(space.link[1]) in text
     assert f"[{exact(space.joint_range[0])}, {exact(space.joint_range[1])}] rad" in text
-    assert space.mass.words() in text
+    assert space.mass.description in text
     for kind in space.joint_types:
         assert f"  - {kind}: " in text
     headings = [line for line in text.splitlines() if line.startswith("# ")]

@@ -144,7 +144,7 @@ def test_optuna_has_the_run(run: Path) -> None:
         for trial, ours in zip(study.trials, history, strict=True):
             assert trial.number == ours.number
             assert trial.state is TrialState.COMPLETE
-            assert trial.params == history.problem.space.searched(ours.design)
+            assert trial.params == history.problem.space.free_values(ours.design)
             assert trial.distributions == {name: space[name] for name in trial.params}
             assert trial.values == list(ours.values)
             assert tuple(trial.constraints.values()) == ours.constraints
@@ -274,7 +274,7 @@ def test_one_goes_on_with_it_and_loses_nothing_when_the_run_goes_on_too(tmp_path
                 else trial.suggest_categorical(name, each.choices)
                 for name, each in space.items()
             }
-            return tuple(problem.evaluate([problem.space.completed(given)]).values[0].tolist())
+            return tuple(problem.evaluate([problem.space.from_free_values(given)]).values[0].tolist())
 
         study.optimize(objective, n_trials=3)
         save_note(study, "mine")

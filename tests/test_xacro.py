@@ -15,7 +15,9 @@ from armwright.export.limits import limits_of
 from armwright.export.urdf import to_urdf
 from armwright.export.xacro import to_xacro
 from armwright.exporting import mass_per_metre
-from armwright.space import Design, DesignSpace, MassModel
+from armwright.masses import MassModel
+from armwright.parameters import Design
+from armwright.space import DesignSpace
 from tests.exported import ARMS, MIXED, Peer, load, moving, peer_of, postures, processed
 
 EVERY_ARM = pytest.mark.parametrize("arm", ARMS)

@@ -60,7 +60,7 @@ def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "flo
     }
     if actuation is not None:
         per_joint |= {"effort": actuation.effort, "speed": actuation.speed}
-    present = present.reshape(columns.n, -1)
+    present = _flatten(present)
     flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
     n_joints = present.sum(axis=1).astype(np.int32)
     tool = _rotate_one(np.array(space.tool), columns)
@@ -98,7 +98,7 @@ class _Columns:
     def __init__(self, space: DesignSpace, matrix: Array) -> None:
         self._space, self._matrix = space, matrix
         self._column = {parameter.name: i for i, parameter in enumerate(space.parameters)}
-        self.n, self.modules = len(matrix), space.most_joints
+        self.n, self.modules = len(matrix), space.max_joints
         self.present = np.ones((self.n, self.modules), dtype=bool)
         if "n_joints" in self._column:
             counts = self._indices("n_joints", int)
@@ -172,7 +172,7 @@ def _limits(space: DesignSpace, columns: _Columns, plan: Indices) -> tuple[Array
         lower = -upper
     else:
         lower, upper = np.full((1, 1, 1), low), np.full((1, 1, 1), high)
-    stroke = columns.reals("stroke", space.least_stroke)[..., None]
+    stroke = columns.reals("stroke", space.min_stroke)[..., None]
     lower = np.where(plan < PRISMATIC, lower, np.where(plan < FIXED, 0.0, -1.0))
     upper = np.where(plan < PRISMATIC, upper, np.where(plan < FIXED, stroke, 1.0))
     return lower, upper
@@ -180,8 +180,8 @@ def _limits(space: DesignSpace, columns: _Columns, plan: Indices) -> tuple[Array
 
 def _carried(space: DesignSpace, columns: _Columns, joints: _Joints) -> tuple[_Carried, Actuation | None]:
     """Return the masses of rails and actuators, and (N, M, K) what the actuators can do."""
-    stroke = columns.reals("stroke", space.least_stroke)
-    rails = np.where(joints.slides[..., -1], space.mass.masses(stroke), 0.0)
+    stroke = columns.reals("stroke", space.min_stroke)
+    rails = np.where(joints.slides[..., -1], space.mass.mass(stroke), 0.0)
     if not space.actuators:
         return _Carried(rails, rails), None
     moving = (joints.plan < FIXED).sum(axis=2)  # (N, M) joints that need an actuator
@@ -207,7 +207,7 @@ def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array, Array]:
 def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Carried) -> tuple[Bodies, Array]:
     """Return the links as bodies, (N, M, ...) each, and (N, M, 3) their centres of mass from the joint [m]."""
     links = columns.links
-    mass = np.where(columns.present, space.mass.masses(links), 0.0)
+    mass = np.where(columns.present, space.mass.mass(links), 0.0)
     end_mass = np.concatenate([carried.mass[:, 1:], np.zeros((columns.n, 1))], axis=1)
     directions = columns.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
     direction = _rotate(_VECTORS[directions], columns.mount)  # (N, M, 3)
@@ -227,7 +227,7 @@ def _end_shift(space: DesignSpace, columns: _Columns, plan: Indices, carried: _C
     if not rails.any():
         return 0.0
     share = np.where(rails > 0.0, rails / np.where(carried.mass > 0.0, carried.mass, 1.0), 0.0)
-    shift = share * (columns.reals("stroke", space.least_stroke) / 2)
+    shift = share * (columns.reals("stroke", space.min_stroke) / 2)
     local = np.eye(3)[plan[..., -1] % PRISMATIC] * shift[..., None]
     shifts = np.zeros_like(local)
     shifts[:, :-1] = _rotate(local, columns.mount)[:, 1:]

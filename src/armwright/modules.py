@@ -1,6 +1,6 @@
-"""The joint modules that a design is put together from, and where an arm can stand.
+"""The joint modules that a design is assembled from, and the ways to mount an arm.
 
-A design says its joints as a word, a letter for each module: `YPRP`. Letters R, P, Y, O, S and F are those of
+A design states its joints as a word with one letter per module: `YPRP`. Letters R, P, Y, O, S and F are those of
 Kawaharazuka et al. (arXiv:2409.20038).
 """
 
@@ -18,26 +18,30 @@ Mount = Literal["floor", "ceiling", "wall+x", "wall-x", "wall+y", "wall-y"]
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """Joints at one place, of which the last moves the link that follows.
+    """Joints at one place, followed by a link.
 
-    joints: kind and local axis of each.  words: for a reader who knows nothing of this program.
+    Attributes:
+        joints: Kind and local axis of each joint. The link follows the last one.
+        description: What the module is, for a reader who does not know this program.
     """
 
     joints: tuple[tuple[JointKind, Axis], ...]
-    words: str
+    description: str
 
     @property
-    def turns(self) -> bool:
+    def is_revolute(self) -> bool:
+        """Whether its joints rotate."""
         return self.joints[0][0] == "revolute"
 
     @property
-    def slides(self) -> bool:
+    def is_prismatic(self) -> bool:
+        """Whether its joint translates."""
         return self.joints[0][0] == "prismatic"
 
     @property
-    def moves(self) -> bool:
-        """Whether it needs an actuator for each of its joints."""
-        return self.turns or self.slides
+    def is_actuated(self) -> bool:
+        """Whether it has an actuator for each of its joints."""
+        return self.is_revolute or self.is_prismatic
 
 
 MODULES: Mapping[JointType, Module] = MappingProxyType(
@@ -52,7 +56,7 @@ MODULES: Mapping[JointType, Module] = MappingProxyType(
         "F": Module((("fixed", "z"),), "fixed, no joint: its link is a part of the one before"),
     }
 )
-JOINT_WORDS: Mapping[JointType, str] = {letter: module.words for letter, module in MODULES.items()}
+JOINT_DESCRIPTIONS: Mapping[JointType, str] = {letter: module.description for letter, module in MODULES.items()}
 
 DIRECTIONS: Mapping[Direction, Vector] = MappingProxyType(
     {
@@ -65,8 +69,8 @@ DIRECTIONS: Mapping[Direction, Vector] = MappingProxyType(
     }
 )
 
-# Where the base's own x, y and z point to in the world. The arm's frames are parallel to the world's all the same: an
-# axis about which the base turns one way is the world's own, turned the other way.
+# World directions of the base's x, y and z axes. All frames of the arm stay parallel to the world frame: if the base
+# turns an axis around, the joint rotates about the world axis with the opposite sign.
 MOUNTS: Mapping[Mount, tuple[Direction, Direction, Direction]] = MappingProxyType(
     {
         "floor": ("+x", "+y", "+z"),
@@ -77,7 +81,7 @@ MOUNTS: Mapping[Mount, tuple[Direction, Direction, Direction]] = MappingProxyTyp
         "wall-y": ("+x", "+z", "-y"),
     }
 )
-MOUNT_WORDS: Mapping[Mount, str] = {
+MOUNT_DESCRIPTIONS: Mapping[Mount, str] = {
     "floor": "stands on a floor, local z up",
     "ceiling": "hangs from a ceiling, local z down",
     "wall+x": "on a wall, local z along world +x",
@@ -88,13 +92,13 @@ MOUNT_WORDS: Mapping[Mount, str] = {
 
 
 def mounted(axis: Axis, mount: Mount) -> tuple[Axis, float]:
-    """The world's axis that the base's own `axis` lies along, and 1 where they point the same way, else -1."""
+    """Return the world axis parallel to an axis of the base, and their relative sign (1 or -1)."""
     sign, world = MOUNTS[mount][AXES.index(axis)]
     return AXES[AXES.index(world)], 1.0 if sign == "+" else -1.0  # pyright: ignore[reportArgumentType]
 
 
 def mounted_vector(vector: Vector, mount: Mount) -> Vector:
-    """A vector in the base's axes, in the world's."""
+    """Return a vector of the base frame in world axes."""
     found = [0.0, 0.0, 0.0]
     for axis, value in zip(AXES, vector, strict=True):
         world, sign = mounted(axis, mount)

@@ -11,13 +11,21 @@ from armwright.exceptions import DesignError
 Range = tuple[float, float]
 ParameterValue = float | str
 
-GRID_ERROR = 1e-9  # by which a value may miss its grid
+GRID_ERROR = 1e-9  # tolerance for a value on a grid
 GRID_DIGITS = 12  # decimals of a value on a grid
 
 
 @dataclass(frozen=True, slots=True)
 class FloatParameter:
-    """A real parameter: low <= value <= high, in `unit`; step: of its grid, which begins at `low`, or 0 for none."""
+    """A real parameter.
+
+    Attributes:
+        name: Its name.
+        low: The lower bound, in `unit`.
+        high: The upper bound.
+        unit: The unit.
+        step: The step of its grid, which starts at `low`; 0 for none.
+    """
 
     name: str
     low: float
@@ -26,29 +34,33 @@ class FloatParameter:
     step: float = 0.0
 
     def __post_init__(self) -> None:
-        """0.0 for -0.0, which numpy takes for an end below 0."""
+        """Replace -0.0 by 0.0: numpy sorts -0.0 below 0.0."""
         object.__setattr__(self, "low", self.low + 0.0)
         object.__setattr__(self, "high", self.high + 0.0)
 
     def check(self, value: Any) -> float:
-        """`value` as a float; DesignError where it is not a number within the range."""
+        """Return `value` as a float.
+
+        Raises:
+            DesignError: If it is not a number within the range, or not on the grid.
+        """
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
             raise DesignError(f"{self.name} = {value!r} is not a finite number [{self.unit}]")
         if not self.low <= value <= self.high:
-            shown = exact(value) if abs(value) < 1e300 else "a huge number"  # whole numbers have no largest
+            shown = exact(value) if abs(value) < 1e300 else "a huge number"  # an integer may exceed the largest float
             raise DesignError(
                 f"{self.name} = {shown} {self.unit} is outside "
                 f"{exact(self.low)} <= {self.name} <= {exact(self.high)} {self.unit}"
             )
-        if self.step > 0.0 and abs(self.settled(value) - value) > GRID_ERROR:
+        if self.step > 0.0 and abs(self.nearest(value) - value) > GRID_ERROR:
             raise DesignError(
                 f"{self.name} = {exact(value)} {self.unit} is not on its grid: "
-                f"{exact(self.low)} {self.unit} and multiples of {exact(self.step)} {self.unit} more"
+                f"{exact(self.low)} {self.unit} plus multiples of {exact(self.step)} {self.unit}"
             )
         return float(value)
 
-    def settled(self, value: float) -> float:
-        """The nearest value that it can take."""
+    def nearest(self, value: float) -> float:
+        """Return the allowed value closest to `value`."""
         inside = min(max(float(value), self.low), self.high)
         if self.step == 0.0:
             return inside
@@ -57,13 +69,17 @@ class FloatParameter:
 
 @dataclass(frozen=True, slots=True)
 class CategoricalParameter:
-    """A parameter that takes one of a few names."""
+    """A parameter with a few named choices."""
 
     name: str
     choices: tuple[str, ...]
 
     def check(self, value: Any) -> str:
-        """`value`; DesignError where it is not one of the choices."""
+        """Return `value`.
+
+        Raises:
+            DesignError: If it is not one of the choices.
+        """
         if value not in self.choices:
             raise DesignError(f"{self.name} = {value!r} is not one of {', '.join(self.choices)}")
         return value
@@ -73,14 +89,14 @@ Parameter = FloatParameter | CategoricalParameter
 
 
 def exact(value: float) -> str:
-    """A number in six digits, or in all where six do not give it back: a range must be told so that it can be met."""
+    """Format a number with six digits, or with all if six do not reproduce it."""
     short = f"{value:g}"
     return short if float(short) == value else repr(float(value))
 
 
 @dataclass(frozen=True)
 class Design:
-    """Parameter values: one point of a design space. The order of the mapping means nothing."""
+    """Parameter values: one point of a design space. The order of the mapping is irrelevant."""
 
     params: Mapping[str, ParameterValue]
 
@@ -97,7 +113,7 @@ class Design:
 
     @property
     def joints(self) -> str:
-        """The joint types in order, as one word, a letter for each module: `YPRP`."""
+        """The joint types in order, as one word with a letter per module: `YPRP`."""
         return "".join(str(value) for value in self._numbered("joint"))
 
     @property
@@ -107,21 +123,21 @@ class Design:
 
     @property
     def directions(self) -> tuple[str, ...]:
-        """Where the links leave to, in order; none where the space leaves no choice."""
+        """The link directions in order; empty if they are not parameters of the space."""
         return tuple(str(value) for value in self._numbered("direction"))
 
     @property
     def mount(self) -> str | None:
-        """Where the arm stands; None where the space leaves no choice."""
+        """What the arm is mounted on; None if it is not a parameter of the space."""
         return None if "mount" not in self.params else str(self.params["mount"])
 
     @property
     def motors(self) -> tuple[str, ...]:
-        """The names of the modules' actuators in order; none where the space leaves no choice."""
+        """The names of the modules' actuators in order; empty if they are not parameters of the space."""
         return tuple(str(value) for value in self._numbered("motor"))
 
     def _numbered(self, kind: str) -> list[ParameterValue]:
-        """The values of kind_1, kind_2, … that there are, in whatever order the mapping has them."""
+        """Return the values of kind_1, kind_2, …, in the order of the modules."""
         modules = takewhile(lambda number: f"joint_{number}" in self.params, count(1))
         names = (f"{kind}_{number}" for number in modules)
         return [self.params[name] for name in names if name in self.params]

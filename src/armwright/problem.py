@@ -182,7 +182,7 @@ class Problem:
         Args:
             matrix: (N, P) as `DesignSpace.matrix` returns it. Custom evaluators are not called.
         """
-        return self._evaluate(self.space.settled(matrix), NO_MEASUREMENTS)
+        return self._evaluate(self.space.normalised(matrix), NO_MEASUREMENTS)
 
     def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
         """Return the kinematics and statics of designs at all targets, exact and in the task's first case.

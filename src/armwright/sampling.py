@@ -176,7 +176,7 @@ class BlackBox:
     def restore(self, trials: Iterable[FinishedTrial]) -> None:
         """Adds finished trials, as a resumed run finds them on disk."""
         for trial in trials:
-            params = self._space.searched(trial.design)
+            params = self._space.free_values(trial.design)
             self._study.add_trial(
                 create_trial(
                     params=params,
@@ -212,7 +212,7 @@ class BlackBox:
         # unknown category RUNNING for ever.
         checked = self._space.design(design.params)
         sampler = self._study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
-        self._study.enqueue_trial(self._space.searched(checked), user_attrs=_attributes(source, proposal))
+        self._study.enqueue_trial(self._space.free_values(checked), user_attrs=_attributes(source, proposal))
         trial = self._study.ask()
         self._suggested(trial)
         self._enlist(sampler, trial)
@@ -240,7 +240,7 @@ class BlackBox:
         """The design that a trial suggests: parameter by parameter, as some decide which of the others matter."""
         params: dict[str, ParameterValue] = {}
         for parameter in self._space.parameters:
-            if not self._space.is_searched(parameter.name, self._space.completed(params).params):
+            if not self._space.is_free(parameter.name, self._space.from_free_values(params).params):
                 continue
             if isinstance(parameter, FloatParameter):
                 params[parameter.name] = trial.suggest_float(
@@ -248,7 +248,7 @@ class BlackBox:
                 )
             else:
                 params[parameter.name] = trial.suggest_categorical(parameter.name, parameter.choices)
-        return self._space.completed(params)
+        return self._space.from_free_values(params)
 
     def _enlist(self, sampler: BaseSampler, trial: Trial) -> None:
         """Gives the trial a generation, where the sampler has such.

@@ -163,7 +163,7 @@ class _RunAsStudy:
             yield StoredTrial(
                 params={
                     name: self._distributions[name].to_internal_repr(value)
-                    for name, value in space.searched(trial.design).items()
+                    for name, value in space.free_values(trial.design).items()
                 },
                 values=trial.values,
                 started=started,

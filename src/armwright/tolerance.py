@@ -19,7 +19,7 @@ def moved(space: DesignSpace, rows: NDArray[np.float64], tolerance: float = TOLE
 
     A copy may lie a tolerance outside the design space: what is built knows no ranges.
     """
-    rows = space.settled(rows)
+    rows = space.normalised(rows)
     for column in measured_columns(space):
         for offset in (-tolerance, tolerance):
             copies = rows.copy()

@@ -16,7 +16,7 @@ from typing import Any, cast
 from armwright.exceptions import DesignError
 from armwright.llm.lines import designs_in_lines, plain_number, words_of_lists
 from armwright.llm.words import one_line, without_thoughts
-from armwright.modules import JOINT_WORDS
+from armwright.modules import JOINT_DESCRIPTIONS
 from armwright.parameters import CategoricalParameter, Design, Parameter, exact
 from armwright.problem import Problem
 
@@ -175,7 +175,7 @@ def _value(parameter: Parameter | None, value: Any) -> Any:
     if isinstance(parameter, CategoricalParameter):
         counted = isinstance(value, int) and not isinstance(value, bool)
         word = str(value).strip().strip("'\"").lower() if counted or isinstance(value, str) else None
-        spoken = {kind: words.partition(",")[0] for kind, words in JOINT_WORDS.items()}
+        spoken = {kind: words.partition(",")[0] for kind, words in JOINT_DESCRIPTIONS.items()}
         for choice in parameter.choices:
             if word in (choice.lower(), spoken.get(choice)):  # pyright: ignore[reportArgumentType, reportCallIssue]
                 return choice

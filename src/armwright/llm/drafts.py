@@ -20,7 +20,7 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.llm.answer import LONGEST_ANSWER
 from armwright.llm.prompt import rendered
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
-from armwright.modules import JOINT_WORDS
+from armwright.modules import JOINT_DESCRIPTIONS
 from armwright.objectives import MOST_OBJECTIVES, OBJECTIVES, PAPER_OBJECTIVES
 from armwright.space import DesignSpace
 from armwright.task import MOST_TARGETS, Task, task_template
@@ -89,9 +89,9 @@ def draft_prompt(words: str, refused: str = "", refusal: str = "") -> str:
         "words": shown,
         "fence": fence(shown),
         "most_targets": MOST_TARGETS,
-        "reach": space.longest_reach,
+        "reach": space.max_reach,
         "bases": ", ".join(f"{low:g} <= {axis} <= {high:g}" for axis, (low, high) in zip("xyz", ranges, strict=True)),
-        "toy": space.mass.words(),
+        "toy": space.mass.description,
         "task_schema": _schema(Task),
         "space_schema": _schema(DesignSpace),
         "most_objectives": MOST_OBJECTIVES,
@@ -100,7 +100,7 @@ def draft_prompt(words: str, refused: str = "", refusal: str = "") -> str:
         "template": task_template(Path("my-task.yaml")),
         "example": (resources.files("armwright") / "tasks" / f"{EXAMPLE}.yaml").read_text(encoding="utf-8"),
         "space_example": SPACE_EXAMPLE,
-        "joint_words": JOINT_WORDS,
+        "joint_descriptions": JOINT_DESCRIPTIONS,
         "actuators": [_actuator_line(record) for record in catalogue().values()],
         "refusal": refusal,
         "answer": last,

@@ -40,8 +40,8 @@ class Digits:
     def of(cls, history: History) -> "Digits":
         """By the space's longest arm, and by the largest objectives so far."""
         space = history.problem.space
-        reach = space.longest_reach
-        weight = space.most_joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
+        reach = space.max_reach
+        weight = space.max_joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
         heaviest = GRAVITY * reach * weight  # [N m], more than any torque
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from armwright.modules import JOINT_WORDS
+from armwright.modules import JOINT_DESCRIPTIONS
 
 AXES = ("x", "y", "z")
 LISTS = {  # a value for each module, and what its parameters are called
@@ -145,7 +145,9 @@ def _listed(group: str, values: Sequence[Any]) -> dict[str, Any] | None:
 
 
 def _joints(words: str) -> dict[str, Any] | None:
-    spoken = {kind.lower(): kind for kind in JOINT_WORDS} | {w.partition(",")[0]: k for k, w in JOINT_WORDS.items()}
+    spoken = {kind.lower(): kind for kind in JOINT_DESCRIPTIONS} | {
+        w.partition(",")[0]: k for k, w in JOINT_DESCRIPTIONS.items()
+    }
     words = re.sub(r"joint_\d+\s*[:=]", "", _NAMES_ALONE.sub("", words))
     words = re.sub(rf"\b([A-Za-z])\s*\((?:{'|'.join(spoken)})\)", r"\1", words, flags=re.IGNORECASE)  # Y (yaw)
     words = _in_brackets(words, r"[A-Za-z]")

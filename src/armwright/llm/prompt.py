@@ -22,7 +22,7 @@ from armwright.llm.feedback import Feedback, Record, points, proposal_records, v
 from armwright.llm.lines import LISTS
 from armwright.llm.sandbox import Sandbox
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
-from armwright.modules import JOINT_WORDS, MODULES, MOUNT_WORDS
+from armwright.modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.objectives import (
     OF_CLEARANCE,
     OF_MOVES,
@@ -53,7 +53,7 @@ LARGEST_TEMPLATE = 256 * 1024  # [bytes]
 
 # What a template may use; the answer to `armwright prompt --variables`.
 VARIABLES = {
-    "space": "the design space: fewest_joints, most_joints, joint_types, joint_range, origin_x, origin_y, origin_z, "
+    "space": "the design space: min_joints, max_joints, joint_types, joint_range, origin_x, origin_y, origin_z, "
     "link, mass_note, and all else that a space file can hold",
     "n_joints": "how many joints an arm has, as text; D where that is searched",
     "turning": "the joint types that turn",
@@ -61,8 +61,8 @@ VARIABLES = {
     "straight": "whether all links stand in one vertical line at first",
     "asked": "what a design has beside base, joints and links: name in capitals, and name of a parameter",
     "n_copies": "how many copies of a design a tolerance makes",
-    "joint_words": "what each joint type is, by its letter",
-    "mount_words": "how an arm stands, by the mount",
+    "joint_descriptions": "what each joint type is, by its letter",
+    "mount_descriptions": "how an arm stands, by the mount",
     "gravity": "[m/s²], along -z",
     "task": "the task: name, and more",
     "description": "what the task says of itself, on one line",
@@ -277,7 +277,7 @@ def estimated_tokens(text: str) -> int:
 def _common(history: History, memory: str, proposals: int, form: Form) -> dict[str, Any]:
     problem, space = history.problem, history.problem.space
     names = {parameter.name for parameter in space.parameters}
-    turning = [kind for kind in space.joint_types if MODULES[kind].turns]
+    turning = [kind for kind in space.joint_types if MODULES[kind].is_revolute]
     asked = [("MOUNT", "mount")] if "mount" in names else []
     asked += [
         (group.upper(), kind)
@@ -286,14 +286,14 @@ def _common(history: History, memory: str, proposals: int, form: Form) -> dict[s
     ]
     return {
         "space": space,
-        "n_joints": str(space.most_joints) if space.fewest_joints == space.most_joints else "D",
+        "n_joints": str(space.max_joints) if space.min_joints == space.max_joints else "D",
         "turning": turning,
-        "sliding": [kind for kind in space.joint_types if MODULES[kind].slides],
+        "sliding": [kind for kind in space.joint_types if MODULES[kind].is_prismatic],
         "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
         "asked": asked,
         "n_copies": len(measured_columns(space)) * 2,
-        "joint_words": JOINT_WORDS,
-        "mount_words": MOUNT_WORDS,
+        "joint_descriptions": JOINT_DESCRIPTIONS,
+        "mount_descriptions": MOUNT_DESCRIPTIONS,
         "gravity": GRAVITY,
         "task": problem.task,
         "description": one_line(problem.task.description, LONGEST_DESCRIPTION),

@@ -31,8 +31,8 @@ def shoulder(points: Array, reach: float) -> Array:
 
 def stretched_torque(space: DesignSpace, length: float) -> float:
     """Gravity's torque, α-scaled, on the first joint of an arm of `length` [m] that lies stretched and level."""
-    link = length / space.most_joints
-    lever = (np.arange(space.most_joints) + 0.5) * link  # (D,) of each link's middle [m]
+    link = length / space.max_joints
+    lever = (np.arange(space.max_joints) + 0.5) * link  # (D,) of each link's middle [m]
     return TORQUE_SCALE * GRAVITY * space.mass.mass(link) * float(lever.sum())
 
 

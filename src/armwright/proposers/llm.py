@@ -95,7 +95,7 @@ class LlmProposer(PromptedProposer):
 
 def _feedback_tokens(problem: Problem) -> int:
     """Of the feedback in a full prompt, without evaluating anything: an evaluator can be slow."""
-    joints, targets = problem.space.most_joints, min(len(problem.task.targets), MOST_TARGETS)
+    joints, targets = problem.space.max_joints, min(len(problem.task.targets), MOST_TARGETS)
     numbers = targets * (len(problem.objectives) + 3 + joints) + 2 * joints + len(problem.objectives) + 3
     return (N_PARETO + N_RANDOM) * (TOKENS_A_NUMBER * numbers + TOKENS_A_DESIGN)
 

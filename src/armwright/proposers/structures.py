@@ -84,7 +84,7 @@ def fitted(structure: Structure, problem: Problem, torque: float) -> Design:
     if across(points):
         joints, offset = joints.translate(OTHER_WAY), offset[[1, 0, 2]]
     origin = shoulder(points, reach) + reach * offset
-    return space.clipped(origin, worded(joints, space), reach * np.array(divided(structure.links, space.most_joints)))
+    return space.clipped(origin, worded(joints, space), reach * np.array(divided(structure.links, space.max_joints)))
 
 
 def sized(share: float, problem: Problem, torque: float) -> float:
@@ -108,9 +108,9 @@ def across(points: Array) -> bool:
 def worded(joints: str, space: DesignSpace) -> str:
     """The joint word for this space: cut or continued to its number of joints, of the types that it allows."""
     word = joints
-    while len(word) < space.most_joints:
+    while len(word) < space.max_joints:
         word += word[-2:].translate(OTHER_WAY)
-    return "".join(_allowed(kind, space) for kind in word[: space.most_joints])
+    return "".join(_allowed(kind, space) for kind in word[: space.max_joints])
 
 
 def _allowed(kind: str, space: DesignSpace) -> str:

@@ -51,7 +51,7 @@ class ByWorkers(Judging):
 
     def post(self, trial: FinishedTrial) -> None:
         """Posts it."""
-        params = self._space.searched(trial.design)
+        params = self._space.free_values(trial.design)
         record = json.loads(json.dumps(begun_record(trial)))  # as the database gives it back
         self._board.post(record, params, {name: self._distributions[name] for name in params})
         self._waited_for[trial.number] = record
