@@ -44,7 +44,8 @@ from armwright.sampling import BlackBox
 from armwright.search.front import FrontSearch
 from armwright.space import paper_space
 from armwright.study import optimize
-from armwright.task import Task, load_task, task_template
+from armwright.task import Task, load_task
+from armwright.task_template import task_template
 from armwright.tolerance import moved
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.fixed import FixedProblem, fixed_history

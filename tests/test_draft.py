@@ -18,7 +18,7 @@ from armwright.llm.drafts import LONGEST_WORDS, SPACE_EXAMPLE, draft_prompt, rea
 from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.objectives import OBJECTIVES
-from armwright.task import task_template
+from armwright.task_template import task_template
 from tests import wires
 from tests.chat_server import Answer, ChatServer, Request
 from tests.command_line import PATIENCE, armwright, press_ctrl_c, refused

@@ -25,7 +25,8 @@ from armwright.report.repeat import repeat_command
 from armwright.report.solids import clipped
 from armwright.run_folder import read_run
 from armwright.study import optimize
-from armwright.task import Task, load_task, task_template
+from armwright.task import Task, load_task
+from armwright.task_template import task_template
 from armwright.verification import verify
 from tests.browser import Tab
 

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from armwright.documents import parse_document
 from armwright.exceptions import TaskError
-from armwright.task import Task, builtin_tasks, load_task, random_task, read_points, task_template
+from armwright.points_file import read_points
+from armwright.task import Task, builtin_tasks, load_task, random_task
+from armwright.task_template import task_template
 
 
 def test_the_built_in_tasks() -> None:

@@ -915,7 +915,9 @@ def init(
 ) -> None:
     """Write a commented task file to edit."""
     from armwright.documents import parse_document
-    from armwright.task import Task, read_points, task_template
+    from armwright.points_file import read_points
+    from armwright.task import Task
+    from armwright.task_template import task_template
 
     if file.suffix not in (".yaml", ".yml"):
         raise TaskError(f"{file}: a task file ends in .yaml, such as {file.stem}.yaml")

@@ -1,11 +1,7 @@
 """The task: points that the tip of the arm should reach, and which way it should point there."""
 
-import csv
-import json
-import math
 import os
 import re
-import shlex
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -45,7 +41,6 @@ LARGEST_NOISE = 1.0  # [m]
 MOST_TARGETS = 10_000
 MOST_RESTARTS = 100
 IN_ORDER = "in_order"  # of moves: from each target to the next
-UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 _FOLDER = resources.files("armwright") / "tasks"
 _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 
@@ -315,104 +310,6 @@ def random_task(seed: int) -> Task:
     )
 
 
-def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) -> tuple[Point, ...]:
-    """The points of a CSV file with x, y and z in its first three columns, times `unit`, plus `offset` [m].
-
-    A first line without any number is taken for the column names; empty lines and lines that begin
-    with # are passed over. Commas, semicolons, tabs or blanks may separate the columns.
-    """
-    if unit not in UNITS:
-        raise TaskError(f'unit "{unit}" is not one of {", ".join(UNITS)}')
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as fault:
-        raise TaskError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    except UnicodeDecodeError as fault:
-        raise TaskError(f"{path} is not a text file in UTF-8") from fault
-    points: list[Point] = []
-    rows = [(number, _split_row(line)) for number, line in enumerate(lines, start=1) if _holds_data(line)]
-    if rows and not any(map(_is_number, rows[0][1][:3])):
-        rows = rows[1:]  # column names
-    for number, row in rows:
-        try:
-            x, y, z = (float(cell) * UNITS[unit] for cell in row[:3])
-        except ValueError as fault:
-            raise TaskError(f"{path}, line {number}: {row[:3]} is not three numbers x, y, z") from fault
-        if not all(math.isfinite(c) for c in (x, y, z)):
-            raise TaskError(f"{path}, line {number}: coordinates must be finite, not {row[:3]}")
-        points.append((_tidy(x + offset[0]), _tidy(y + offset[1]), _tidy(z + offset[2])))
-    if not points:
-        raise TaskError(f"{path} holds no points: three numbers x, y, z a line are needed")
-    return tuple(points)
-
-
-def task_template(file: Path, targets: tuple[Point, ...] | None = None) -> str:
-    """A commented task file to edit, with `targets` [m] or three example points."""
-    points = targets or ((0.45, 0.0, 0.1), (0.45, 0.2, 0.3), (0.45, -0.2, 0.3))
-    rows = "\n".join(f"  - [{x!r}, {y!r}, {z!r}]" for x, y, z in points)
-    return f"""\
-# A task for armwright: points that the tip of the arm should reach.
-# Run it with:  armwright optimize {shlex.quote(str(file))}
-name: {json.dumps(_safe_name(file.stem))}    # names the run folder: letters, digits, . _ -
-
-# x, y, z in metres; z is up. The base is searched within ±1 m of the origin (see --space).
-targets:
-{rows}
-
-# A target can say more than its point: which way the tool's own z points there (axis), or its whole orientation as
-# roll, pitch, yaw about the fixed x, y, z [rad]; from where on it counts as missed; how much it counts.
-#   - {{position: [0.45, 0.0, 0.1], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}}
-#   - {{position: [0.45, 0.2, 0.3], orientation: [3.1416, 0, 1.5708]}}
-
-# Further starts of the inverse kinematics at each target, from postures drawn at random; the best posture counts.
-# restarts: 3
-
-# What the tip carries: at every target, or a list with a value for each [kg].
-# payload: 0.5
-
-# The worst case counts, in each objective, of these payloads (0: empty-handed; 1.2: a fifth more), and of targets that
-# are all off by so many metres along x, y or z.
-# payload_factors: [0.0, 1.2]
-# target_noise: 0.005
-
-# What the arm should keep away from, in metres; it counts with the objective collision or clearance_shortfall.
-# obstacles:
-#   - {{kind: ground, z: 0.0}}
-#   - {{kind: box, name: shelf, center: [0.4, 0.0, 0.2], size: [0.3, 0.6, 0.02], yaw: 0.0}}
-#   - {{kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}}
-#   - {{kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: z}}
-
-# Straight lines that the tip goes along: from each target to the next, or pairs of targets counted from 1. They count
-# in path_error, max_joint_step, peak_torque, torque_utilisation, collision and clearance_shortfall.
-# moves: in_order    # or [[1, 2], [2, 1]]
-# move_step: 0.02    # m between two samples of a line
-# move_time: 1.5     # s, or a list with a value for each; for dynamic_torque, dynamic_utilisation, speed_utilisation
-
-# A box that the tip should cover, in metres, or a list of boxes; it counts with the objective uncovered_fraction. Where
-# targets are left out, they are its corners.
-# workspace: {{low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 200}}
-
-# What is minimised; without it, the paper's two, position_error and torque. Also: worst_error, unreached_targets,
-# peak_torque, rms_torque, mass, length, collision, clearance_shortfall, orientation_error, worst_angle, path_error,
-# max_joint_step, dynamic_torque, uncovered_fraction, anisotropy.
-# objectives: [worst_error, peak_torque, mass]
-
-# What a design has to keep; one that does not is on no front. Any of the objectives' names, <= or >=, and a number
-# in its unit.
-# constraints:
-#   - worst_error <= 0.01
-#   - mass <= 3
-
-# Worst values that still count, for the hypervolume: [position error summed over the targets in m,
-# torque summed over the targets in N m, times 40], or one for each of the objectives. Without it, 1.1 x the worst
-# non-dominated values of the first random trials is taken and kept for the run.
-# reference_point: [5.0, 5.0]
-
-# description: What the arm has to do there.
-# provenance: Who measured the points, and when.
-"""
-
-
 def _listed(workspace: Any) -> list[Any]:
     """One box, or a list of them, as a list."""
     if isinstance(workspace, (dict, Region)):
@@ -427,37 +324,6 @@ def _is_pair(value: Any) -> bool:
         return False
     pair = cast("list[Any]", value)
     return len(pair) == 2 and all(isinstance(target, int) and not isinstance(target, bool) for target in pair)
-
-
-def _safe_name(stem: str) -> str:
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("._-")[:64].rstrip(".") or "task"
-    try:
-        return check_name(name)
-    except ValueError:
-        return f"task-{name}"
-
-
-def _holds_data(line: str) -> bool:
-    return bool(line.strip()) and not line.lstrip().startswith("#")
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _split_row(line: str) -> list[str]:
-    for delimiter in (",", ";", "\t"):
-        if delimiter in line:
-            return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
-    return line.split()
-
-
-def _tidy(value: float) -> float:
-    return round(value, 9)
 
 
 def _file_order(name: str) -> tuple[int, str]:

@@ -570,7 +570,8 @@ def run_urdf(data: bytes) -> None:
 def run_points(data: bytes) -> None:
     from armwright.documents import parse_document
     from armwright.exceptions import TaskError
-    from armwright.task import read_points, task_template
+    from armwright.points_file import read_points
+    from armwright.task_template import task_template
 
     points = read_points(file_of(data, "points.csv"), "mm", (0.0, 1.0, 0.0))
     parse_document(task_template(Path("x y.yaml"), points), Task, TaskError, "x y.yaml")

@@ -25,7 +25,8 @@ from armwright.report.page import write_report
 from armwright.results import read_summary
 from armwright.run_folder import read_config
 from armwright.space import load_space
-from armwright.task import Task, load_task, task_template
+from armwright.task import Task, load_task
+from armwright.task_template import task_template
 from armwright.urdf.reading import read_urdf
 from tests.fuzz.__main__ import INPUTS, TooSlowError, limited
 from tests.fuzz.targets import TARGETS, DefectError, a_run, check, looked_at, seeds_of

@@ -23,7 +23,8 @@ from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_DESCRIPTIONS
 from armwright.objectives import MOST_OBJECTIVES, OBJECTIVES, PAPER_OBJECTIVES
 from armwright.space import DesignSpace
-from armwright.task import MOST_TARGETS, Task, task_template
+from armwright.task import MOST_TARGETS, Task
+from armwright.task_template import task_template
 
 LONGEST_WORDS = 10_000  # characters; who has more has points, and `armwright init --from` reads them
 LONGEST_SHOWN = 20_000  # characters of a refused answer that goes back; the end counts
