@@ -1,7 +1,8 @@
-"""How answers may be written, over the real protocols: lenient in form, strict in substance."""
+"""Answers over the real protocols: lenient in form, strict in values."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from itertools import cycle, product
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,17 @@ both_formats = pytest.mark.parametrize("wire", ["openai", "anthropic"])
 every_output = pytest.mark.parametrize("output", OUTPUTS)
 
 
+def spread(cases: Iterable[str], outputs: Sequence[str] = OUTPUTS) -> pytest.MarkDecorator:
+    """The first case over every wire format and output, each other case over one of them in turn."""
+    first, *others = cases
+    ways = list(product(("openai", "anthropic"), outputs))
+    together = [
+        *((*way, first) for way in ways),
+        *((*way, case) for way, case in zip(cycle(ways), others, strict=False)),
+    ]
+    return pytest.mark.parametrize(("wire", "output", "case"), together)
+
+
 @pytest.fixture
 def ask(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Run]:
     """One proposal."""
@@ -67,25 +79,21 @@ def giving(answer: Answer) -> Callable[[Request], Answer]:
     return lambda request: answer if wants_design(request) else designer(request)
 
 
-@pytest.mark.parametrize("form", IN_ANY_FORM)
-@every_output
-@both_formats
-def test_the_form_of_an_answer_is_free(
-    chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, form: str
+@spread(IN_ANY_FORM)
+def test_answers_are_read_in_any_form(
+    chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, case: str
 ) -> None:
-    chat_server.answer = giving(IN_ANY_FORM[form])
+    chat_server.answer = giving(IN_ANY_FORM[case])
     run = ask(wire, output=output)
     assert (run.trials[4].source, dict(run.trials[4].design.params)) == ("llm", EXPECTED)
     assert len(chat_server.requests) == 3  # nothing is asked again
 
 
-@pytest.mark.parametrize("form", IN_TEXT)
-@pytest.mark.parametrize("output", ["native", "prompted"])
-@both_formats
-def test_what_stands_around_an_answer_does_not_matter(
-    chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, form: str
+@spread(IN_TEXT, ("native", "prompted"))
+def test_text_around_an_answer_is_ignored(
+    chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, case: str
 ) -> None:
-    chat_server.answer = giving(IN_TEXT[form])
+    chat_server.answer = giving(IN_TEXT[case])
     run = ask(wire, output=output)
     assert (run.trials[4].source, dict(run.trials[4].design.params)) == ("llm", EXPECTED)
     assert len(chat_server.requests) == 3
@@ -93,7 +101,7 @@ def test_what_stands_around_an_answer_does_not_matter(
 
 @every_output
 @both_formats
-def test_one_step_takes_thoughts_and_design_from_one_answer(
+def test_one_step_answers_hold_reasoning_and_design(
     chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str
 ) -> None:
     chat_server.answer = giving(json.dumps({"reasoning": "Step 1: {think}.", **GOOD_DESIGN}))
@@ -104,13 +112,11 @@ def test_one_step_takes_thoughts_and_design_from_one_answer(
     assert (call.step, json.loads(call.answer)["reasoning"]) == ("answer", "Step 1: {think}.")
 
 
-@pytest.mark.parametrize("name", REFUSED)
-@every_output
-@both_formats
-def test_what_the_space_refuses_is_asked_again_in_its_words(
-    chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str, name: str
+@spread(REFUSED)
+def test_refused_values_are_asked_again_with_the_reason(
+    chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str, case: str
 ) -> None:
-    refused, words = REFUSED[name]
+    refused, words = REFUSED[case]
     chat_server.answer = giving(json.dumps(refused))
     run = ask(wire, output=output)
     assert (run.trials[4].source, run.trials[4].fault) == ("bbo", "answer")
@@ -125,7 +131,7 @@ def test_what_the_space_refuses_is_asked_again_in_its_words(
 
 @pytest.mark.parametrize("output", ["native", "prompted"])
 @both_formats
-def test_a_refused_answer_is_kept_with_the_words_around_it(
+def test_refused_answers_are_recorded_with_the_text_around_them(
     chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str
 ) -> None:
     written = f"Here it is:\n{json.dumps({**GOOD_DESIGN, 'joint_1': 'Z'})}\nI hope this helps."
@@ -137,17 +143,14 @@ def test_a_refused_answer_is_kept_with_the_words_around_it(
 
 @every_output
 @both_formats
-def test_a_mended_answer_is_taken(chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str) -> None:
+def test_corrected_answers_are_taken(chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str) -> None:
     answers = iter([REFUSED["missing link"][0], REFUSED["NaN"][0], GOOD_DESIGN])
     chat_server.answer = lambda request: json.dumps(next(answers)) if wants_design(request) else designer(request)
     assert dict(ask(wire, output=output).trials[4].design.params) == EXPECTED
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-@both_formats
-def test_numbers_that_are_none_in_json_are_refused(
-    chat_server: ChatServer, ask: Callable[..., Run], wire: str, number: str
-) -> None:
+def test_numbers_outside_json_are_refused(chat_server: ChatServer, ask: Callable[..., Run], number: str) -> None:
     chat_server.answer = giving(json.dumps(GOOD_DESIGN).replace("0.01", number))
-    run = ask(wire, output="prompted")
+    run = ask("openai", output="prompted")
     assert (run.trials[4].source, run.trials[4].fault) == ("bbo", "answer")

@@ -285,12 +285,11 @@ def test_names_that_cannot_be_fetched(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_the_command(run: Path, in_folder: Path) -> None:
     Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)))
-    done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run)
+    done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures")
     assert done.returncode == 0, done.stderr
     assert "…" not in done.stdout
     for word in ("ur5_robot", "panda", "1,500 positions", "of the front, dominated by", 'tip is the link "ee_link"'):
         assert word in done.stdout
-    assert (run / "figures" / "front.png").is_file()
     told = json.loads(
         armwright("compare-arms", "task.yaml", UR5, "--run", run, "--base", "0,0.1,0", "--no-figures", "--json").stdout
     )

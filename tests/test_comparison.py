@@ -191,7 +191,6 @@ def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest
     text = markdown(found, "x")
     assert "mine: runs had different reference points" in text
     assert f"{shared[0]:.4g}, {shared[1]:.4g}" in text
-    assert write_comparison_figures(tmp_path, found)
 
 
 def test_searches_for_the_whole_front_stand_beside_studies(runs: Path, tmp_path: Path) -> None:
@@ -201,7 +200,6 @@ def test_searches_for_the_whole_front_stand_beside_studies(runs: Path, tmp_path:
     assert row.e_hv is None
     assert row.final.mean > 8.0
     assert "front search" in markdown(found, "x")
-    assert write_comparison_figures(tmp_path, found)
 
 
 def test_the_tables_hold_the_same_numbers(comparison: Comparison, tmp_path: Path) -> None:
@@ -226,6 +224,7 @@ def test_the_tables_hold_the_same_numbers(comparison: Comparison, tmp_path: Path
     assert "_" not in re.sub(r"\\_|[E\\]?\w*_\{hv\}", "", tex)
 
 
+@pytest.mark.slow
 def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) -> None:
     names = {path.stem for path in write_comparison_figures(tmp_path, comparison, samples=["BBO/rules (12 trials)"])}
     assert names >= {
@@ -238,6 +237,15 @@ def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) ->
         assert b"/FontFile2" in pdf, "the fonts are embedded, as TrueType"
 
 
+@pytest.mark.slow
+def test_figures_show_a_front_search_beside_a_study(runs: Path, tmp_path: Path) -> None:
+    find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
+    found = side_by_side([read_run_record(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
+    names = {path.stem for path in write_comparison_figures(tmp_path, found)}
+    assert {"hypervolume-methods", "attainment-target-1"} <= names
+
+
+@pytest.mark.slow
 def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_server: ChatServer) -> None:
     words = "Step 1: $\\alpha_{x \x1b[31m and _no_ markup\n" + "reason " * 3000
     problem = Problem(load_task("target-1"))

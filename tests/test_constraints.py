@@ -233,6 +233,7 @@ def test_a_bound_that_everything_keeps_changes_no_trial(sampler: str) -> None:
     assert np.array_equal(bound.hypervolume, free.hypervolume)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
 def test_black_boxes_prefer_feasible_designs(sampler: str) -> None:
     """Of the counted trials more are feasible than where the sampler knows of no constraint, on average over seeds."""
