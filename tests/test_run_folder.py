@@ -36,7 +36,7 @@ def folder(run: Run) -> Path:
 
 def test_the_files_of_a_run(run: Run) -> None:
     names = {path.name for path in folder(run).iterdir()} - {".lock"}
-    results = {"trials.csv", "front.csv", "summary.json", "designs", "study.db", "artifacts"}
+    results = {"trials.csv", "front.csv", "summary.json", "designs"}
     assert names == {"config.yaml", "trials.jsonl", "status.json", *results}
 
 

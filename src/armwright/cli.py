@@ -693,21 +693,22 @@ def export(
         ),
     ] = "urdf",
     out: Annotated[
-        Path | None, typer.Option(help="File; without it, to stdout; of optuna, study.db in the run's folder.")
+        Path | None, typer.Option(help="File; without it, to stdout; for optuna, study.db in the run folder.")
     ] = None,
 ) -> None:
     """Write one design of RUN for a simulator or a workshop, or all of RUN for Optuna.
 
     Any design of the run, not only those of the front.
     """
-    from armwright.exporting import OPTUNA, export_design, export_study
+    from armwright.exporting import OPTUNA, export_design
 
     if format_ == OPTUNA:
+        from armwright.optuna_export import export_study
+
         if design is not None:
             raise SettingsError(f"--design {design} goes with the other formats; optuna takes the whole run")
         study = export_study(run, out)
-        kept = "" if study.kept is None else f"; the one before was changed by somebody, and is {study.kept} now"
-        print(f"{study.path}{kept}; it is shown by (pip install optuna-dashboard):\n  {study.command}")
+        print(f"{study.database}; show it in a browser (pip install optuna-dashboard):\n  {study.dashboard_command}")
         return
     text = export_design(run, design, format_)
     if out is None:

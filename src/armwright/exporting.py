@@ -1,4 +1,4 @@
-"""A design of a run as a file for a simulator or a workshop; a whole run as a study of Optuna's."""
+"""A design of a run as a file for a simulator or a workshop."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -17,12 +17,11 @@ from armwright.export.urdf import to_urdf
 from armwright.export.xacro import to_xacro
 from armwright.history import FrontMember, History
 from armwright.misses import why_missed
-from armwright.results import as_csv, read_summary
-from armwright.run_folder import RunFolder, read_config, read_run
+from armwright.results import as_csv
+from armwright.run_folder import read_run
 from armwright.space import DesignSpace
-from armwright.study_db import StudyFile, write_study
 
-OPTUNA = "optuna"  # the format that a whole run has
+OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
 
 
 def export_design(run: Path, number: int | None, kind: str) -> str:
@@ -35,22 +34,6 @@ def export_design(run: Path, number: int | None, kind: str) -> str:
         raise SettingsError(f"--design {number}: {run} has the designs 0 to {len(history) - 1}")
     member = pick(history)[0] if number is None else history.member(number)
     return FORMATS[kind](history, member)
-
-
-def export_study(run: Path, target: Path | None) -> StudyFile:
-    """All finished trials of a run as a study of Optuna's: study.db in its folder, or the file `target`."""
-    read_config(run)  # a folder that holds no run is said before anything is made
-    if target is None:
-        with RunFolder(run):
-            return _export_study(run, None)
-    return _export_study(run, target)
-
-
-def _export_study(run: Path, target: Path | None) -> StudyFile:
-    _, history = read_run(run)
-    if not len(history):
-        raise SettingsError(f"{run} has no finished trial yet")
-    return write_study(run, history, read_summary(run), target)
 
 
 def _name(history: History, member: FrontMember) -> str:

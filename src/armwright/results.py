@@ -4,7 +4,6 @@ summary.json              what the run came to
 trials.csv, front.csv     all trials, and those of the front
 designs/NNNN/arm.urdf     each design of the front, for simulators
 designs/NNNN/design.json  and its postures, errors and torques at every target
-study.db, artifacts/      the run as a study of Optuna's (study_db.py)
 """
 
 import csv
@@ -31,7 +30,6 @@ from armwright.misses import why_missed
 from armwright.pareto import hypervolume, total_violation
 from armwright.proposers.proposer import ProposerSummary
 from armwright.run_folder import FrontMethod, RunConfig, RunFolder, read_run
-from armwright.study_db import MOST_AT_END, discard_study, write_study
 from armwright.summary_record import checked_summary
 from armwright.verification import Verification, verify_front
 
@@ -57,8 +55,6 @@ def write_results(
     rows = [row | _flat_verdict(verdicts.get(row["number"])) for row in _rows(history) if row["number"] in on_front]
     folder.write_text("front.csv", as_csv(rows))
     _write_designs(folder, history, verdicts)
-    if len(history) <= MOST_AT_END:
-        write_study(folder.path, history, summary)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
@@ -85,12 +81,11 @@ def results_are_there(path: Path, history: History) -> bool:
 
 
 def discard_results(path: Path) -> None:
-    """Takes away what says that a run is finished: its summary, its page, its figures and study.db."""
+    """Takes away what says that a run is finished: its summary, its page and its figures."""
     try:
         (path / SUMMARY).unlink(missing_ok=True)
         (path / REPORT).unlink(missing_ok=True)
         replace_folder(path / FIGURES)
-        discard_study(path)
     except OSError as fault:
         raise RunFolderError(f"cannot remove the old results in {path}: {fault.strerror or fault}") from fault
 

@@ -66,7 +66,6 @@ DERIVED = (
     "summary.json",
     "trials.csv",
     "front.csv",
-    "study.db",
     ".lock",
 )
 
