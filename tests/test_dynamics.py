@@ -17,8 +17,8 @@ from armwright.arm import AXES, Actuator, Arm, Joint, Link, uniform_link
 from armwright.cli import app
 from armwright.evaluation import evaluate
 from armwright.exceptions import RunConflictError, SettingsError
+from armwright.export.link_geometry import inertia_tensor
 from armwright.export.mjcf import to_mjcf
-from armwright.export.shapes import inertia_tensor
 from armwright.export.urdf import to_urdf
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.dynamics import inverse_dynamics

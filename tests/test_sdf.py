@@ -10,7 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from armwright.arm import Arm, Joint, Link, uniform_link
 from armwright.exceptions import ArmError
-from armwright.export.limits import limits_of
+from armwright.export.link_geometry import joint_limits
 from armwright.export.sdf import to_sdf
 from armwright.kinematics.forward import joint_positions
 from tests import reference
@@ -49,7 +49,7 @@ def test_names_axes_limits_and_masses(arm: Arm) -> None:
         assert plant.GetJointByName(f"joint_{number}").type_name() == kinds[joint.kind]
     assert plant.num_positions() == len(moving(arm))
     for number, joint in moving(arm):
-        seen, limits = plant.GetJointByName(f"joint_{number}"), limits_of(joint)
+        seen, limits = plant.GetJointByName(f"joint_{number}"), joint_limits(joint)
         axis = seen.revolute_axis() if joint.kind == "revolute" else seen.translation_axis()
         assert np.allclose(axis, np.eye(3)["xyz".index(joint.axis)])
         assert seen.position_lower_limits() == pytest.approx(limits["lower"])

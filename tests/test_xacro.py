@@ -11,7 +11,7 @@ import pytest
 import yourdfpy
 
 from armwright.arm import Arm, Joint, Link, uniform_link
-from armwright.export.limits import limits_of
+from armwright.export.link_geometry import joint_limits
 from armwright.export.urdf import to_urdf
 from armwright.export.xacro import to_xacro
 from armwright.exporting import mass_per_metre
@@ -60,7 +60,7 @@ def test_yourdfpy_and_mujoco_see_the_same_as_of_the_urdf(arm: Arm) -> None:
                     assert not sizes or sizes[0] == pytest.approx(sizes[1])
     for number, joint in moving(arm):
         (limit,) = [j.limit for j in seen.joints if j.name == f"joint_{number}"]
-        assert vars(limit) == pytest.approx(limits_of(joint))
+        assert vars(limit) == pytest.approx(joint_limits(joint))
     model, our = (mujoco.MjModel.from_xml_string(urdf) for urdf in (text, to_urdf(arm)))
     assert np.allclose(model.body_mass, our.body_mass, rtol=1e-9, atol=1e-12)
     assert np.allclose(model.body_inertia, our.body_inertia, rtol=1e-6, atol=1e-12)

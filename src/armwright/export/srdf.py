@@ -1,30 +1,28 @@
-"""An arm as SRDF, what MoveIt needs beside its URDF."""
+"""An arm as SRDF, which MoveIt needs in addition to its URDF."""
 
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 from armwright.arm import Arm
 from armwright.export.collisions import settled_pairs
-from armwright.export.limits import home_of
-from armwright.export.shapes import number, text_of
+from armwright.export.link_geometry import home_position, moving_joints, number, to_xml
 
 GROUP = "arm"
 
 
 def to_srdf(arm: Arm, name: str = "arm") -> str:
-    """The SRDF that belongs to `to_urdf` of the same arm and name: the group `arm` from `base` to `tip`, and its home.
+    """Return the SRDF for the URDF of the same arm and name: the group `arm` from `base` to `tip`, and its home.
 
-    Home is all joints at 0, or at the limit nearest to it. Collisions are not looked for between neighbours, and
-    where it is proven that two links never or always meet (`settled_pairs`). There is no end effector, as an arm ends
-    at its tip, and no virtual joint, as the URDF itself has `world`.
+    Home is all joints at 0, or at the limit closest to it. Collision checks are disabled between neighbours, and for
+    links that provably never or always collide (`settled_pairs`). There is no end effector, since an arm ends at its
+    tip, and no virtual joint, since the URDF itself has `world`.
     """
-    robot = ElementTree.Element("robot", name=name)
-    group = ElementTree.SubElement(robot, "group", name=GROUP)
-    ElementTree.SubElement(group, "chain", base_link="base", tip_link="tip")
-    state = ElementTree.SubElement(robot, "group_state", name="home", group=GROUP)
-    for n, joint in enumerate(arm.joints, start=1):
-        if joint.kind != "fixed":
-            ElementTree.SubElement(state, "joint", name=f"joint_{n}", value=number(home_of(joint)))
+    robot = Element("robot", name=name)
+    group = SubElement(robot, "group", name=GROUP)
+    SubElement(group, "chain", base_link="base", tip_link="tip")
+    state = SubElement(robot, "group_state", name="home", group=GROUP)
+    for n, joint in moving_joints(arm):
+        SubElement(state, "joint", name=f"joint_{n}", value=number(home_position(joint)))
     for (first, second), reason in settled_pairs(arm).items():
         pair = {"link1": f"link_{first + 1}", "link2": f"link_{second + 1}", "reason": reason}
-        ElementTree.SubElement(robot, "disable_collisions", pair)
-    return text_of(robot)
+        SubElement(robot, "disable_collisions", pair)
+    return to_xml(robot)

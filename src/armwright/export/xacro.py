@@ -1,21 +1,24 @@
 """An arm as xacro: its URDF with lengths, radii, masses and base to be chosen when it is processed."""
 
 import math
-from xml.etree import ElementTree
+from collections.abc import Sequence
+from xml.etree.ElementTree import Comment, Element, SubElement
 
-from armwright.arm import Arm, Joint, Link, Vector
-from armwright.export.limits import limits_of
-from armwright.export.shapes import (
+from armwright.arm import Arm, Link, Vector
+from armwright.export.link_geometry import (
     AXIS_VECTORS,
-    BOUNDS,
-    COLOURS,
-    MARKER,
-    along,
+    MARKER_SCALE,
+    TENSOR_PLACES,
+    Segment,
+    joint_limits,
     number,
     numbers,
-    text_of,
-    tip_turn,
+    rpy_along,
+    segments,
+    tip_rpy,
+    to_xml,
 )
+from armwright.export.urdf import add_header, add_marker
 
 NAMESPACE = "http://www.ros.org/wiki/xacro"
 NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
@@ -30,57 +33,63 @@ NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
 
 
 def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float = 0.0) -> str:
-    """The URDF of `to_urdf` as xacro, its numbers as arguments; the arguments' defaults give this arm.
+    """Return the URDF of an arm as xacro, with its numbers as arguments whose defaults give this arm.
 
-    A link that is made longer keeps its direction, and its centre of mass the same share of its length; inertia is
-    that of the longer cylinder. The arguments are listed in the file.
+    A link that is made longer keeps its direction, and its centre of mass the same fraction of its length; its inertia
+    is that of the longer cylinder. The arguments are listed in the file.
 
-    mass_per_metre: by how much a link gets heavier with its length [kg/m]; the rest of its mass stays. A link without
-    length has all of its mass whatever its length.
+    Args:
+        arm: The arm.
+        name: The name of the robot.
+        mass_per_metre: The mass that a link gains per metre of length [kg/m]; the rest of its mass is constant. A link
+            without length has a constant mass.
     """
-    robot = ElementTree.Element("robot", {"xmlns:xacro": NAMESPACE, "name": _literal(name)})
-    robot.append(ElementTree.Comment(NOTE))
+    robot = Element("robot", {"xmlns:xacro": NAMESPACE, "name": _literal(name)})
+    robot.append(Comment(NOTE))
     _add_arguments(robot, arm, mass_per_metre)
     _add_macro(robot)
-    compiler = ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler")
-    compiler.attrib.update(fusestatic="false", discardvisual="false", **BOUNDS)
-    for material, rgba in COLOURS.items():
-        ElementTree.SubElement(ElementTree.SubElement(robot, "material", name=material), "color", rgba=rgba)
-    ElementTree.SubElement(robot, "link", name="world")
-    ElementTree.SubElement(robot, "link", name=_own("base"))
+    add_header(robot)
+    SubElement(robot, "link", name=_prefixed("base"))
     _add_joint(robot, "world_to_base", "fixed", "world", "base", "${base_x} ${base_y} ${base_z}")
-    parent, place, terms = "base", "0 0 0", ["0", "0", "0"]
-    for n, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True), start=1):
-        _add_link(robot, n, joint, link)
-        element = _add_joint(robot, f"joint_{n}", joint.kind, _own(parent), f"link_{n}", place)
+    position, terms = "0 0 0", ["0", "0", "0"]
+    for segment in segments(arm):
+        joint = segment.joint
+        _add_link(robot, segment)
+        parent = _prefixed(segment.parent)
+        element = _add_joint(robot, f"joint_{segment.number}", joint.kind, parent, segment.name, position)
         if joint.kind != "fixed":
-            ElementTree.SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
-            ElementTree.SubElement(element, "limit", {key: number(value) for key, value in limits_of(joint).items()})
-        parent = f"link_{n}"
-        terms = _scaled(_direction(link), n)
-        place = " ".join(f"${{{term}}}" if term != "0" else term for term in terms)
-    ElementTree.SubElement(robot, "link", name=_own("tip"))
-    place = " ".join(f"${{{term} + tool_{axis}}}" for axis, term in zip("xyz", terms, strict=True))
-    _add_joint(robot, "tip_joint", "fixed", _own(parent), "tip", place, numbers(tip_turn(arm)))
-    return text_of(robot)
+            SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
+            SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
+        terms = _scaled(_direction(segment.link), segment.number)
+        position = _evaluated(terms)
+    SubElement(robot, "link", name=_prefixed("tip"))
+    position = " ".join(f"${{{term} + tool_{axis}}}" for axis, term in zip("xyz", terms, strict=True))
+    last = _prefixed(f"link_{len(arm.links)}")
+    _add_joint(robot, "tip_joint", "fixed", last, "tip", position, numbers(tip_rpy(arm)))
+    return to_xml(robot)
 
 
 def _literal(text: str) -> str:
-    """Text that xacro is not to evaluate: each dollar is an expression of its own, so that none opens another."""
+    """Return text that xacro does not evaluate: each dollar becomes an expression of its own."""
     return text.replace("$", "${'$'}")
 
 
-def _own(name: str) -> str:
+def _prefixed(name: str) -> str:
     return f"$(arg prefix){name}"
 
 
-def _add_arguments(robot: ElementTree.Element, arm: Arm, mass_per_metre: float) -> None:
-    ElementTree.SubElement(robot, "xacro:arg", name="prefix", default="")
+def _evaluated(terms: Sequence[str]) -> str:
+    """Return the three terms as expressions; a plain 0 needs none."""
+    return " ".join(f"${{{term}}}" if term != "0" else term for term in terms)
+
+
+def _add_arguments(robot: Element, arm: Arm, mass_per_metre: float) -> None:
+    SubElement(robot, "xacro:arg", name="prefix", default="")
     values = {f"base_{axis}": value for axis, value in zip("xyz", arm.base, strict=True)}
     values |= {f"tool_{axis}": value for axis, value in zip("xyz", arm.tool, strict=True)}
     for n, link in enumerate(arm.links, start=1):
         growing = mass_per_metre * link.length
-        # A mass that is all in the length is not to leave a rounding beside it.
+        # If all of the mass is proportional to the length, do not leave a rounding error as a constant part.
         rest = 0.0 if math.isclose(growing, link.mass, rel_tol=1e-12) else link.mass - growing
         values |= {
             f"link_{n}_length": link.length,
@@ -90,12 +99,12 @@ def _add_arguments(robot: ElementTree.Element, arm: Arm, mass_per_metre: float) 
             f"link_{n}_end_mass": link.end_mass,
         }
     for name, value in values.items():
-        ElementTree.SubElement(robot, "xacro:arg", name=name, default=repr(float(value)))
-        ElementTree.SubElement(robot, "xacro:property", name=name, value=f"$(arg {name})")
+        SubElement(robot, "xacro:arg", name=name, default=repr(float(value)))
+        SubElement(robot, "xacro:property", name=name, value=f"$(arg {name})")
 
 
-# The solid cylinder, m r² / 2 around its axis u and half of that + m l² / 12 across it, and what sits at its end, about
-# their common centre of mass: two masses at a distance d from each other add m e / (m + e) (|d|² 1 - d dᵀ).
+# The solid cylinder, m r² / 2 around its axis u and half of that + m l² / 12 across it, and the mass at its end, about
+# their common centre of mass: two masses m and e at a distance d add m e / (m + e) (|d|² 1 - d dᵀ).
 _PROPERTIES = {
     "l": "length",
     "u": "direction",
@@ -115,22 +124,21 @@ def _moment(i: int, j: int) -> str:
     return f"${{{straight}more * u[{i}] * u[{j}] - pair * d[{i}] * d[{j}]}}"
 
 
-def _add_macro(robot: ElementTree.Element) -> None:
-    """`inertial` of a link; direction: of unit length, com: [m]; end_shift: from its end to its end mass [m]."""
+def _add_macro(robot: Element) -> None:
+    """Add the macro for the `inertial` of a link, from its unit direction, com [m] and end_shift [m]."""
     params = "length radius mass end_mass end_shift direction com"
-    macro = ElementTree.SubElement(robot, "xacro:macro", name="armwright_inertial", params=params)
+    macro = SubElement(robot, "xacro:macro", name="armwright_inertial", params=params)
     for name, expression in _PROPERTIES.items():
-        ElementTree.SubElement(macro, "xacro:property", name=name, value=f"${{{expression}}}")
-    inertial = ElementTree.SubElement(macro, "inertial")
+        SubElement(macro, "xacro:property", name=name, value=f"${{{expression}}}")
+    inertial = SubElement(macro, "inertial")
     centre = " ".join(f"${{com[{i}] + share * d[{i}]}}" for i in range(3))
-    ElementTree.SubElement(inertial, "origin", xyz=centre, rpy="0 0 0")
-    ElementTree.SubElement(inertial, "mass", value="${total}")
-    places = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
-    ElementTree.SubElement(inertial, "inertia", {name: _moment(*place) for name, place in places.items()})
+    SubElement(inertial, "origin", xyz=centre, rpy="0 0 0")
+    SubElement(inertial, "mass", value="${total}")
+    SubElement(inertial, "inertia", {name: _moment(*place) for name, place in TENSOR_PLACES.items()})
 
 
 def _direction(link: Link) -> Vector:
-    """Of unit length; along z where the link has none."""
+    """Return the unit vector along a link; z if it has no length."""
     if link.length == 0.0:
         return (0.0, 0.0, 1.0)
     x, y, z = link.offset
@@ -138,33 +146,32 @@ def _direction(link: Link) -> Vector:
 
 
 def _scaled(vector: Vector, n: int) -> list[str]:
-    """The terms of a vector times the length of link n."""
+    """Return the terms of a vector times the length of link n."""
     length = f"link_{n}_length"
     plain = {0.0: "0", 1.0: length, -1.0: f"-{length}"}
     return [plain.get(value, f"{value!r} * {length}") for value in vector]
 
 
 def _com(link: Link, n: int) -> list[str]:
-    """The terms of the centre of mass: a share of the length, where there is one."""
+    """Return the terms of the centre of mass: a fraction of the length, if there is one."""
     x, y, z = link.com
     if link.length == 0.0:
         return [repr(x), repr(y), repr(z)]
     return _scaled((x / link.length, y / link.length, z / link.length), n)
 
 
-def _add_joint(
-    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0"
-) -> ElementTree.Element:
-    element = ElementTree.SubElement(robot, "joint", name=_own(name), type=kind)
-    ElementTree.SubElement(element, "parent", link=parent)
-    ElementTree.SubElement(element, "child", link=_own(child))
-    ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
+def _add_joint(robot: Element, name: str, kind: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0") -> Element:
+    element = SubElement(robot, "joint", name=_prefixed(name), type=kind)
+    SubElement(element, "parent", link=parent)
+    SubElement(element, "child", link=_prefixed(child))
+    SubElement(element, "origin", xyz=xyz, rpy=rpy)
     return element
 
 
-def _add_link(robot: ElementTree.Element, n: int, joint: Joint, link: Link) -> None:
-    element = ElementTree.SubElement(robot, "link", name=_own(f"link_{n}"))
-    own = f"link_{n}_"
+def _add_link(robot: Element, segment: Segment) -> None:
+    link, n = segment.link, segment.number
+    element = SubElement(robot, "link", name=_prefixed(segment.name))
+    own = f"{segment.name}_"
     direction, length = _direction(link), f"{own}length"
     inertial = {
         "length": f"${{{length}}}",
@@ -175,19 +182,15 @@ def _add_link(robot: ElementTree.Element, n: int, joint: Joint, link: Link) -> N
         "direction": f"${{[{', '.join(map(repr, direction))}]}}",
         "com": f"${{[{', '.join(_com(link, n))}]}}",
     }
-    ElementTree.SubElement(element, "xacro:armwright_inertial", inertial)
-    drawn = ElementTree.SubElement(element, "xacro:if", value=f"${{{length} > 0}}")
+    SubElement(element, "xacro:armwright_inertial", inertial)
+    drawn = SubElement(element, "xacro:if", value=f"${{{length} > 0}}")
     x, y, z = direction
-    half = " ".join(f"${{{term}}}" if term != "0" else term for term in _scaled((x / 2, y / 2, z / 2), n))
+    midpoint = _evaluated(_scaled((x / 2, y / 2, z / 2), n))
     for purpose in ("visual", "collision"):
-        body = ElementTree.SubElement(drawn, purpose)
-        ElementTree.SubElement(body, "origin", xyz=half, rpy=numbers(along(direction)))
-        shape = ElementTree.SubElement(body, "geometry")
-        ElementTree.SubElement(shape, "cylinder", radius=f"${{{own}radius}}", length=f"${{{length}}}")
+        body = SubElement(drawn, purpose)
+        SubElement(body, "origin", xyz=midpoint, rpy=numbers(rpy_along(direction)))
+        shape = SubElement(body, "geometry")
+        SubElement(shape, "cylinder", radius=f"${{{own}radius}}", length=f"${{{length}}}")
         if purpose == "visual":
-            ElementTree.SubElement(body, "material", name="link")
-    marker = ElementTree.SubElement(element, "visual")
-    ElementTree.SubElement(marker, "origin", xyz="0 0 0", rpy="0 0 0")
-    shape = ElementTree.SubElement(marker, "geometry")
-    ElementTree.SubElement(shape, "sphere", radius=f"${{{MARKER} * {own}radius}}")
-    ElementTree.SubElement(marker, "material", name=f"joint_{joint.axis}")
+            SubElement(body, "material", name="link")
+    add_marker(element, segment, f"${{{MARKER_SCALE} * {own}radius}}")
