@@ -416,6 +416,7 @@ def test_a_template_may_replace_blocks_and_use_what_the_given_one_has() -> None:
         ("{% for a in [[[1]]] recursive %}({{ loop(a) if a is iterable else a }}){% endfor %}", "(((1)))"),
         ("{% call(n) twice(2) %}{{ n }}{% endcall %}{% macro twice(n) %}{{ caller(2 * n) }}{% endmacro %}", None),
         ("{% macro m(n) %}{{ caller(n) }}{% endmacro %}{% call(n) m(2) %}{{ n }}!{% endcall %}", "2!"),
+        ("{% filter upper %}x{% endfilter %}{{ '{:>{}}'.format(1, 3) }}", "X  1"),
         ("{{ '0123456789'[2:5] }}{{ [1, 2, 3][1:] | length }} {{ description[:9] | length }}", "2342 9"),
     ],
 )
@@ -441,7 +442,6 @@ def test_a_template_of_ones_own_from_scratch() -> None:
         ("\n\n{{ frnt }}", '"frnt", which does not exist. Did you mean "front"'),
         ("\n{{ front | frist }}", "line 2: No filter named 'frist'"),
         ("{{ front is frist }}", "No test named 'frist'"),
-        ("{% filter upper %}x{% endfilter %}", "line 1: a filter for a whole block is not possible here"),
         ('{% extends "propsal.md.j2" %}', 'uses the template "propsal.md.j2", which does not exist. Did you mean'),
         ('{% include "/etc/passwd" %}', 'uses the template "/etc/passwd", which does not exist'),
         ("{{ " + "(" * 3000 + "1" + ")" * 3000 + " }}", "nested too deeply"),
@@ -458,44 +458,6 @@ def test_a_template_that_cannot_be_read(tmp_path: Path, template: str, message: 
     assert str(refusal.value).startswith("prompt own.md")
 
 
-TOO_MUCH = "it makes more than 10,000,000 characters on its way"
-BIG = "{% set big = 'x' * 900000 %}"
-LARGE = [  # of each some hundred million characters and more
-    *(f"{{{{ 'x'.{name}(900000000) | length }}}}" for name in ("ljust", "rjust", "center", "zfill")),
-    "{{ 'x' | center(900000000) | length }}",
-    "{{ 'x' | indent(first=true, width=900000000) | length }}",
-    "{{ '\t'.expandtabs(900000000) | length }}",
-    "{{ ['x'] | map('center', 900000000) | list | length }}",
-    "{{ ([1] | batch(900000000, 0) | list)[0] | length }}",
-    "{{ [[1]] | tojson(900000000) | length }}",
-    "{{ '%900000000d' % 1 }}",
-    "{{ '%*d' % (900000000, 1) }}",
-    "{{ '%900000000d' | format(1) | length }}",
-    "{{ '{:900000000}'.format(1) | length }}",
-    "{{ '{:{}}'.format(1, 900000000) | length }}",
-    "{{ '{x:{w}}'.format_map({'x': 1, 'w': 900000000}) | length }}",
-    "{{ ('{:900000000}' | attr('format'))(1) | length }}",
-    BIG + "{{ big.replace('x', 'x' * 1000) | length }}",
-    BIG + "{{ big | replace('x', 'x' * 1000) | length }}",
-    BIG + "{{ ('x' * 1000).join([big] * 1000) | length }}",
-    BIG + "{{ ([big] * 1000) | join | length }}",
-    BIG + "{{ ([big] * 1000) | map('upper') | join | length }}",
-    BIG + "{{ ([big] * 1000) | string | length }}",
-    BIG + "{{ ([big] * 1000) ~ '' }}",
-    BIG + "{{ '%s' % ([big] * 1000,) }}",
-    BIG + "{{ [big] * 1000 }}",
-    BIG + "{% set s = namespace(x=big) %}{% for i in range(40) %}{% set s.x = s.x ~ s.x %}{% endfor %}",
-    BIG + "{% set s = namespace(x=[]) %}{% for i in range(40000) %}{% set s.x = [s.x, big[1:]] %}{% endfor %}",
-    BIG + "{% set all %}{% for i in range(1000) %}{{ big }}{% endfor %}{% endset %}",
-    "{% set s = namespace(x=[1]) %}{% for i in range(40) %}{% set s.x = [s.x, s.x] %}{% endfor %}{{ s.x }}",
-    "{% set s = namespace(x=[1]) %}{% for i in range(40) %}{% set s.x = [s.x, s.x] %}{% endfor %}{{ s }}",
-    "{% set all %}{% for i in range(90000) %}" + "words " * 1000 + "{% endfor %}{% endset %}",
-    "{% macro m(n) %}{% if n %}{{ m(n - 1) ~ m(n - 1) }}{% else %}"
-    + "x" * 99999
-    + "{% endif %}{% endmacro %}{{ m(9) }}",
-]
-
-
 @pytest.mark.parametrize(
     ("template", "message"),
     [
@@ -508,21 +470,20 @@ LARGE = [  # of each some hundred million characters and more
         ("{{ front[0].nmber }}", "has no attribute 'nmber'"),
         ("{{ 1 / 0 }}", "division by zero"),
         ("{{ range(10 ** 9) | length }}", "Range too big"),
-        (
-            "{% for i in range(99999) %}{% for j in range(99999) %}{% endfor %}{% endfor %}",
-            "its loops go on for more than 100,000 rounds",
-        ),
+        ("{{ n_targets * 1e999 }}", "name 'inf' is not defined"),
         ("{% macro m(n) %}{{ m(n) }}{{ m(n) }}{% endmacro %}{{ m(1) }}", "cannot be rendered: "),
-        ("{% macro m(n) %}{% if n %}{{ m(n-1) }}{{ m(n-1) }}{% endif %}{% endmacro %}{{ m(40) }}", "rounds"),
-        ('{{ "x" * 10 ** 8 }}', "is too large"),
+        ('{{ "x" * 10 ** 7 }}', "it is longer than 1,000,000 characters"),
         ('{% for i in range(99999) %}{{ "x" * 1000 }}{% endfor %}', "it is longer than 1,000,000 characters"),
-        ("{{ 10 ** (10 ** 9) }}", "is too large"),
-        ('{{ "%1999999d" % 1 }}', "it is longer than 1,000,000 characters"),
+        (
+            "{% for i in range(99999) %}{% for j in range(99999) %}words {% endfor %}{% endfor %}",
+            "it is longer than 1,000,000 characters",
+        ),
         ("{{ space.sample }}{{ space.nothing }}", "has no attribute 'nothing'"),
         ("{{ task.points.tofile('x') }}", "tofile cannot be called in a template"),
-        ("{{ task.model_dump_json(indent=10 ** 9) }}", "model_dump_json cannot be called"),
-        ("{{ (1).to_bytes(10 ** 9, 'big') }}", "to_bytes cannot be called"),
-        *((template, TOO_MUCH) for template in LARGE),
+        ("{{ (task.points | attr('tofile'))('x') }}", "tofile cannot be called in a template"),
+        ("{{ task.parse_raw('', proto='pickle', allow_pickle=true) }}", "parse_raw cannot be called"),
+        ("{{ task.model_dump_json() }}", "model_dump_json cannot be called"),
+        ("{{ space.mass.mass(1) }}", "mass cannot be called"),
     ],
 )
 def test_a_template_that_cannot_be_rendered(template: str, message: str) -> None:

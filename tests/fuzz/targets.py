@@ -597,24 +597,6 @@ def word_seeds() -> list[bytes]:
             b"mass <= 3\nlength >= 0.2"]  # fmt: skip
 
 
-def template_seeds() -> list[bytes]:
-    from armwright.llm.prompt import whole_template
-
-    return [
-        whole_template("plus").encode(),
-        b"{% for t in targets %}{{ t }}, {% endfor %}{{ task.name | upper }} {{ '%.2f' | format(tolerance) }}",
-        b"{% macro m(x) %}{{ x * 3 }}{% endmacro %}{{ m('ab') }}{{ objectives | map(attribute='name') | join(', ') }}",
-        b"{{ space.link }}{{ front | length }}{% if n_targets > 3 %}many{% else %}few{% endif %}{{ description[:20] }}",
-    ]
-
-
-def run_template(data: bytes) -> None:
-    from armwright.llm.prompt import load_prompt
-
-    prompt = load_prompt(str(file_of(data, "mine.md.j2")))
-    prompt.render(History(a_problem(), [], 1, None), 0)
-
-
 # The page's server
 
 
@@ -835,7 +817,6 @@ TARGETS: dict[str, Target] = {
     "urdf": Target("text", urdf_seeds, run_urdf),
     "points": Target("text", point_seeds, run_points),
     "words": Target("text", word_seeds, run_words),
-    "template": Target("text", template_seeds, run_template, heavy=True),
     "request": Target("json", request_seeds, run_request),
     "arguments": Target("json", argument_seeds, run_arguments, heavy=True),
 }  # fmt: skip

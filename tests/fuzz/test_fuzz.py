@@ -34,7 +34,7 @@ from tests.fuzz.targets import TARGETS, DefectError, a_run, check, looked_at, se
 
 def inputs(name: str) -> int:
     """As many as take half a second or so."""
-    if name.startswith("run ") or name in ("draft", "template"):
+    if name.startswith("run ") or name == "draft":
         return 4
     return 20 if TARGETS[name].heavy else 100
 
@@ -269,13 +269,6 @@ def test_a_template_that_is_nested_too_deeply(tmp_path: Path, text: str) -> None
     """Python refuses what jinja makes of it."""
     (tmp_path / "mine.md.j2").write_text(text)
     with limited(), suppress(SettingsError):
-        load_prompt(tmp_path / "mine.md.j2")
-
-
-def test_a_number_in_a_template_that_is_too_large(tmp_path: Path) -> None:
-    """Jinja wrote it as a name that does not exist."""
-    (tmp_path / "mine.md.j2").write_text("{{ 1e999 }}")
-    with pytest.raises(SettingsError, match="too large"):
         load_prompt(tmp_path / "mine.md.j2")
 
 

@@ -20,7 +20,7 @@ from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.kinematics.solve import UPDATES
 from armwright.llm.feedback import Feedback, Record, points, proposal_records, vector
 from armwright.llm.lines import LISTS
-from armwright.llm.sandbox import Sandbox
+from armwright.llm.sandbox import Sandbox, render
 from armwright.llm.words import end_of, fence, one_line, without_thoughts
 from armwright.modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.objectives import (
@@ -133,7 +133,7 @@ class Prompt:
                     f"{did_you_mean(str(other), there)} Templates: {', '.join(there)}"
                 )
             known |= _exported(_sandbox().parse(builtin_template(str(other))))
-        for name in sorted(_sandbox().names_needed(tree) - known):
+        for name in sorted(meta.find_undeclared_variables(tree) - known):
             raise SettingsError(
                 f'prompt {self.name} uses "{name}", which does not exist.{did_you_mean(name, VARIABLES)} '
                 f"Names: {', '.join(VARIABLES)}"
@@ -177,9 +177,8 @@ class Prompt:
         return text + "\n" + rendered("hints.md.j2", values)
 
     def _render(self, values: Mapping[str, Any]) -> str:
-        sandbox = _sandbox()
         try:
-            text = _tidy(sandbox.rendered(sandbox.from_string(self.template), values))
+            text = _tidy(render(_sandbox().from_string(self.template), values))
         except _FAULTS as fault:
             line = next(
                 (f.lineno for f in reversed(traceback.extract_tb(fault.__traceback__)) if f.filename == "<template>"),
@@ -195,7 +194,8 @@ class Prompt:
 
 # What a template can run into.
 _FAULTS = (
-    TemplateError, TypeError, ValueError, ArithmeticError, LookupError, AttributeError, RecursionError, MemoryError
+    TemplateError, TypeError, ValueError, ArithmeticError, LookupError, AttributeError, NameError, RecursionError,
+    MemoryError
 )  # fmt: skip
 
 
@@ -266,7 +266,7 @@ def fenced(answer: str) -> dict[str, str]:
 
 def rendered(name: str, values: Mapping[str, Any]) -> str:
     """A template that comes with armwright, with these values."""
-    return _tidy(_sandbox().rendered(_sandbox().get_template(name), values))
+    return _tidy(render(_sandbox().get_template(name), values))
 
 
 def estimated_tokens(text: str) -> int:
