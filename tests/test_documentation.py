@@ -219,6 +219,7 @@ def file_of(block: Block) -> str | None:
 FOLLOWED = [page for page in PAGES if commands(page)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", FOLLOWED)
 def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
     """Its commands, files and programs, from the first to the last, in one folder."""
