@@ -1,0 +1,223 @@
+"""Hostile files and answers, each of which once broke something: refused in one line, or read.
+
+`tests/fuzz` found most of them.
+"""
+
+import json
+import shutil
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from armwright.documents import LARGEST_DOCUMENT
+from armwright.exceptions import (
+    ArmwrightError,
+    RunFolderError,
+    SettingsError,
+    SpaceError,
+    TaskError,
+)
+from armwright.experiment.plan import cells_of, load_experiment
+from armwright.llm.prompt import load_prompt
+from armwright.llm.transcript import Transcript
+from armwright.report.page import write_report
+from armwright.results import read_summary
+from armwright.run_folder import read_config
+from armwright.space import load_space
+from armwright.task import Task, load_task
+from armwright.task_template import task_template
+from armwright.urdf.reading import read_urdf
+from tests.fuzz.targets import a_run, looked_at
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name: !!int ''", "tags"),  # PyYAML: IndexError
+        ("name: !!bool maybe", "tags"),  # KeyError
+        ("name: !!timestamp never", "tags"),  # AttributeError
+        ("name: !!python/object/apply:os.system [id]", "tags"),
+        ("name: ! x", "tags"),
+        (f"name: {'1:' * 400}1.0", "base 60"),  # OverflowError
+        (f"name: {'1:' * 1_000_000}1", "base 60"),  # hours
+        ("name: 0x" + "f" * 20_000, "valid string"),  # a number of too many digits to be shown
+        ("name: " + "9" * 5000, "not valid YAML"),
+        ('name: "\\ud800"', "not valid YAML"),
+        ('"a\\nb": 1', "unknown key"),
+        ('"\\e[2J": 1', "unknown key"),
+        ("? " + "x" * 1_000_000 + "\n: 1", "unknown key"),
+        ("a: &a [x]\nb: [*a, *a]", "aliases"),
+        ("[" * 100_000, "nested too deeply"),
+        ("a: " + "{a: " * 100_000, "nested too deeply"),
+        ("- " * 100_000, "nested too deeply"),
+        ("a: [" + "1," * 400_000 + "1]", "400,000 values"),
+        ("name: many\ntargets: [" + "[0,0,0]," * 10_001 + "]", "at most 10000"),
+        ("name: x\ntargets: [[1e308, 0, 0]]", "more than 1000 m away"),
+        ("name: x\ntargets: [[.nan, 0, 0]]", "finite number"),
+        ("name: x\ntargets: [[" + "9" * 400 + ", 0, 0]]", "target"),
+        ("name: ../../x\ntargets: [[0, 0, 0]]", "pattern"),
+        ("name: /etc/x\ntargets: [[0, 0, 0]]", "pattern"),
+        ('name: "a\\nb"\ntargets: [[0, 0, 0]]', "pattern"),
+        ("name: CON\ntargets: [[0, 0, 0]]", "Windows"),
+        ("name: nul.x\ntargets: [[0, 0, 0]]", "Windows"),
+        ("name: a.\ntargets: [[0, 0, 0]]", "Windows"),
+    ],
+    ids=lambda value: value[:30],
+)
+def test_hostile_documents_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "task.yaml"
+    file.write_text(text)
+    with pytest.raises(TaskError, match=words) as refusal:
+        load_task(file)
+    assert str(refusal.value).isprintable()
+    assert len(str(refusal.value)) <= 3000
+
+
+def test_endless_and_huge_files_are_refused(tmp_path: Path) -> None:
+    for place in (Path("/dev/zero"), tmp_path / "big.yaml"):
+        if place.parent == tmp_path:
+            place.write_bytes(b" " * (LARGEST_DOCUMENT + 1))
+        with pytest.raises(SpaceError, match="larger than 4 MiB"):
+            load_space(place)
+    with pytest.raises(SpaceError, match="cannot read"):
+        load_space("a\0.yaml")
+
+
+@pytest.mark.slow
+def test_task_with_ten_thousand_targets_is_read(tmp_path: Path) -> None:
+    record = "{position: [0.1, 0.2, 0.3], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}"
+    file = tmp_path / "task.yaml"
+    file.write_text("name: many\ntargets:\n" + f"  - {record}\n" * 10_000)
+    assert len(load_task(file).targets) == 10_000
+
+
+def test_experiment_with_too_many_cells_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text("name: x\ntasks: all\nseeds: 10000\nmethods: {a: {label: A}}\n")
+    with pytest.raises(SettingsError, match="310,000 cells"):
+        cells_of(*load_experiment(str(file)), tmp_path)
+
+
+def test_experiment_with_line_breaks_in_its_commands_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text('name: x\ntasks: [target-1]\nseeds: 1\nmethods: {a: {label: A, proposer: llm, prompt: "a\\n"}}\n')
+    with pytest.raises(SettingsError, match="can stand on no line") as refusal:
+        cells_of(*load_experiment(str(file)), tmp_path)
+    assert str(refusal.value).isprintable()
+
+
+def test_range_from_zero_to_minus_zero_is_one_value(tmp_path: Path) -> None:
+    file = tmp_path / "space.yaml"
+    file.write_text("name: x\norigin_z: [0.0, -0.0]\n")
+    assert [design.origin[2] for design in load_space(file).sample(3, 0)] == [0.0] * 3
+
+
+def test_template_renames_tasks_that_are_windows_devices() -> None:
+    text = task_template(Path("con.yaml"))
+    assert 'name: "task-con"' in text
+    assert Task(name="console", targets=((0, 0, 0),)).name == "console"
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """A finished run, to be damaged."""
+    return Path(shutil.copytree(a_run(), tmp_path / "run"))
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("verification",), 3), (("verification", "solid_numbers"), None), (("verification", "solid_numbers"), {}),
+        (("hypervolume",), {}), (("hypervolume", "history"), [[1], 2]), (("hypervolume", "final"), "x"),
+        (("credit",), []), (("credit", "bbo"), None), (("proposer", "failures"), 1), (("diagnostics",), "x"),
+        (("seconds",), {}), (("best_known",), {"share": 1}), (("front_size",), 10**400), (("n_trials",), -1),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_damaged_summary_is_made_again(run: Path, place: tuple[str, ...], value: object) -> None:
+    summary = json.loads((run / "summary.json").read_text())
+    within = summary
+    for key in place[:-1]:
+        within = within[key]
+    within[place[-1]] = value
+    (run / "summary.json").write_text(json.dumps(summary))
+    assert read_summary(run) is None
+    looked_at(run)
+
+
+@pytest.mark.parametrize("field", ["proposals", "memory", "answer", "name", "prompt"])
+def test_config_without_a_proposer_setting_is_refused(run: Path, field: str) -> None:
+    text = (run / "config.yaml").read_text()
+    assert f"    {field}: " in text
+    lines = [line for line in text.splitlines() if not line.startswith(f"    {field}: ")]
+    (run / "config.yaml").write_text("\n".join(lines))
+    if field == "prompt":
+        assert read_config(run).study.proposer is not None
+    else:
+        with pytest.raises(RunFolderError, match=field):
+            read_config(run)
+
+
+@pytest.mark.parametrize("values", [[], [1.0], [1.0, 2.0, 3.0], [float("nan"), 1.0]], ids=str)
+def test_existing_arms_with_other_objectives_are_refused(run: Path, values: list[float]) -> None:
+    bought = json.loads((run / "bought.json").read_text())
+    bought[0]["values"] = values
+    (run / "bought.json").write_text(json.dumps(bought))
+    with pytest.raises(RunFolderError, match="compare the arms again"):
+        write_report(run)
+
+
+@pytest.mark.parametrize("value", ["x", "llm-", "llm-x", "llm-9999999999", "-1\n"])
+def test_transcript_with_an_invalid_proposal_is_refused(run: Path, value: str) -> None:
+    calls = [json.loads(line) for line in (run / "transcripts.jsonl").read_text().splitlines()]
+    calls[1]["proposal"] = value
+    (run / "transcripts.jsonl").write_text("".join(f"{json.dumps(call)}\n" for call in calls))
+    with pytest.raises(RunFolderError, match="line 2 is damaged"):
+        Transcript(run / "transcripts.jsonl")
+
+
+@pytest.mark.parametrize("url", ["http://a:x/v1", "http://[::1", "http://", "http://\x01/v1", "http://a b/v1"])
+def test_invalid_server_address_is_refused(url: str) -> None:
+    from armwright.llm.chat import ModelClient
+
+    with pytest.raises(SettingsError, match="is no address"):
+        ModelClient("openai-chat:x", url)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"><link name="x"/></robot>',
+        '<!DOCTYPE r SYSTEM "file:///etc/passwd"><robot/>',
+        '<!DOCTYPE r [<!ENTITY % p SYSTEM "http://127.0.0.1:9/x"> %p;]><robot/>',
+        "<a>" * 100_000,
+        '<?xml version="1.0" encoding="utf-7"?><robot/>',
+        "<robot><link name=\"${__import__('os').system('id')}\"/></robot>",
+        '<robot xmlns:xacro="x"><xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/></robot>',
+        '<robot><link name="a"><inertial><mass value="${1+1}"/></inertial></link></robot>',
+        '<robot><xacro:include filename="/etc/passwd"/></robot>',
+    ],
+    ids=lambda text: text[:40],
+)
+def test_hostile_urdf_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+    """Entities are not declared, nothing is fetched, and xacro is not expanded."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(text)
+    with pytest.raises(ArmwrightError) as refusal:
+        read_urdf(file)
+    assert str(refusal.value).isprintable()
+
+
+@pytest.mark.parametrize("text", ["{{ " + "(" * 300 + "1" + ")" * 300 + " }}", "{{ " + "-" * 300 + "1 }}"])
+def test_deeply_nested_template_is_read_or_refused(tmp_path: Path, text: str) -> None:
+    """Python refuses what jinja makes of it."""
+    (tmp_path / "mine.md.j2").write_text(text)
+    with suppress(SettingsError):
+        load_prompt(tmp_path / "mine.md.j2")
+
+
+def test_template_with_too_many_digits_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine.md.j2").write_text("{{ " + "9" * 5000 + " }}")
+    with pytest.raises(SettingsError, match="cannot be read: Exceeds the limit"):
+        load_prompt(tmp_path / "mine.md.j2")
