@@ -131,7 +131,7 @@ def paper_space(joints: int = 4) -> DesignSpace:
     Args:
         joints: The number of joints, 4 in the experiments of the paper.
 
-    Example:
+    Examples:
         >>> import armwright as aw
         >>> space = aw.paper_space(joints=2)
         >>> [parameter.name for parameter in space.parameters]
@@ -155,7 +155,7 @@ def builtin_spaces() -> list[str]:
 def load_space(name_or_path: str | Path) -> DesignSpace:
     """Load a built-in space by name, or a YAML file. Keys that a file leaves out are as in the paper.
 
-    Example:
+    Examples:
         >>> import armwright as aw
         >>> aw.load_space("slideopt").joint_types
         ('R', 'P', 'Y', 'O', 'S', 'F')
