@@ -44,7 +44,7 @@ def page() -> str:
     runs = baselines()[0].runs
     methods = list(dict.fromkeys(baseline.method for baseline in baselines()))
     head = ["task", "targets", "what for", "best known", *(f"{m}: E_hv (σ_hv)" for m in methods)]
-    head += [f"{m}: at the end" for m in methods]
+    head += [f"{m}: final" for m in methods]
     lines = [f"| {' | '.join(head)} |", "|---|--:|---|" + "--:|" * (1 + 2 * len(methods))]
     for name, task in builtin_tasks().items():
         by_method = {baseline.method: baseline for baseline in baselines_of(name)}
@@ -56,19 +56,20 @@ def page() -> str:
     return f"""\
 # The benchmark suite
 
-{len(builtin_tasks())} tasks, each with its points, a reference point, the best known front and baselines.
-`armwright tasks NAME` tells all of one task, its points and where they come from included; `random-N` is one of a
-seeded family.
+After reading this page you can place a search method of your own next to the usual ones on {len(builtin_tasks())} tasks.
 
-Hypervolume within the task's reference point, {runs} runs (seeds 0 to {runs - 1}) of 10 random and 200 counted trials
-in the paper's design space. At the end: the mean share of the best known hypervolume. `armwright front` comes to 97 to
-100 % of it ([benchmarks](benchmarks.md)). This page and the stored numbers are made by
+Each task has its points, a reference point, the best known front and baselines. `armwright tasks NAME` shows everything
+about one task, including its points and their source. `random-N` is one of a seeded family.
+
+The table gives the hypervolume within the task's reference point over {runs} runs (seeds 0 to {runs - 1}) of 10 random
+and 200 counted trials in the paper's design space. "Final" is the mean share of the best known hypervolume at the end.
+`armwright design` reaches 97 to 100 % of it ([benchmarks](benchmarks.md)). This page and the stored numbers are made by
 
     armwright experiment suite
     python benchmarks/baselines.py experiments/suite
 
-To place a method of your own beside them, copy the experiment (`armwright experiment suite --print > mine.yaml`), add
-the method and run it ([experiments](experiments.md)).
+To add your method, copy the experiment (`armwright experiment suite --print > mine.yaml`), add the method, and run it
+([experiments](experiments.md)).
 
 {chr(10).join(lines)}
 """
