@@ -56,7 +56,8 @@ def page() -> str:
     return f"""\
 # The benchmark suite
 
-After reading this page you can place a search method of your own next to the usual ones on {len(builtin_tasks())} tasks.
+After reading this page you can place a search method of your own next to the usual ones on
+{len(builtin_tasks())} tasks.
 
 Each task has its points, a reference point, the best known front and baselines. `armwright tasks NAME` shows everything
 about one task, including its points and their source. `random-N` is one of a seeded family.
