@@ -1,4 +1,4 @@
-"""What the model is told, word for word: golden files that a person has read, and what must hold for every problem.
+"""What the model is told: six golden files that a person has read, facts of other cases, and rules for all problems.
 
 The golden files are made again with: ARMWRIGHT_REMAKE_GOLDEN=1 python -m pytest tests/test_prompt.py
 """
@@ -105,43 +105,237 @@ def rendered(history: History, prompt: str = "plus", **how: Any) -> str:
     return load_prompt(prompt).render(history, 3, **how)
 
 
-CASES: dict[str, Callable[[], str]] = {
-    "plus": lambda: rendered(fixed_history(PAPER)),
-    "minus": lambda: rendered(fixed_history(PAPER), "minus"),
-    "six-joints": lambda: rendered(fixed_history(FixedProblem(load_task("target-2"), SIX_AXIS)), "minus"),
-    "own": lambda: rendered(own(4), "minus", memory="own"),
-    "own-many": lambda: rendered(own(25), "minus", memory="own"),
-    "several": lambda: rendered(fixed_history(PAPER), "minus", proposals=3),
-    "several-own-text": lambda: rendered(own(1), "minus", memory="own", proposals=2, form="text"),
-    "one-step": lambda: rendered(fixed_history(PAPER), form="schema"),
-    "one-step-several-own": lambda: rendered(own(1), "minus", memory="own", proposals=2, form="schema"),
-    "one-step-own": lambda: rendered(own(1), "minus", memory="own", form="schema"),
-    "text": lambda: rendered(fixed_history(PAPER), "minus", form="text"),
-    "no-reference-point": lambda: rendered(fixed_history(FixedProblem(grid_task(3)), n=4), "minus"),
-    "many-targets": lambda: rendered(fixed_history(FixedProblem(grid_task(200))), "minus"),
-    "one-objective": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=ONE_OBJECTIVE))),
-    "three-objectives": lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES))),
-    "obstacles": lambda: rendered(fixed_history(FixedProblem(IN_THE_WAY)), "minus"),
-    "moves": lambda: rendered(fixed_history(FixedProblem(ON_LINES)), "minus"),
-    "workspace": lambda: rendered(fixed_history(FixedProblem(COVERING)), "minus"),
-    "one-target-one-joint": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
-    "two-joints-two-designs": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
-    "nothing-yet": lambda: rendered(fixed_history(PAPER, n=0), "minus"),
-    "robust": lambda: rendered(fixed_history(FixedProblem(load_task("target-1"), tolerance=1e-3)), "minus"),
-    "constraints": lambda: rendered(fixed_history(bounded("worst_error <= 0.3", "length >= 0.7"))),
-    "constraints-none-feasible-own": lambda: rendered(
+GOLDENS: dict[str, Callable[[], str]] = {
+    "analysis-in-three-steps": lambda: rendered(fixed_history(PAPER)),
+    "memory-and-several-designs-as-text": lambda: rendered(own(1), "minus", memory="own", proposals=2, form="text"),
+    "obstacles-and-moves": lambda: rendered(fixed_history(FixedProblem(ON_LINES)), "minus"),
+    "no-feasible-design": lambda: rendered(
         fixed_history(bounded("mass <= 0.001"), proposals=[proposal(DESIGNS[0], "light", (1.0, 2.0))]),
         "minus",
         memory="own",
     ),
-    "small": lambda: rendered(fixed_history(FixedProblem(ONE_POINT, SMALL), n=3), "minus"),
-    "parameters": lambda: parameters_prompt(PAPER, "I think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)"),
-    "parameters-several-own": lambda: parameters_prompt(
-        FixedProblem(ONE_POINT, ONE_JOINT), "Two designs.", proposals=2, expected=True
+    "second-call-with-expectations": lambda: parameters_prompt(PAPER, "One design.", expected=True),
+    "schema-of-several-designs": lambda: schema(reasoning=True, expected=True, proposals=2),
+}
+SIX_JOINTS = FixedProblem(load_task("target-2"), SIX_AXIS)
+BOUNDED = ("worst_error <= 0.3", "length >= 0.7")
+
+# For each case what its prompt says, and what it does not say.
+Facts = tuple[Callable[[], str], tuple[str, ...], tuple[str, ...]]
+FACTS: dict[str, Facts] = {
+    "minus": (
+        lambda: rendered(fixed_history(PAPER), "minus"),
+        (
+            "The arm has D = 4 joints connected in series",
+            "14 designs have been evaluated; 2 of them are Pareto-optimal.",
+            "## Both Pareto-optimal designs, by rising E_pos",
+            "## 5 of the 12 other designs, drawn at random",
+            "Propose one new design, different from all above, that enlarges the hypervolume most.",
+            "End your answer with the new design, in these lines:",
+        ),
+        ("Step 1", "BROKEN", "earlier proposals", "EXPECTED", "REASON", "workshop"),
     ),
-    "parameters-own": lambda: parameters_prompt(PAPER, "One design.", expected=True),
-    "schema": lambda: schema(reasoning=False, expected=False, proposals=1),
-    "schema-one-step-several-own": lambda: schema(reasoning=True, expected=True, proposals=2),
+    "six joints, ranges of one value, tubes": (
+        lambda: rendered(fixed_history(SIX_JOINTS), "minus"),
+        (
+            "The arm has D = 6 joints connected in series",
+            "JOINTS = (joint_1, ..., joint_6)",
+            "-0.25 <= origin_x <= 0.75, origin_y = 0 (fixed), origin_z = 0.125 (fixed).",
+            "Every joint angle stays within [-2.8, 2] rad.",
+            "a tube of 30 mm outer diameter and 2 mm wall, 2700 kg/m³ (0.475 kg per metre).",
+            "14 designs have been evaluated; 1 of them is Pareto-optimal.",
+            "## The Pareto-optimal design",
+            "TAU_IK: [(5.39, -1.35, 0.60, -0.34, 0.22, -0.15), (1.42, -0.36, 0.16, -0.09, 0.06, -0.04)",
+        ),
+        (),
+    ),
+    "memory": (
+        lambda: rendered(own(4), "minus", memory="own"),
+        (
+            "## Your earlier proposals",
+            "Design 15\n",
+            "EXPECTED: not said\n",
+            "REASON: not said\n",
+            "Design 16, on the front now\n",
+            "EXPECTED: (3.250, 3.500)\n",
+            "REASON: longer links, because the far corners were missed\n",
+            "EXPECTED: (E_pos, E_torque) that you expect of it\n",
+        ),
+        ("The last",),
+    ),
+    "memory of many proposals": (
+        lambda: rendered(own(25), "minus", memory="own"),
+        ("The last 20 of 25.", "39 designs have been evaluated", "Design 19\n", "Design 38"),
+        ("EXPECTED: (1.250, 3.500)",),
+    ),
+    "several designs": (
+        lambda: rendered(fixed_history(PAPER), "minus", proposals=3),
+        (
+            "Propose 3 new designs, different from each other and from all above, that together enlarge",
+            "End your answer with the 3 new designs, each in these lines:",
+        ),
+        ("one new design",),
+    ),
+    "one call": (
+        lambda: rendered(fixed_history(PAPER), form="schema"),
+        (
+            "Step 3: Choose the new values",
+            "Write your thoughts into `reasoning` first; then give the new design and the main reason for it",
+        ),
+        ("End your answer", "what you expect"),
+    ),
+    "one call with memory": (
+        lambda: rendered(own(1), "minus", memory="own", form="schema"),
+        ("then give the new design, what you expect of E_pos and E_torque, and the main reason for it",),
+        ("End your answer",),
+    ),
+    "one call for several designs, with memory": (
+        lambda: rendered(own(1), "minus", memory="own", proposals=2, form="schema"),
+        ("then give the 2 new designs, each with what you expect of E_pos and E_torque and the main reason",),
+        ("End your answer",),
+    ),
+    "text": (
+        lambda: rendered(fixed_history(PAPER), "minus", form="text"),
+        ("End your answer", "REASON: the main reason for this design, in one sentence\n"),
+        ("EXPECTED", "`reasoning`"),
+    ),
+    "no reference point": (
+        lambda: rendered(fixed_history(FixedProblem(grid_task(3)), n=4), "minus"),
+        (
+            "4 designs have been evaluated; 4 of them are Pareto-optimal.",
+            "## All 4 Pareto-optimal designs",
+            "judged by its hypervolume: the more of the space of the objectives it dominates, the better.",
+        ),
+        ("reference point", "other designs"),
+    ),
+    "many targets": (
+        lambda: rendered(fixed_history(FixedProblem(grid_task(200))), "minus"),
+        (
+            "each of 200 target points (x, y, z) [m], which lie in the box from (0.300, 0.000, 0.400) to "
+            "(0.480, 0.950, 0.460). These are 20 of them, spread evenly over the list:",
+            "for each target in TARGET",
+            "with the reference point (36.45, 1006): a design counts only if E_pos < 36.45 and E_torque < 1006",
+        ),
+        (),
+    ),
+    "one objective": (
+        lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=ONE_OBJECTIVE))),
+        (
+            "The objective is its sum over all targets, E_ALL = (E_pos). It is minimised.",
+            "14 designs have been evaluated.\n",
+            "## The best design",
+            "## 5 of the 13 other designs, drawn at random",
+            "different from all above, with E_pos as small as possible.",
+            "Step 2: Analyse what limits the best designs so far.",
+        ),
+        ("Pareto", "hypervolume", "conflict"),
+    ),
+    "three objectives": (
+        lambda: rendered(fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES))),
+        (
+            "The 3 objectives are the sums over all targets, E_ALL = (E_pos, E_torque, E_length). All are minimised.",
+            "E_EACH: (E_pos_i, E_torque_i, E_length_i) for each target",
+            "Which part of the front is empty: low E_pos, low E_torque, low E_length, or the middle?",
+        ),
+        (),
+    ),
+    "obstacles": (
+        lambda: rendered(fixed_history(FixedProblem(IN_THE_WAY)), "minus"),
+        (
+            "In the way are 5 obstacles, which are solid; positions and lengths in [m]:",
+            "The inverse kinematics steers around nothing: whether the kept posture is free follows from the design.",
+        ),
+        ("do not matter", "moves along straight lines"),
+    ),
+    "workspace": (
+        lambda: rendered(fixed_history(FixedProblem(COVERING)), "minus"),
+        (
+            "The tip should also cover these workspaces [m], by points spread evenly over each",
+            "- box from (0.2, -0.3, 0) to (0.6, 0.3, 0.5), 200 points\n",
+            "- box from (0, 0, 1) to (0, 0, 1.5), 20 points\n",
+            "E_uncovered, of the arm itself, and E_torque, the sum of E_torque_i over all targets",
+            "E_EACH: (E_torque_i) for each target",
+        ),
+        (),
+    ),
+    "one target, one joint, one design": (
+        lambda: rendered(fixed_history(FixedProblem(ONE_POINT, ONE_JOINT), n=1)),
+        (
+            "The arm has D = 1 joint, followed by one link.",
+            "JOINTS = (joint_1):",
+            "The only type is",
+            "link_1 = 0.2 (fixed)",
+            "The tip of the arm should reach this target point",
+            "One design has been evaluated.",
+            "## The Pareto-optimal design",
+            "TAU_IK: [(0.00436)]",
+        ),
+        ("## The other", "other designs"),
+    ),
+    "two joints, two designs": (
+        lambda: rendered(fixed_history(FixedProblem(ONE_POINT, TWO_JOINTS), n=2), "minus"),
+        (
+            "JOINTS = (joint_1, joint_2):",
+            "2 designs have been evaluated; 1 of them is Pareto-optimal.",
+            "## The Pareto-optimal design",
+            "## The other design",
+        ),
+        ("drawn at random",),
+    ),
+    "no design yet": (
+        lambda: rendered(fixed_history(PAPER, n=0), "minus"),
+        (
+            "No design has been evaluated yet.",
+            "Propose one new design, that enlarges the hypervolume most. Think step by step.",
+        ),
+        ("E_EACH", "different from", "\nDesign "),
+    ),
+    "a tolerance": (
+        lambda: rendered(fixed_history(FixedProblem(load_task("target-1"), tolerance=1e-3)), "minus"),
+        (
+            "A workshop builds to within 1 mm.",
+            "the worst of the design as it stands and of 14 copies of it, each with one coordinate of ORIGIN or one "
+            "link longer or shorter by that much.",
+        ),
+        (),
+    ),
+    "constraints": (
+        lambda: rendered(fixed_history(bounded(*BOUNDED))),
+        (
+            "A design must keep all of these constraints:",
+            "- E_worst <= 0.3 [m], where E_worst is the largest over all targets of the distance",
+            "- E_length >= 0.7 [m], where E_length is the sum of the lengths of all links.",
+            "0 of them are feasible; 0 of them are Pareto-optimal.",
+            "## No design is feasible; these 5 break the constraints least",
+            "BROKEN: E_worst = 0.4909, not <= 0.3; E_length = 0.635, not >= 0.7\n",
+            "Propose one new feasible design",
+        ),
+        (),
+    ),
+    "second call": (
+        lambda: parameters_prompt(PAPER, "I think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)"),
+        (
+            "ends with the design of a robot arm",
+            "- origin_z: -1 to 1 m\n- joint_1: one of R, P, Y\n",
+            "- link_4: 0.03 to 0.3 m\n",
+            "\n----------\nI think.\n\nORIGIN: (0, 0, 0)\nJOINTS: (Y, P, R, P)\n----------\n",
+        ),
+        ("expected",),
+    ),
+    "second call for several designs": (
+        lambda: parameters_prompt(FixedProblem(ONE_POINT, ONE_JOINT), "Two designs.", proposals=2, expected=True),
+        (
+            "ends with up to 2 designs of a robot arm",
+            "- joint_1: P\n- link_1: 0.2 m (fixed)\n",
+            "For each design give the expected E_pos and E_torque as they are stated",
+        ),
+        (),
+    ),
+    "schema of one design": (
+        lambda: schema(reasoning=False, expected=False, proposals=1),
+        ('"title": "NewDesign"', '"-1 <= origin_x <= 1 m"', '"reason"', '"additionalProperties": false'),
+        ('"reasoning"', '"expected_', '"designs"'),
+    ),
 }
 
 
@@ -149,13 +343,21 @@ def schema(**how: Any) -> str:
     return json.dumps(answer_schema(PAPER, **how), indent=2, ensure_ascii=False) + "\n"
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", GOLDENS)
 def test_golden(name: str) -> None:
     file = GOLDEN / f"{name}.md"
-    text = CASES[name]()
+    text = GOLDENS[name]()
     if os.environ.get("ARMWRIGHT_REMAKE_GOLDEN"):
         file.write_text(text, encoding="utf-8")
     assert text == file.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", FACTS)
+def test_facts_of_a_prompt(name: str) -> None:
+    render, present, absent = FACTS[name]
+    text = render()
+    assert [fact for fact in present if fact not in text] == []
+    assert [fact for fact in absent if fact in text] == []
 
 
 def test_obstacles_that_do_not_count_are_told_so() -> None:
@@ -170,7 +372,7 @@ def test_obstacles_that_do_not_count_are_told_so() -> None:
 
 
 def test_every_golden_file_has_its_case() -> None:
-    assert {file.stem for file in GOLDEN.iterdir()} == set(CASES)
+    assert {file.stem for file in GOLDEN.iterdir()} == set(GOLDENS)
 
 
 # What must hold for every problem.
@@ -509,6 +711,6 @@ def test_a_file_that_is_no_template(tmp_path: Path) -> None:
 
 
 def test_designs_of_the_worst_scale_keep_their_digits() -> None:
-    text = CASES["small"]()
+    text = rendered(fixed_history(FixedProblem(ONE_POINT, SMALL), n=3), "minus")
     assert "LINKS: (0.00314, 0.00238)" in text
     assert "LINKS: (0.000" not in text.replace("LINKS: (0.00097, 0.00191)", "")
