@@ -101,10 +101,11 @@ COMPILE_FOR_CUDA = """
 import sys
 import warp as wp
 from armwright.kinematics.clearance_kernels import clearance_kernels_of
-from armwright.kinematics.kernels import kernels_of
-from armwright.kinematics.pose_kernels import pose_kernels_of
-variants = [kernels_of("float32", 1, "revolute"), kernels_of("float32", 1, "any"), pose_kernels_of("float32", 1, "any")]
-solving = [k for v in variants for k in (v.descend, v.settle, v.hold) if k is not None]
+from armwright.kinematics.pose_kernels import pose_kernels
+from armwright.kinematics.position_kernels import position_kernels
+variants = [position_kernels("float32", 1, motions) for motions in ("revolute", "any")]
+variants.append(pose_kernels("float32", 1, "any"))
+solving = [k for v in variants for k in (v.solve_ik, v.keep_pose, v.static_torque) if k is not None]
 measuring = clearance_kernels_of("float32")
 kernels = {kernel.module.name: kernel for kernel in (*solving, measuring.place, measuring.part, measuring.clear)}
 print(len(kernels), file=open(sys.argv[1] + "/count", "w"))

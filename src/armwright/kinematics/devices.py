@@ -73,12 +73,12 @@ def _warp() -> Any:
 @cache
 def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> Any:
     with _said_where_it_is_kept():
-        from armwright.kinematics.kernels import kernels_of
-        from armwright.kinematics.pose_kernels import pose_kernels_of
+        from armwright.kinematics.pose_kernels import pose_kernels
+        from armwright.kinematics.position_kernels import position_kernels
 
-        make = {"position": kernels_of, "pose": pose_kernels_of}[kind]
+        make = {"position": position_kernels, "pose": pose_kernels}[kind]
         kernels = make(precision, lanes, motions)
-        for kernel in (kernels.descend, kernels.settle, kernels.hold):
+        for kernel in (kernels.solve_ik, kernels.keep_pose, kernels.static_torque):
             if kernel is not None:
                 kernel.module.load(device)
     return kernels

@@ -257,7 +257,7 @@ def _launch(arms: ArmArrays, at: Any, updates: int, q_last: Any, h_last: Any, wp
 
 def _columns(dof: int, kernels: Any) -> tuple[int, ...]:
     """Of the results: kept angles, reached points, torques and, of poses, angles off."""
-    return (dof, 3, dof) if kernels.settle is None else (dof, 3, dof, 1)
+    return (dof, 3, dof) if kernels.keep_pose is None else (dof, 3, dof, 1)
 
 
 def _steps(
@@ -266,17 +266,17 @@ def _steps(
     """The kernels in their order, each with what it takes; results: as of `_columns`."""
     on_device = _on_device(arms, wp, kernels, q_last.device)
     kept, *held = results[:3]
-    if kernels.settle is None:
+    if kernels.keep_pose is None:
         return (
-            (kernels.descend, [on_device, at, updates, q_last, h_last, kept]),
-            (kernels.hold, [on_device, at, q_last, kept, *held]),
+            (kernels.solve_ik, [on_device, at, updates, q_last, h_last, kept]),
+            (kernels.static_torque, [on_device, at, q_last, kept, *held]),
         )
     vector = kernels.Arms.vars["base"].type.dtype
     tool = [wp.array(getattr(arms, name), dtype=vector, device=q_last.device, copy=False) for name in TOOL]
     return (
-        (kernels.descend, [on_device, *tool, at, updates, q_last, h_last, kept]),
-        (kernels.settle, [on_device, *tool, at, q_last, kept, results[3]]),
-        (kernels.hold, [on_device, at, kept, kept, *held]),
+        (kernels.solve_ik, [on_device, *tool, at, updates, q_last, h_last, kept]),
+        (kernels.keep_pose, [on_device, *tool, at, q_last, kept, results[3]]),
+        (kernels.static_torque, [on_device, at, kept, kept, *held]),
     )
 
 
