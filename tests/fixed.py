@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.batch_builder import stack_designs
 from armwright.evaluation import Evaluation
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.kinematics.paths import Paths
 from armwright.moves import lines_of
 from armwright.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
@@ -17,6 +17,7 @@ from armwright.pareto import default_reference_point
 from armwright.problem import Problem
 from armwright.space import DesignSpace, paper_space
 from armwright.task import Task
+from armwright.trial import FinishedTrial
 from armwright.workspace import points_of
 
 

@@ -22,7 +22,7 @@ from armwright.credit import credit_by_source
 from armwright.decision import numbers_of, pick
 from armwright.exceptions import FailureError, RunConflictError, RunFolderError, SettingsError, TaskError
 from armwright.front import find_front
-from armwright.history import FinishedTrial, History, found_reference_point
+from armwright.history import History, found_reference_point
 from armwright.parameters import CategoricalParameter, FloatParameter
 from armwright.pareto import (
     default_reference_point,
@@ -47,6 +47,7 @@ from armwright.study import optimize
 from armwright.task import Task, load_task
 from armwright.task_template import task_template
 from armwright.tolerance import moved
+from armwright.trial import FinishedTrial
 from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.fixed import FixedProblem, fixed_history
 
@@ -325,7 +326,7 @@ def test_a_line_without_its_constraints_is_damaged(tmp_path: Path) -> None:
     first = json.loads(file.read_text().splitlines()[0])
     del first["constraints"]
     file.write_text(json.dumps(first) + "\n")
-    with pytest.raises(RunFolderError, match=r"line 1 is damaged .0 constraints where 3 are due"):
+    with pytest.raises(RunFolderError, match=r"line 1 is damaged .expected 3 violations, found 0"):
         read_run(tmp_path / "run")
 
 

@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armwright.credit import credit_by_source, front_by_source, gained_by_source, hypervolume_gains
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.pareto import front_numbers, hypervolume
 from armwright.problem import Problem
 from armwright.task import Task
+from armwright.trial import FinishedTrial
 
 EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 BOUNDED = Problem(Task(name="bounded", targets=((0.3, 0.0, 0.3),), reference_point=(5.0, 5.0)))

@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armwright.diagnostics import are_round, diagnose, front_share, repeated
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.task import load_task, random_task
+from armwright.trial import FinishedTrial
 
 EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 TARGET_2 = Problem(load_task("target-2"))  # symmetric about y = 0, x = 0.5 and its own z = 0.5

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.pareto import FrontTracker
 from armwright.problem import Problem
 from armwright.task import load_task
+from armwright.trial import FinishedTrial
 
 PROBLEM = Problem(load_task("target-2").model_copy(update={"constraints": ("length <= 1",), "reference_point": None}))
 DESIGNS = PROBLEM.space.sample(12, seed=0)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armwright.history import RANDOM, FinishedTrial, History
+from armwright.history import RANDOM, History
 from armwright.masses import MassPerLink, MassPerMetre
 from armwright.pareto import hypervolume
 from armwright.problem import Problem
@@ -19,6 +19,7 @@ from armwright.proposers.structures import OPENING, divided, fitted, worded
 from armwright.space import DesignSpace, paper_space
 from armwright.study import optimize
 from armwright.task import Task, load_task, random_task
+from armwright.trial import FinishedTrial
 
 
 def task(*points: tuple[float, float, float], reference_point: tuple[float, float] | None = (5.0, 5.0)) -> Task:

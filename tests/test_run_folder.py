@@ -44,7 +44,7 @@ def test_trials_are_one_json_line_each(run: Run) -> None:
     lines = [json.loads(line) for line in (folder(run) / "trials.jsonl").read_text().splitlines()]
     for line, trial in zip(lines, run.trials, strict=True):
         reason = ["reason"] if trial.source == "rules" else []
-        assert list(line) == ["number", "source", "proposal", *reason, "params", "values", "seconds"]
+        assert list(line) == ["number", "source", "proposal", "params", "values", *reason, "seconds"]
         assert line["number"] == trial.number
         assert line["params"] == dict(trial.design.params)
         assert line["values"] == list(trial.values)
@@ -170,8 +170,8 @@ def test_everything_but_config_and_trials_can_be_deleted(run: Run, tmp_path: Pat
     ("damage", "words"),
     [
         (lambda lines: [*lines[:3], b"{broken}\n", *lines[4:]], "line 4 is damaged"),
-        (lambda lines: [*lines[:3], *lines[4:]], "line 4 is damaged (number 4 where 3 is due)"),
-        (lambda lines: [*lines[:3], lines[2], *lines[3:]], "line 4 is damaged (number 2 where 3 is due)"),
+        (lambda lines: [*lines[:3], *lines[4:]], "line 4 is damaged (expected trial number 3, found 4)"),
+        (lambda lines: [*lines[:3], lines[2], *lines[3:]], "line 4 is damaged (expected trial number 3, found 2)"),
         (lambda lines: [*lines[:3], lines[3].replace(b'"values": [', b'"values": [NaN, '), *lines[4:]], "line 4"),
         (lambda lines: [*lines[:3], lines[3].replace(b'"link_1": 0.', b'"link_1": 7.'), *lines[4:]], "link_1 = 7."),
         (lambda lines: [*lines[:3], lines[3].replace(b'"params"', b'"parms"'), *lines[4:]], "params: Field required"),

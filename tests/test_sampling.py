@@ -9,7 +9,7 @@ from optuna.trial import TrialState
 
 from armwright import extras
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError
-from armwright.history import BBO, RANDOM, FinishedTrial, History
+from armwright.history import BBO, RANDOM, History
 from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.proposers.rules import RulesProposer
@@ -26,6 +26,7 @@ from armwright.seeding import derived_seed
 from armwright.space import paper_space
 from armwright.study import optimize
 from armwright.task import Task, load_task
+from armwright.trial import FinishedTrial
 from tests.extras import NEEDS_GP
 
 SPACE = paper_space()

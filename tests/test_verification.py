@@ -5,13 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.parameters import Design
 from armwright.problem import Problem
 from armwright.results import read_summary, verify_run
 from armwright.study import optimize
 from armwright.task import Task, load_task
 from armwright.tolerance import moved
+from armwright.trial import FinishedTrial
 from armwright.verification import START_SPREAD, STARTS, verify
 from tests import reference
 

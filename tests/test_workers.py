@@ -16,11 +16,13 @@ from optuna.trial import TrialState
 
 import armwright as aw
 from armwright.exceptions import EvaluatorError, MissingExtraError, RunConflictError, SettingsError, StorageError
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.judging import Judged, Judging, judged
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.run_folder import WorkersRecord, read_run
+from armwright.run_config import WorkersRecord
+from armwright.run_folder import read_run
 from armwright.study import Progress
+from armwright.trial import FinishedTrial
 from armwright.workers import board as board_module
 from armwright.workers import judging, worker
 from armwright.workers.board import Board, shown_url, sqlite_url

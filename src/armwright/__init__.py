@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from armwright.export.urdf import to_urdf
     from armwright.export.xacro import to_xacro
     from armwright.front import FrontRun, find_front
-    from armwright.history import FinishedTrial, FrontMember, History
+    from armwright.history import FrontMember, History
     from armwright.measuring import Evaluator, evaluator, load_evaluator
     from armwright.parameters import Design
     from armwright.pareto import hypervolume
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from armwright.space import DesignSpace, load_space, paper_space
     from armwright.study import Run, optimize
     from armwright.task import Task, builtin_tasks, load_task, random_task
+    from armwright.trial import FinishedTrial
     from armwright.urdf.reading import UrdfArm, read_urdf
     from armwright.workers.plan import Workers
     from armwright.workers.worker import work
@@ -64,7 +65,7 @@ _PLACES = {
     "Evaluation": "evaluation",
     "Evaluator": "measuring",
     "FailureError": "exceptions",
-    "FinishedTrial": "history",
+    "FinishedTrial": "trial",
     "FrontMember": "history",
     "FrontRun": "front",
     "History": "history",

@@ -16,8 +16,10 @@ from armwright.exceptions import RunFolderError, SettingsError
 from armwright.history import History
 from armwright.pareto import hypervolume
 from armwright.results import read_summary
-from armwright.run_folder import CONFIG, TRIALS, FrontMethod, RunConfig, read_config, read_run
+from armwright.run_config import FrontMethod, RunConfig
+from armwright.run_folder import CONFIG, read_config, read_run
 from armwright.statistics import Interval, PairedTest, can_reject, holm, interval, paired_test
+from armwright.trials_file import TRIALS
 
 LEVELS = (0.5, 0.75, 0.9, 0.95)  # of the best known hypervolume, for the time to get there
 NAMES = {"rules": "rules", "llm": "LLM", "manual": "people", "scripted": "scripted"}

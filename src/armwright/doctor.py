@@ -9,7 +9,7 @@ from armwright.exceptions import ArmwrightError, ModelError
 from armwright.extras import EXTRAS, command, is_installed, missing_packages
 from armwright.llm.configuration import configuration_path, configured_model
 from armwright.llm.speaker import CallError
-from armwright.run_folder import versions
+from armwright.run_config import versions
 
 OK, MISSING, WRONG = "ok", "--", "!!"
 

@@ -19,24 +19,17 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.history import FRONT, FinishedTrial, FrontMember, History, found_reference_point
+from armwright.history import FRONT, FrontMember, History, found_reference_point
 from armwright.kinematics.solve import MANY_ARMS
 from armwright.pareto import PENALTY
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.results import discard_results, read_summary, results_are_there, summarize_front, write_results
-from armwright.run_folder import (
-    PROPOSALS,
-    SEARCH,
-    FrontMethod,
-    RunConfig,
-    RunFolder,
-    read_run,
-    record_objectives,
-    versions,
-)
+from armwright.run_config import FrontMethod, RunConfig, record_objectives, versions
+from armwright.run_folder import PROPOSALS, SEARCH, RunFolder, read_run
 from armwright.search.front import FrontSearch
 from armwright.study import optimize, whole
+from armwright.trial import FinishedTrial
 from armwright.verification import verify_front
 
 SAVE_SECONDS = 5.0

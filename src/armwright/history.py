@@ -23,6 +23,7 @@ from armwright.pareto import (
     total_violation,
 )
 from armwright.problem import Problem
+from armwright.trial import FinishedTrial
 
 RANDOM = "random"
 BBO = "bbo"
@@ -31,49 +32,6 @@ POLISH = "polish"  # a design of the front, refined
 FRONT = "front"  # of a search for the whole front
 NOT_PROPOSED = (RANDOM, BBO, START, POLISH, FRONT)
 GROWING = ("values", "broken", "counted", "front", "proposed", "_course", "_first_of")  # what more trials add to
-
-
-@dataclass(frozen=True)
-class FinishedTrial:
-    """One evaluated design.
-
-    constraints: how far it breaks each constraint of the task, <= 0: not at all.
-    source: `random`, `start`, `bbo`, `polish`, `front`, or the name of the proposer.
-    proposal, reason, expected: the proposal's id and reason, and the objectives that were expected of it, where a
-        proposer made the design (and said so).
-    fault: why a trial that was a proposer's became a black-box one.
-    asked: the trial that a proposal was asked for, where it came for another (overlap, several proposals a call).
-    feedback: how many finished trials the proposer knew, where not all before this one.
-    refines: the trial whose design was refined for this one.
-    evaluations: designs that were evaluated to find it (a refined one: many; the same arm as an earlier one: none).
-    same_as: the earlier trial whose arm it is, and whose values it has (`canonical.py`).
-    failure: why an evaluator of one's own gave no values, so that the design has the worst.
-    seconds: wall time by part (proposing, sampling, evaluation).
-    sampler_notes: what the sampler noted on its trial and study (a genetic one: generations), needed to resume.
-    """
-
-    number: int
-    source: str
-    design: Design
-    values: tuple[float, ...]
-    proposal: str | None = None
-    reason: str = ""
-    expected: tuple[float, ...] | None = None
-    fault: str | None = None
-    asked: int | None = None
-    feedback: int | None = None
-    refines: int | None = None
-    evaluations: int = 1
-    same_as: int | None = None
-    seconds: Mapping[str, float] = field(default_factory=dict[str, float])
-    sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
-    constraints: tuple[float, ...] = ()
-    failure: str = ""
-
-    @property
-    def is_feasible(self) -> bool:
-        """Whether it meets all constraints."""
-        return all(broken <= 0.0 for broken in self.constraints)
 
 
 @dataclass(frozen=True)

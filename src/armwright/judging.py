@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from armwright.history import FinishedTrial
 from armwright.problem import Outcome, Problem
+from armwright.trial import FinishedTrial
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,10 @@ from armwright.export.urdf import to_urdf
 from armwright.files import replace_file, writable
 from armwright.history import History
 from armwright.results import read_summary
-from armwright.run_folder import TRIALS, RunConfig, read_run
+from armwright.run_config import RunConfig
+from armwright.run_folder import read_run
 from armwright.sampling import distributions, quietly
+from armwright.trials_file import TRIALS
 
 STUDY_DB = "study.db"
 ARTIFACTS = "artifacts"

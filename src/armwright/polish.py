@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.history import POLISH, FinishedTrial, FrontMember, History
+from armwright.history import POLISH, FrontMember, History
 from armwright.refining import EVALUATIONS, POLISHING, refine_members, worth_refining
 from armwright.results import discard_results, read_summary, resummarize, unmet, write_results
 from armwright.run_folder import RunFolder, read_run
 from armwright.search.refinement import POPULATION, Refined
 from armwright.seeding import derived_seed
+from armwright.trial import FinishedTrial
 from armwright.verification import verify_front
 
 MOST_EVALUATIONS = 10**9

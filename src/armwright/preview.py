@@ -12,7 +12,8 @@ from armwright.llm.recording import ReplayBackend
 from armwright.problem import Problem
 from armwright.proposers.asking import Asking, PromptedProposer
 from armwright.proposers.replay import recorded_asking
-from armwright.run_folder import RunConfig, read_run
+from armwright.run_config import RunConfig
+from armwright.run_folder import read_run
 from armwright.space import DesignSpace
 from armwright.study import optimize
 from armwright.task import Task

@@ -25,12 +25,14 @@ from armwright.diagnostics import diagnose
 from armwright.exceptions import RunFolderError
 from armwright.export.urdf import to_urdf
 from armwright.files import replace_folder
-from armwright.history import FinishedTrial, FrontMember, History
+from armwright.history import FrontMember, History
 from armwright.misses import why_missed
 from armwright.pareto import hypervolume, total_violation
 from armwright.proposers.proposer import ProposerSummary
-from armwright.run_folder import FrontMethod, RunConfig, RunFolder, read_run
+from armwright.run_config import FrontMethod, RunConfig
+from armwright.run_folder import RunFolder, read_run
 from armwright.summary_record import checked_summary
+from armwright.trial import FinishedTrial
 from armwright.verification import Verification, verify_front
 
 SUMMARY = "summary.json"

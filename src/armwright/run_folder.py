@@ -11,202 +11,37 @@ What stands in the last lines is made from the finished trials, and can be made 
 """
 
 import errno
-import json
 import os
-import platform
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
-from importlib import metadata
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Literal, Self, cast
+from typing import Any, BinaryIO, Self, cast
 
 import yaml
 from filelock import FileLock, Timeout
-from pydantic import BaseModel, Field, ValidationError, field_validator
 
-from armwright.arrays import Array
 from armwright.control import CHANNEL_FILES
 from armwright.documents import parse_document
-from armwright.evaluation import Evaluation
-from armwright.exceptions import DesignError, RunConflictError, RunFolderError
-from armwright.files import replace_file, writable
-from armwright.history import FinishedTrial, History
-from armwright.kinematics.devices import Device, usable_device
+from armwright.exceptions import RunConflictError, RunFolderError
+from armwright.files import replace_file
+from armwright.history import History
 from armwright.measuring import Evaluator
-from armwright.objectives import OBJECTIVES, PAPER_OBJECTIVES, Objective
-from armwright.problem import Problem
+from armwright.objectives import PAPER_OBJECTIVES
+from armwright.run_config import RunConfig, check_same_run, versions
 from armwright.space import DesignSpace
-from armwright.task import Task
+from armwright.trial import FinishedTrial, trial_line
+from armwright.trials_file import TRIALS, read_trials
 
 LOCK = ".lock"  # held by whoever writes; the system lets go of a dead process's, and the file stays
 LOCK_SECONDS = 2.0  # that a command waits for it: the workers of a killed experiment take a moment to end
 CONFIG = "config.yaml"
-TRIALS = "trials.jsonl"
 PROPOSALS = "proposals"
 SEARCH = "search.npz"
 BEFORE_TRIALS = {
     LOCK, CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
 }  # fmt: skip
-# Of a task; its words may change.
-IDENTITY = (
-    "name", "targets", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step",
-    "move_time", "workspace", "constraints", "reference_point",
-)  # fmt: skip
-PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
-
-
-class Method(BaseModel, frozen=True, extra="forbid"):
-    """How a study searches.
-
-    proposer: its name and settings; None for black-box trials only.
-    in_flight: how many questions go on while black-box trials run; None: the study waits for each.
-    polish_every: after so many counted trials the next free one refines a design of the front; None: never.
-    start: designs that the first of the n_init trials are, in place of random ones.
-    """
-
-    proposer: dict[str, Any] | None
-    sampler: str
-    n_init: int = Field(ge=1)
-    n_step: int = Field(ge=1)
-    n_total: int = Field(ge=1)
-    in_flight: int | None = Field(default=None, ge=1)
-    polish_every: int | None = Field(default=None, ge=1)
-    start: tuple[dict[str, float | str], ...] = ()
-
-    @field_validator("proposer")
-    @classmethod
-    def _check_proposer(cls, settings: dict[str, Any] | None) -> dict[str, Any] | None:
-        """That what is asked again can be asked as before."""
-        kinds = {"name": str} | ({"prompt": str} if settings and "prompt" in settings else {})
-        if "prompt" in kinds:
-            kinds |= {"memory": str, "answer": str, "proposals": int}
-        kinds |= {"template": str} if settings and "template" in settings else {}
-        for key, kind in kinds.items():
-            if settings is not None and not isinstance(settings.get(key), kind):
-                raise ValueError(f"{key} = {settings.get(key)!r} is no {kind.__name__}")
-        return settings
-
-    @property
-    def n_trials(self) -> int:
-        """Of the whole study, the random ones included."""
-        return self.n_init + self.n_total
-
-
-class FrontMethod(BaseModel, frozen=True, extra="forbid"):
-    """How a search for the whole front searches (front.py): there is nothing to choose but what it begins with."""
-
-    search: Literal["front"] = "front"
-    begin_with: dict[str, Any] | None = None
-
-    @property
-    def n_init(self) -> int:
-        """Its trials are the front alone."""
-        return 0
-
-
-class WorkersRecord(BaseModel, frozen=True, extra="forbid"):
-    """Where the designs of a study wait for workers (`armwright worker`).
-
-    storage: the URL of the database that search and workers share, without its password.
-    study: the name of Optuna's study there.
-    at_a_time: designs under way at most.
-    heartbeat: [s] between two signs of life of a worker; it counts as dead after some without.
-    """
-
-    storage: str
-    study: str
-    at_a_time: int = Field(ge=1, le=10_000)
-    heartbeat: int = Field(default=10, ge=1, le=3600)
-
-
-class ObjectiveRecord(BaseModel, frozen=True, extra="forbid"):
-    """An objective as a run's settings tell of it; its formula is code."""
-
-    name: str
-    label: str
-    unit: str
-    symbol: str
-
-
-def record_objectives(objectives: Sequence[Objective]) -> tuple[ObjectiveRecord, ...]:
-    """What a run's settings tell of its objectives."""
-    return tuple(ObjectiveRecord(name=o.name, label=o.label, unit=o.unit, symbol=o.symbol) for o in objectives)
-
-
-class RunConfig(BaseModel, frozen=True, extra="forbid"):
-    """Everything needed to repeat a run.
-
-    tolerance, device: `Problem`'s.
-    objectives: what is minimised, in the order of the trials' values.
-    reference_point: as the task states it, or as frozen after the first n_init trials (None until then).
-    """
-
-    task: Task
-    space: DesignSpace
-    tolerance: float = Field(default=0.0, ge=0.0)
-    device: Device = "cpu"
-    objectives: tuple[ObjectiveRecord, ...] = record_objectives(PAPER_OBJECTIVES)
-    reference_point: tuple[float, ...] | None
-    method: Method | FrontMethod
-    seed: int
-    evaluator: str | None = None  # of one's own that measured designs in place of ours, by name; never loaded from here
-    workers: WorkersRecord | None = None
-    versions: dict[str, str]
-    earlier_versions: list[dict[str, str]] = []  # of sessions that made earlier trials, where they were others
-
-    @property
-    def problem(self) -> Problem:
-        """The problem of the run; on the CPU, where its GPU is not here.
-
-        Objectives of one's own have their names and values here; to compute them again needs the problem itself.
-        """
-        return self.problem_with(None)
-
-    def problem_with(self, evaluator: Evaluator | None) -> Problem:
-        """The problem of the run with the evaluator that measures its designs."""
-        own = {} if evaluator is None else {objective.name: objective for objective in evaluator.objectives}
-        objectives = tuple(own.get(record.name) or _recorded(record) for record in self.objectives)
-        return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives, evaluator)
-
-    @property
-    def study(self) -> Method:
-        """How its study searches; RunFolderError where it is a search for the whole front."""
-        if isinstance(self.method, FrontMethod):
-            raise RunFolderError(
-                "this run is a search for the whole front, not a study: its front needs no polish, and "
-                "`armwright front` with a larger --budget goes on with it"
-            )
-        return self.method
-
-
-def _recorded(record: ObjectiveRecord) -> Objective:
-    """The objective of a record: ours by its name; of one that is none of ours, only what was written down."""
-    known = OBJECTIVES.get(record.name)
-    if known is not None and record_objectives((known,)) == (record,):
-        return known
-
-    def each(evaluation: Evaluation) -> Array:
-        raise RunFolderError(
-            f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
-        )
-
-    words = record.label.lower()
-    return Objective(record.name, record.label, record.unit, record.symbol, words=words, each=each, over="arm")
-
-
-def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
-    """The versions that the numbers of a run depend on; of an evaluator's file, a part of its sha256."""
-    found = {"python": platform.python_version()}
-    if evaluator is not None and evaluator.version:
-        found["evaluator"] = evaluator.version
-    for package in PACKAGES:
-        with suppress(metadata.PackageNotFoundError):  # an extra
-            found[package] = metadata.version(package)
-    return found
 
 
 class RunFolder:
@@ -314,7 +149,7 @@ class RunFolder:
     ) -> list[FinishedTrial]:
         """The finished trials; a last line that a crash cut short is dropped. Opens the file for `append`."""
         path = self.path / TRIALS
-        trials, intact = _read_trials(path, space, n_objectives, n_constraints)
+        trials, intact = read_trials(path, space, n_objectives, n_constraints)
         try:
             self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
             if intact < self._trials.tell():  # else the file keeps its time
@@ -327,7 +162,7 @@ class RunFolder:
         """Writes one finished trial: a single write, so that a crash leaves a whole line or a cut last one."""
         assert self._trials is not None, "open_trials comes first"
         self._check_here()
-        line = _trial_line(trial)
+        line = trial_line(trial)
         try:
             if os.fstat(self._trials.fileno()).st_nlink == 0:
                 raise OSError(errno.ENOENT, "the file was deleted while the run went on")
@@ -353,7 +188,7 @@ class RunFolder:
 
     def replace_trials(self, trials: Iterable[FinishedTrial]) -> None:
         """Writes all trials anew."""
-        self.write_bytes(TRIALS, b"".join(map(_trial_line, trials)))
+        self.write_bytes(TRIALS, b"".join(map(trial_line, trials)))
 
     def write_text(self, name: str, text: str) -> None:
         """Replaces a file in one step, so that a crash leaves the old or the new one."""
@@ -428,242 +263,8 @@ def read_run(path: str | Path) -> tuple[RunConfig, History]:
     """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
     path = Path(path)
     config = read_config(path)
-    trials, _ = _read_trials(path / TRIALS, config.space, len(config.objectives), len(config.task.constraints))
+    trials, _ = read_trials(path / TRIALS, config.space, len(config.objectives), len(config.task.constraints))
     return config, History(config.problem, trials, config.method.n_init, config.reference_point)
-
-
-class _BegunRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, strict=True):
-    """A trial that is to be evaluated."""
-
-    number: int
-    source: str
-    proposal: str | None
-    reason: str = ""
-    expected: list[float] | None = None
-    fault: str | None = None
-    asked: int | None = None
-    feedback: int | None = None
-    refines: int | None = None
-    evaluations: int = Field(default=1, ge=0)
-    same_as: int | None = None
-    params: dict[str, float | str]
-
-
-class _TrialRecord(_BegunRecord, frozen=True):
-    """One line of trials.jsonl."""
-
-    values: list[float] = Field(min_length=1)
-    constraints: list[float] = []
-    failure: str = ""
-    seconds: dict[str, float]
-    sampler_notes: dict[str, dict[str, Any]] = {}
-
-
-def begun_record(trial: FinishedTrial) -> dict[str, Any]:
-    """A trial that has no values yet, for `read_begun` in another process."""
-    return _BegunRecord(**_begun_fields(trial)).model_dump(exclude_defaults=True)
-
-
-def read_begun(record: Any, space: DesignSpace) -> FinishedTrial:
-    """The trial of a record; RunFolderError where it is none of this space."""
-    try:
-        return _begun_trial(_BegunRecord.model_validate(record), space)
-    except (ValueError, DesignError) as fault:
-        raise RunFolderError(f"a trial that was posted for workers is damaged: {_words(fault)}") from fault
-
-
-def _begun_fields(trial: FinishedTrial) -> dict[str, Any]:
-    return {
-        "number": trial.number,
-        "source": trial.source,
-        "proposal": trial.proposal,
-        "reason": writable(trial.reason),
-        "expected": None if trial.expected is None else list(trial.expected),
-        "fault": trial.fault,
-        "asked": trial.asked,
-        "feedback": trial.feedback,
-        "refines": trial.refines,
-        "evaluations": trial.evaluations,
-        "same_as": trial.same_as,
-        "params": dict(trial.design.params),
-    }
-
-
-def _trial_line(trial: FinishedTrial) -> bytes:
-    record = _TrialRecord(
-        **_begun_fields(trial),
-        values=list(trial.values),
-        constraints=list(trial.constraints),
-        failure=writable(trial.failure),
-        seconds=dict(trial.seconds),
-        sampler_notes={place: dict(noted) for place, noted in trial.sampler_notes.items()},
-    )
-    return json.dumps(record.model_dump(exclude_defaults=True)).encode() + b"\n"
-
-
-def _read_trials(
-    path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
-) -> tuple[list[FinishedTrial], int]:
-    """The trials of a file, and its length [bytes] without a cut last line."""
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        return [], 0
-    except OSError as fault:
-        raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    return _parse_trials(content, 0, path, space, n_objectives, n_constraints)
-
-
-def _parse_trials(
-    content: bytes, first: int, path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
-) -> tuple[list[FinishedTrial], int]:
-    """The trials from number `first` on in a part of a file, and its length [bytes] without a cut last line."""
-    end = content.rfind(b"\n") + 1
-    trials: list[FinishedTrial] = []
-    for number, line in enumerate(content[:end].split(b"\n")[:-1], start=first):
-        try:
-            trials.append(_parse_trial(line, number, space, n_objectives, n_constraints))
-        except (ValueError, DesignError) as fault:
-            raise RunFolderError(
-                f"{path}, line {number + 1} is damaged ({_words(fault)}); restore the file, or delete this line and "
-                "all after it: the same command then goes on from there"
-            ) from fault
-    return trials, end
-
-
-class TrialsReader:
-    """Reads the finished trials of a run that may go on elsewhere; a line that was read is not read again."""
-
-    def __init__(self, folder: Path, config: RunConfig) -> None:
-        self._path = folder / TRIALS
-        self._config = config
-        self.trials: list[FinishedTrial] = []
-        self._at = 0  # [bytes] read
-        self._file = 0  # which file it was
-
-    def read_on(self) -> bool:
-        """Reads what has come; whether it is another file than before (the run was polished), read from its start."""
-        try:
-            with self._path.open("rb") as file:
-                there = os.fstat(file.fileno())
-                is_other = there.st_ino != self._file or there.st_size < self._at
-                file.seek(0 if is_other else self._at)
-                content = file.read()
-        except FileNotFoundError:
-            there, is_other, content = None, bool(self.trials), b""
-        except OSError as fault:
-            raise RunFolderError(f"cannot read {self._path}: {fault.strerror or fault}") from fault
-        if is_other:
-            self.trials, self._at = [], 0
-            self._file = 0 if there is None else there.st_ino
-        try:
-            new, length = self._parsed(content)
-        except RunFolderError:
-            if self._at == 0:
-                raise
-            self.trials, self._at = [], 0  # written anew in place, perhaps, and longer than what was read
-            is_other = True
-            new, length = self._parsed(self._path.read_bytes())
-        self.trials = [*self.trials, *new]
-        self._at += length
-        return is_other
-
-    def _parsed(self, content: bytes) -> tuple[list[FinishedTrial], int]:
-        config = self._config
-        n_objectives, n_constraints = len(config.objectives), len(config.task.constraints)
-        return _parse_trials(content, len(self.trials), self._path, config.space, n_objectives, n_constraints)
-
-
-def _parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int, n_constraints: int) -> FinishedTrial:
-    record = _TrialRecord.model_validate_json(line)
-    if len(record.values) != n_objectives:
-        raise ValueError(f"{len(record.values)} values where {n_objectives} are due")
-    if len(record.constraints) != n_constraints:
-        raise ValueError(f"{len(record.constraints)} constraints where {n_constraints} are due")
-    if record.number != number:
-        raise ValueError(f"number {record.number} where {number} is due")
-    return replace(
-        _begun_trial(record, space),
-        values=tuple(record.values),
-        constraints=tuple(record.constraints),
-        failure=record.failure,
-        seconds=record.seconds,
-        sampler_notes=record.sampler_notes,
-    )
-
-
-def _begun_trial(record: _BegunRecord, space: DesignSpace) -> FinishedTrial:
-    return FinishedTrial(
-        number=record.number,
-        source=record.source,
-        design=space.design(record.params),
-        values=(),
-        proposal=record.proposal,
-        reason=record.reason,
-        expected=None if record.expected is None else tuple(record.expected),
-        fault=record.fault,
-        asked=record.asked,
-        feedback=record.feedback,
-        refines=record.refines,
-        evaluations=record.evaluations,
-        same_as=record.same_as,
-    )
-
-
-def _words(fault: Exception) -> str:
-    if not isinstance(fault, ValidationError):
-        return str(fault)
-    first = fault.errors(include_url=False, include_context=False, include_input=False)[0]
-    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
-
-
-def check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
-    """RunConflictError where `asked` is another run than the one that lies there; a larger n_total is the same."""
-    old, new = _identity(there), _identity(asked)
-    differences = [
-        f"{key}: {_brief(old.get(key))} there, {_brief(new.get(key))} asked"
-        for key in {**old, **new}
-        if old.get(key) != new.get(key)
-    ]
-    n_there, n_asked = (getattr(config.method, "n_total", 0) for config in (there, asked))
-    if n_asked < n_there:
-        differences.append(f"n_total: {n_there} there, {n_asked} asked (it can only grow)")
-    if differences:
-        raise RunConflictError(
-            f"{path} holds a run with other settings ({'; '.join(differences)}). "
-            "Give another --out DIR, or the same settings"
-        )
-
-
-def _brief(value: Any) -> str:
-    """A setting on one line; a prompt of the user's own is a whole page."""
-    text = " ".join(str(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."
-
-
-def _identity(config: RunConfig) -> dict[str, Any]:
-    """What makes a run this run and no other, flat."""
-    content = config.model_dump(mode="json")
-    content["task"] = {key: content["task"][key] for key in IDENTITY}
-    content["objectives"] = [objective["name"] for objective in content["objectives"]]
-    content["workers"] = None if content["workers"] is None else "evaluate"  # how many, and where, may change
-    method = content.pop("method")
-    method.pop("n_total", None)
-    if method.get("begin_with"):
-        method["begin_with"].pop("run", None)  # a path has many spellings; what lay there is known by its sha256
-    for key in ("versions", "earlier_versions", "reference_point"):
-        del content[key]
-    return _flat({**content, **method})
-
-
-def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in content.items():
-        if isinstance(value, dict):
-            flat.update(_flat(cast("dict[str, Any]", value), f"{prefix}{key}."))
-        else:
-            flat[prefix + key] = value
-    return flat
 
 
 def _write_error(path: Path, fault: OSError) -> RunFolderError:

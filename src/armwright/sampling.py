@@ -23,10 +23,11 @@ from optuna.trial import Trial, create_trial
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.extras import check_extra
-from armwright.history import RANDOM, FinishedTrial
+from armwright.history import RANDOM
 from armwright.parameters import Design, FloatParameter, Parameter, ParameterValue
 from armwright.seeding import derived_seed
 from armwright.space import DesignSpace
+from armwright.trial import FinishedTrial
 
 SamplerFactory = Callable[[int], BaseSampler]
 

@@ -17,7 +17,7 @@ from armwright.arrays import Array
 from armwright.canonical import SameArms
 from armwright.control import Channel
 from armwright.exceptions import ArmwrightError, ModelError, SettingsError, StoppedError
-from armwright.history import BBO, POLISH, RANDOM, START, FinishedTrial, FrontMember, History
+from armwright.history import BBO, POLISH, RANDOM, START, FrontMember, History
 from armwright.judging import Here, Judged, Judging
 from armwright.parameters import Design
 from armwright.pareto import FrontTracker
@@ -26,8 +26,10 @@ from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.refining import Refinement, refine_one
 from armwright.results import discard_results, read_summary, results_are_there, summarize, write_results
-from armwright.run_folder import Method, RunConfig, RunFolder, WorkersRecord, record_objectives, versions
+from armwright.run_config import Method, RunConfig, WorkersRecord, record_objectives, versions
+from armwright.run_folder import RunFolder
 from armwright.sampling import BlackBox, SamplerFactory, sampler_name
+from armwright.trial import FinishedTrial
 from armwright.turns import Asker, Nobody, Recorded, Schedule, Turn, Turns, asking_turns, past_turns
 from armwright.verification import verify_front
 from armwright.workers.plan import Workers

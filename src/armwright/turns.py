@@ -14,9 +14,10 @@ from itertools import count, groupby
 from typing import Protocol
 
 from armwright.exceptions import DesignError, ProposalError
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.proposers.proposer import Proposal, Proposer, Record
 from armwright.seeding import derived_seed
+from armwright.trial import FinishedTrial
 
 PROPOSING = 2  # the place of the proposals' seeds under the run's seed
 LOOK_EVERY = 0.2  # [s] between two looks for Ctrl-C, where a wait cannot be interrupted

@@ -16,7 +16,8 @@ from armwright.front import find_front
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.report.page import write_report
-from armwright.run_folder import read_config, versions
+from armwright.run_config import versions
+from armwright.run_folder import read_config
 from armwright.study import Run, optimize
 from armwright.task import load_task
 from tests.chat_server import ChatServer

@@ -16,10 +16,11 @@ from optuna.trial import FrozenTrial, TrialState
 
 from armwright.any_study.parameters import Space, observed_space
 from armwright.exceptions import DesignError, RunFolderError, SettingsError
-from armwright.history import BBO, FinishedTrial, History
+from armwright.history import BBO, History
 from armwright.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.sampling import distributions
+from armwright.trial import FinishedTrial
 
 N_REFERENCE = 10  # the first complete trials, which bound the hypervolume of a task that does not
 

@@ -22,7 +22,8 @@ from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem import Problem
 from armwright.proposers.choice import choose_proposer
 from armwright.results import read_summary
-from armwright.run_folder import check_same_run, read_config
+from armwright.run_config import check_same_run
+from armwright.run_folder import read_config
 from armwright.sampling import sampler_factory
 from armwright.space import load_space, paper_space
 from armwright.study import optimize, study_config, study_method

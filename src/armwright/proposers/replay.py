@@ -10,13 +10,16 @@ from typing import Any
 
 from armwright.control import Hint
 from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError
-from armwright.history import FinishedTrial, History
+from armwright.history import History
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import ReplayBackend
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of
 from armwright.proposers.asking import LAST_STEPS, Asking, PromptedProposer
 from armwright.proposers.proposer import Proposal, ProposerSummary, Record, RecordedTurn
-from armwright.run_folder import CONFIG, TRIALS, RunConfig, read_config, read_run
+from armwright.run_config import RunConfig
+from armwright.run_folder import CONFIG, read_config, read_run
+from armwright.trial import FinishedTrial
+from armwright.trials_file import TRIALS
 
 
 class ReplayProposer(PromptedProposer):

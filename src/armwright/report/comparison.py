@@ -23,7 +23,7 @@ from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.figures import axis_label, draw_samples
 from armwright.report.style import FRONT, MISSED, TARGET, line, look
 from armwright.results import FIGURES
-from armwright.run_folder import RunConfig
+from armwright.run_config import RunConfig
 
 MOST_SHOWN = 12  # most tasks in the figure of targets
 COLUMNS = 3  # panels side by side

@@ -29,8 +29,10 @@ from armwright.pareto import hypervolume
 from armwright.report.repeat import repeat_command
 from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.results import read_summary
-from armwright.run_folder import FrontMethod, Method, RunConfig, TrialsReader, read_config
+from armwright.run_config import FrontMethod, Method, RunConfig
+from armwright.run_folder import read_config
 from armwright.targets import TargetArrays
+from armwright.trials_file import TrialsReader
 
 KINDS = ("revolute", "prismatic", "fixed")
 NO_JOINT = Joint("fixed", "z")  # padding of shorter arms

@@ -28,7 +28,8 @@ from armwright.report.style import (
     look,
 )
 from armwright.results import FIGURES, read_summary
-from armwright.run_folder import FrontMethod, ObjectiveRecord, read_run
+from armwright.run_config import FrontMethod, ObjectiveRecord
+from armwright.run_folder import read_run
 from armwright.space import DesignSpace
 
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 and 200 of 200, as in the paper

@@ -17,7 +17,8 @@ from armwright.exceptions import ArmwrightError
 from armwright.llm.transcript import TRANSCRIPTS, used_hints
 from armwright.report.content import RunContent, design_files
 from armwright.results import SUMMARY
-from armwright.run_folder import CONFIG, TRIALS, is_held, read_config
+from armwright.run_folder import CONFIG, is_held, read_config
+from armwright.trials_file import TRIALS
 
 WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
 RECENT = 20  # trials whose mean duration predicts the remaining time

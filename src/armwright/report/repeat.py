@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from armwright.objectives import OBJECTIVES
-from armwright.run_folder import FrontMethod, Method, RunConfig
+from armwright.run_config import FrontMethod, Method, RunConfig
 from armwright.space import builtin_spaces, load_space
 from armwright.task import builtin_names, load_task
 from armwright.tolerance import TOLERANCE

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from sqlalchemy import URL, Engine
 
 # Attributes of a posted trial.
-BEGUN = "armwright"  # the trial as it was begun (`run_folder.begun_record`)
+BEGUN = "armwright"  # the trial as it was begun (`trials_file.begun_record`)
 NUMBER = "number"  # the search's own, which stays where it is posted again
 ERROR = "error"  # why its evaluator failed
 GIVEN_BACK = "given_back"  # its worker was stopped, and nothing is wrong with the trial

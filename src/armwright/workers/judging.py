@@ -10,11 +10,12 @@ from optuna.study import StudyDirection
 from optuna.trial import TrialState
 
 from armwright.exceptions import EvaluatorError, StorageError
-from armwright.history import FinishedTrial
 from armwright.judging import Judged, Judging
 from armwright.problem import Problem
-from armwright.run_folder import WorkersRecord, begun_record, read_begun
+from armwright.run_config import WorkersRecord
 from armwright.sampling import distributions
+from armwright.trial import FinishedTrial
+from armwright.trials_file import begun_record, read_begun
 from armwright.workers.board import SIGNS_MISSED, Board, Posted
 
 MOST_DEATHS = 3  # of workers over one trial in a session

@@ -11,7 +11,8 @@ from armwright.exceptions import SettingsError
 from armwright.judging import Judging
 from armwright.measuring import Evaluator
 from armwright.problem import Problem
-from armwright.run_folder import CONFIG, WorkersRecord, read_config
+from armwright.run_config import WorkersRecord
+from armwright.run_folder import CONFIG, read_config
 
 STORAGE_VARIABLE = "ARMWRIGHT_STORAGE"
 FILE = "workers.db"

@@ -8,7 +8,8 @@ from armwright.exceptions import ArmwrightError, SettingsError
 from armwright.judging import judged
 from armwright.measuring import Evaluator
 from armwright.problem import Problem
-from armwright.run_folder import read_begun, read_config
+from armwright.run_folder import read_config
+from armwright.trials_file import read_begun
 from armwright.workers.board import Board, Posted, shown_url
 
 LOOK_EVERY = 0.1  # [s] between two looks for a trial, where none waits
