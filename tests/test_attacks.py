@@ -275,8 +275,8 @@ def test_names_in_a_run_folder_are_no_markup(tmp_path: Path, browser: Browser) -
         trial |= {"source": LINK, "reason": LINK, "proposal": LINK, "fault": LINK}
     (folder / "trials.jsonl").write_text("".join(f"{json.dumps(trial)}\n" for trial in trials))
     arm = {"joints": 6, "reach": 0.5, "mass": 1.0, "base": [0, 0, 0], "values": trials[-1]["values"], "measures": {},
-           "dominates": 1, "dominated_by": 0, "breaks": [], "notes": [LINK]}  # fmt: skip
-    (folder / "bought.json").write_text(json.dumps([{"name": LINK, **arm}]))
+           "dominates": 1, "dominated_by": 0, "violated": [], "notes": [LINK]}  # fmt: skip
+    (folder / "existing_arms.json").write_text(json.dumps([{"name": LINK, **arm}]))
     shutil.rmtree(folder / "designs")
     tab = Tab(browser, offline=True)
     page = write_report(folder)

@@ -13,7 +13,14 @@ import pytest
 from playwright.sync_api import Browser
 
 import armwright as aw
-from armwright.buying import BOUGHT, ArmComparison, ComparedArm, compare_arms, read_bought, standing
+from armwright.buying import (
+    EXISTING_ARMS,
+    ArmComparison,
+    ComparedArm,
+    compare_arms,
+    dominance_counts,
+    read_existing_arms,
+)
 from armwright.exceptions import ArmError, FailureError, MissingExtraError, RunFolderError, SettingsError, TaskError
 from armwright.history import History
 from armwright.kinematics.arm_arrays import stack_arms
@@ -133,14 +140,14 @@ def test_standing_beside_the_front(history: History) -> None:
     ]:
         better = sum(all(p <= v) and any(p < v) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
         worse = sum(all(v <= p) and any(v < p) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
-        assert standing(point.tolist(), (), history) == (better, worse)
-    assert standing((values.min(axis=0) - 1e-9).tolist(), (), history) == (len(values), 0)
-    assert standing((1.0, None), (), history) is None
+        assert dominance_counts(point.tolist(), (), history) == (better, worse)
+    assert dominance_counts((values.min(axis=0) - 1e-9).tolist(), (), history) == (len(values), 0)
+    assert dominance_counts((1.0, None), (), history) is None
 
 
 def test_the_run_keeps_the_arms_for_its_figures_and_its_page(run: Path, compared: ArmComparison, tab: Tab) -> None:
     comparison = compare_arms(TASK, [UR5, PANDA], run)
-    kept = read_bought(run, 2)
+    kept = read_existing_arms(run, 2)
     assert kept == comparison.arms == compared.arms
     assert {"front.png"} <= {path.name for path in write_figures(run)}
     history = read_run(run)[1]
@@ -172,16 +179,16 @@ def test_a_name_that_is_no_text_of_a_page(run: Path, tmp_path: Path, tab: Tab) -
     tab.open(write_report(run))
     assert tab.ask("window.hacked") is None
     assert tab.faults == []
-    (run / BOUGHT).unlink()
+    (run / EXISTING_ARMS).unlink()
 
 
 def test_without_arms_nothing_is_drawn(run: Path, history: History) -> None:
-    (run / BOUGHT).unlink(missing_ok=True)
-    assert read_bought(run, 2) == ()
-    (run / BOUGHT).write_text('[{"name": "x"}]')
-    with pytest.raises(RunFolderError, match=r"bought.json is damaged; remove it"):
+    (run / EXISTING_ARMS).unlink(missing_ok=True)
+    assert read_existing_arms(run, 2) == ()
+    (run / EXISTING_ARMS).write_text('[{"name": "x"}]')
+    with pytest.raises(RunFolderError, match=r"existing_arms.json is damaged; remove it"):
         write_figures(run)
-    (run / BOUGHT).unlink()
+    (run / EXISTING_ARMS).unlink()
     (axes,) = draw_front(history).axes
     assert "existing arm" not in [text.get_text() for text in axes.get_legend().get_texts()]
 
@@ -210,9 +217,9 @@ def test_constraints_hold_for_arms_too(tmp_path: Path) -> None:
     task = TASK.model_copy(update={"constraints": ("mass <= 19", "self_clearance >= 0.01")})
     aw.optimize(aw.Problem(task, SPACE), proposer="none", n_init=10, n_total=10, out=tmp_path / "run")
     ur5, panda = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
-    assert ur5.breaks == ("mass <= 19 (it has 21)",)
+    assert ur5.violated == ("mass <= 19 (it has 21)",)
     assert (ur5.dominates, ur5.dominated_by) == (None, None)
-    assert panda.breaks == ()
+    assert panda.violated == ()
     assert panda.dominates is not None
     assert "whether it keeps self_clearance >= 0.01 is not known" in panda.notes
 
@@ -295,7 +302,7 @@ def test_the_command(run: Path, in_folder: Path) -> None:
     )
     assert told["arms"][0]["base"] == [0.0, 0.1, 0.0]
     assert told["designs"][0]["values"] == list(read_run(run)[1].front[0].values)
-    (run / BOUGHT).unlink()
+    (run / EXISTING_ARMS).unlink()
     for args, words in (
         (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": three numbers with commas'),
         (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),

@@ -44,7 +44,7 @@ from armwright.task import Task, load_task
 from armwright.urdf.names import find_urdf
 from armwright.urdf.reading import UrdfArm, read_urdf
 
-BOUGHT = "bought.json"  # of a run folder: the arms that were compared with it last
+EXISTING_ARMS = "existing_arms.json"  # of a run folder: the arms that were compared with it last
 POSITIONS = 300  # of the base, at random
 REFINED = 4  # of these, the best ones,
 REFINEMENT = 300  # by so many evaluations each
@@ -65,8 +65,8 @@ class ComparedArm:
     base: where its base link stands; of a design, its first joint [m].
     values: of the problem's objectives; None where one cannot be known, such as a price.
     measures: the same by the names of `MEASURES`.
-    dominates, dominated_by: how many designs of the run's front, as of `standing`; None without a run, too.
-    breaks: the task's constraints that it does not keep; it then stands nowhere beside designs that do.
+    dominates, dominated_by: how many designs of the run's front, as of `dominance_counts`; None without a run, too.
+    violated: the task's constraints that it does not keep; it then stands nowhere beside designs that do.
     notes: what was chosen, changed or missing.
     """
 
@@ -79,7 +79,7 @@ class ComparedArm:
     measures: Mapping[str, float | None]
     dominates: int | None = None
     dominated_by: int | None = None
-    breaks: tuple[str, ...] = ()
+    violated: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -164,8 +164,8 @@ def compare_arms(
     return result
 
 
-class _BoughtRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """One arm of bought.json."""
+class _ArmRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """One arm of existing_arms.json."""
 
     name: str
     joints: int
@@ -176,16 +176,16 @@ class _BoughtRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     measures: dict[str, float | None]
     dominates: int | None
     dominated_by: int | None
-    breaks: tuple[str, ...]
+    violated: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-_RECORDS = TypeAdapter(tuple[_BoughtRecord, ...])
+_RECORDS = TypeAdapter(tuple[_ArmRecord, ...])
 
 
-def read_bought(folder: Path, n_objectives: int) -> tuple[ComparedArm, ...]:
+def read_existing_arms(folder: Path, n_objectives: int) -> tuple[ComparedArm, ...]:
     """The arms that were last compared with a run of so many objectives; none where none were."""
-    path = folder / BOUGHT
+    path = folder / EXISTING_ARMS
     try:
         records = _RECORDS.validate_json(path.read_bytes())
         if any(len(record.values) != n_objectives for record in records):
@@ -201,7 +201,7 @@ def read_bought(folder: Path, n_objectives: int) -> tuple[ComparedArm, ...]:
 
 def _write(run: Path, result: ArmComparison) -> None:
     with RunFolder(run) as folder:
-        folder.write_text(BOUGHT, json.dumps([asdict(arm) for arm in result.arms], indent=2) + "\n")
+        folder.write_text(EXISTING_ARMS, json.dumps([asdict(arm) for arm in result.arms], indent=2) + "\n")
 
 
 def _names(arms: Sequence[str | Path | UrdfArm], read: Sequence[UrdfArm]) -> list[str]:
@@ -262,7 +262,7 @@ def _compared(
     evaluation = problem.physics_of_arms(stack_arms([arm]))
     values = tuple(_known(objective, evaluation) for objective in problem.objectives)
     bounds = [(constraint, _known(constraint.quantity, evaluation)) for constraint in problem.constraints]
-    breaks = tuple(
+    violated = tuple(
         f"{constraint.words} (it has {value:.3g})"
         for constraint, value in bounds
         if value is not None and float(constraint(evaluation)[0]) > 0.0
@@ -270,7 +270,7 @@ def _compared(
     unknown = [o.name for o, value in zip(problem.objectives, values, strict=True) if value is None]
     said = [*notes, *(f"its {name} is not known, so it cannot be placed among the designs" for name in unknown)]
     said += [f"whether it keeps {constraint.words} is not known" for constraint, value in bounds if value is None]
-    stands = None if history is None else standing(values, breaks, history)
+    stands = None if history is None else dominance_counts(values, violated, history)
     return ComparedArm(
         name=name,
         joints=int((evaluation.arms.motion < FIXED).sum()),
@@ -281,7 +281,7 @@ def _compared(
         measures={objective.name: _known(objective, evaluation) for objective in MEASURES},
         dominates=None if stands is None else stands[0],
         dominated_by=None if stands is None else stands[1],
-        breaks=breaks,
+        violated=violated,
         notes=tuple(said),
     )
 
@@ -313,16 +313,18 @@ def _of_front(history: History) -> list[ComparedArm]:
 def _of_design(history: History, member: FrontMember) -> ComparedArm:
     name = f"#{member.number} {member.design.joints}"
     compared = _compared(history.problem, None, name, member.arm, member.arm.base)
-    return replace(compared, values=member.values, breaks=(), notes=())
+    return replace(compared, values=member.values, violated=(), notes=())
 
 
-def standing(values: Sequence[float | None], breaks: Sequence[str], history: History) -> tuple[int, int] | None:
-    """How many designs of the front an arm of these values dominates, and by how many it is.
+def dominance_counts(
+    values: Sequence[float | None], violated: Sequence[str], history: History
+) -> tuple[int, int] | None:
+    """Return how many designs of the front an arm dominates, and how many dominate it.
 
-    One arm dominates another that is worse in one objective and better in none. None where a value is not known, and
-    for an arm that breaks a constraint.
+    One arm dominates another that is worse in one objective and better in none. None if a value is unknown or the arm
+    violates a constraint.
     """
-    if None in values or breaks or not history.front:
+    if None in values or violated or not history.front:
         return None
     own, front = np.array(values, dtype=np.float64), np.array([member.values for member in history.front])
     dominates = np.all(own <= front, axis=1) & np.any(own < front, axis=1)

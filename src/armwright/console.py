@@ -374,9 +374,11 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
         )
     names = ", ".join(objective.name for objective in objectives)
     for arm in comparison.arms:
-        broken = f"; breaks {', '.join(arm.breaks)}" if arm.breaks else ""
+        broken = f"; violates {', '.join(arm.violated)}" if arm.violated else ""
         stands = (
-            broken if comparison.run is None or arm.breaks else f"; {_standing_words(arm, comparison.front)} ({names})"
+            broken
+            if comparison.run is None or arm.violated
+            else f"; {_standing_words(arm, comparison.front)} ({names})"
         )
         console.print(f"{arm.name}: base at {_point(tuple(round(value, 4) for value in arm.base))} m{stands}")
         for note in arm.notes:

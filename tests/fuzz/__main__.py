@@ -33,7 +33,7 @@ INPUTS = {
     "words": 200_000, "points": 200_000, "start": 200_000, "answer": 120_000, "urdf": 120_000, "request": 50_000,
     "trials": 30_000, "actuators": 30_000, "space": 20_000, "task": 20_000, "experiment": 10_000, "replay": 10_000,
     "arguments": 6_000, "draft": 1_500, "run config.yaml": 1_000, "run trials.jsonl": 1_000,
-    "run transcripts.jsonl": 1_000, "run summary.json": 1_000, "run bought.json": 500, "run control.json": 500,
+    "run transcripts.jsonl": 1_000, "run summary.json": 1_000, "run existing_arms.json": 500, "run control.json": 500,
     "run status.json": 500,
 }  # fmt: skip
 

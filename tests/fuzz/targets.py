@@ -413,14 +413,14 @@ def a_run() -> Path:
         proposer = aw.LlmProposer("test-model", server.url, memory="own", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
-    (there / "bought.json").write_text(
+    (there / "existing_arms.json").write_text(
         json.dumps(
             [
                 {
                     "name": "ur3", "joints": 6, "reach": 0.5, "mass": 11.0, "base": [0.0, 0.0, 0.0],
                     "values": [1.0, 2.0],
                     "measures": {"torque": 2.0, "torque_utilisation": None}, "dominates": 1, "dominated_by": 0,
-                    "breaks": [], "notes": ["the tip is here"],
+                    "violated": [], "notes": ["the tip is here"],
                 }
             ]
         )
@@ -811,8 +811,8 @@ TARGETS: dict[str, Target] = {
     "trials": Target("jsonl", lambda: [(a_run() / "trials.jsonl").read_bytes()], run_trials),
     **{
         f"run {name}": of_run(name)
-        for name in ("config.yaml", "trials.jsonl", "transcripts.jsonl", "summary.json", "bought.json", "control.json",
-                     "status.json")
+        for name in ("config.yaml", "trials.jsonl", "transcripts.jsonl", "summary.json", "existing_arms.json",
+                     "control.json", "status.json")
     },
     "urdf": Target("text", urdf_seeds, run_urdf),
     "points": Target("text", point_seeds, run_points),

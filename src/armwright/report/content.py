@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armwright.arm import AXES, Arm, Joint, Link
 from armwright.best_known import known_front
-from armwright.buying import read_bought, standing
+from armwright.buying import dominance_counts, read_existing_arms
 from armwright.comparison import method_words
 from armwright.decision import bounded_numbers, numbers_of
 from armwright.export.mjcf import to_mjcf
@@ -104,7 +104,7 @@ class RunContent:
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
             "looks": {trial.source: _look(trial.source) for trial in self.history},
             "existing": {"label": EXISTING.label, "colour": EXISTING.colour},
-            "bought": _bought(self.folder, self.history),
+            "existing_arms": _existing_arms(self.folder, self.history),
             "result": _result(self.config, self.history, self.summary),
             "calls_from": calls_from,
             "calls": [asdict(call) for call in self.calls[calls_from:]],
@@ -113,16 +113,16 @@ class RunContent:
         return pack(head, {**arrays, "curve": self.history.hypervolumes})
 
 
-def _bought(folder: Path, history: History) -> list[dict[str, Any]]:
+def _existing_arms(folder: Path, history: History) -> list[dict[str, Any]]:
     """Return the existing arms of the last comparison and their relation to the present front."""
     return [
         {
             "name": arm.name,
             "values": list(arm.values),
-            "breaks": list(arm.breaks),
-            "standing": standing(arm.values, arm.breaks, history),
+            "violated": list(arm.violated),
+            "standing": dominance_counts(arm.values, arm.violated, history),
         }
-        for arm in read_bought(folder, len(history.problem.objectives))
+        for arm in read_existing_arms(folder, len(history.problem.objectives))
     ]
 
 

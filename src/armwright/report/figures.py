@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from armwright.best_known import standing
-from armwright.buying import ComparedArm, read_bought
+from armwright.buying import ComparedArm, read_existing_arms
 from armwright.credit import front_by_source, gained_by_source
 from armwright.exceptions import RunFolderError
 from armwright.history import FrontMember, History
@@ -42,32 +42,32 @@ def write_figures(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     config, history = read_run(folder)
     summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
-    bought = read_bought(folder, len(config.objectives))
+    existing = read_existing_arms(folder, len(config.objectives))
     if summary is None or "search" not in summary:
-        drawn = _figures(history, bought)
+        drawn = _figures(history, existing)
     else:
-        drawn = _search_figures(history, summary, bought)
+        drawn = _search_figures(history, summary, existing)
     return write_drawn(folder / FIGURES, drawn)
 
 
-def _figures(history: History, bought: Sequence[ComparedArm]) -> Iterator[tuple[str, Figure]]:
+def _figures(history: History, existing: Sequence[ComparedArm]) -> Iterator[tuple[str, Figure]]:
     plane = len(history.problem.objectives) > 1  # figures of the first two objectives
     yield "hypervolume", draw_hypervolume(history)
     if plane:
         yield "samples", draw_samples(history)
     yield "credit", draw_credit(history)
     if plane:
-        yield "front", draw_front(history, bought)
+        yield "front", draw_front(history, existing)
     yield from _arm_figures(history)
 
 
 def _search_figures(
-    history: History, summary: Mapping[str, Any], bought: Sequence[ComparedArm]
+    history: History, summary: Mapping[str, Any], existing: Sequence[ComparedArm]
 ) -> Iterator[tuple[str, Figure]]:
     """Yield the figures of a direct search, whose trials are its front."""
     yield "hypervolume", draw_search(history, summary)
     if len(history.problem.objectives) > 1:
-        yield "front", draw_front(history, bought)
+        yield "front", draw_front(history, existing)
     yield from _arm_figures(history)
 
 
@@ -191,7 +191,7 @@ def draw_credit(history: History) -> Figure:
     return figure
 
 
-def draw_front(history: History, bought: Sequence[ComparedArm] = ()) -> Figure:
+def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure:
     """Draw the final front by source, with the chosen designs labelled and existing arms for comparison."""
     figure, axes = one_panel(5.2, 4.2)
     reference = _reference(history)
@@ -219,20 +219,20 @@ def draw_front(history: History, bought: Sequence[ComparedArm] = ()) -> Figure:
         )
     axes.set_xlabel(_label(history, 0))
     axes.set_ylabel(_label(history, 1))
-    shown = _draw_bought(axes, reference, bought)
+    shown = _draw_existing(axes, reference, existing)
     axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if shown else [])], loc="upper right")
     area = hypervolume(history.counted, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     return figure
 
 
-def _draw_bought(axes: Any, reference: Sequence[float], bought: Sequence[ComparedArm]) -> int:
+def _draw_existing(axes: Any, reference: Sequence[float], existing: Sequence[ComparedArm]) -> int:
     """Draw existing arms in the plane of the first two objectives and return how many were drawn.
 
     An arm outside the drawn part is placed at its edge, with its values in the label.
     """
     edge = SHOWN * np.array(reference[:2])
-    known = [(arm, arm.values[0], arm.values[1]) for arm in bought]
+    known = [(arm, arm.values[0], arm.values[1]) for arm in existing]
     places = [(arm, np.array([x, y])) for arm, x, y in known if x is not None and y is not None]
     height = HIGHEST_LABEL  # labels keep clear of the front's and of each other, from the top down
     for arm, place in sorted(places, key=lambda known: -known[1][1]):

@@ -164,14 +164,14 @@ function draw() {
       },
     });
   }
-  const bought = content.head.bought.filter((arm) => arm.values[x] !== null && arm.values[y] !== null);
-  if (bought.length) {
+  const existing = content.head.existing_arms.filter((arm) => arm.values[x] !== null && arm.values[y] !== null);
+  if (existing.length) {
     const { label, colour: paint } = content.head.existing;
     traces.push({
-      x: bought.map((arm) => placed(arm.values[x], 0)),
-      y: bought.map((arm) => arm.values[y]),
-      text: bought.map((arm) => plain(arm.name)),
-      hovertext: bought.map((arm) => plain(`${arm.name}: ${standing(arm)}`)),
+      x: existing.map((arm) => placed(arm.values[x], 0)),
+      y: existing.map((arm) => arm.values[y]),
+      text: existing.map((arm) => plain(arm.name)),
+      hovertext: existing.map((arm) => plain(`${arm.name}: ${standing(arm)}`)),
       hovertemplate: `%{hovertext}<br>%{x:.4g}, %{y:.4g}<extra>${plain(label)}</extra>`,
       mode: "markers+text", textposition: "middle right", cliponaxis: false, name: plain(label),
       marker: { symbol: "cross", size: 12, color: paint, line: { width: 1, color: colour("ink") } },
@@ -201,7 +201,7 @@ function draw() {
   const notes = ["Click a design to see its arm."];
   if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
-  for (const arm of content.head.bought) notes.push(boughtWords(arm, high));
+  for (const arm of content.head.existing_arms) notes.push(existingWords(arm, high));
   if (many) notes.push("Large: on the front in all objectives; in this plane others may lie before them.");
   if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
   if (content.head.is_toy) notes.push("Toy masses: torques compare designs, and say nothing of motors.");
@@ -209,7 +209,7 @@ function draw() {
 }
 
 // What the note says of an arm that exists already.
-function boughtWords(arm, high) {
+function existingWords(arm, high) {
   const [u, v] = [arm.values[x], arm.values[y]];
   const place = high(x) !== undefined && (u > high(x) || v > high(y)) ? ` lies outside this view, at ${number(u)}, ${number(v)};` : ":";
   if (u === null || v === null) return `${arm.name}: not comparable, as it does not state all of these numbers.`;
@@ -217,7 +217,7 @@ function boughtWords(arm, high) {
 }
 
 function standing(arm) {
-  if (arm.breaks.length) return `breaks ${arm.breaks.join(", ")}`;
+  if (arm.violated.length) return `violates ${arm.violated.join(", ")}`;
   if (arm.standing === null) return "not comparable";
   const [worse, better] = arm.standing;
   return `dominates ${plural(worse, "design")} of the front, dominated by ${better}`;
