@@ -377,6 +377,7 @@ def test_times_that_cannot_be_are_refused(in_folder: Path, how: str, words: str)
     assert "\n" not in str(told.exception)
 
 
+@pytest.mark.slow
 def test_a_run_with_times_from_the_command_line(in_folder: Path) -> None:
     text = f"name: line\ntargets: {[list(point) for point in CORNERS]}\nmoves: in_order\n"
     text += "objectives: [position_error, dynamic_torque]\n"

@@ -106,7 +106,7 @@ def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
 
 
 @every_fault
-@every_wire
+@both_formats
 def test_later_a_fault_is_a_black_box_trial_and_is_counted(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
@@ -340,7 +340,7 @@ def test_whatever_a_server_says_is_an_answer_or_a_fault(
     nameless = [dict(event) for event in streamed_events(message(TEXT, TOOL_CALL))]
     nameless[0]["message"] = {**nameless[0]["message"], "model": True}
 
-    @settings(max_examples=200, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=60, deadline=None, database=None, suppress_health_check=list(HealthCheck))
     @given(st.builds(Response, BODIES, STATUSES, HEADERS, TYPES), st.sampled_from(["reasoning", "answer"]))
     @example(Response(stream(nameless), 200, {}, "text/event-stream"), "answer")
     def check(response: Response, step: str) -> None:

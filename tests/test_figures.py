@@ -15,9 +15,12 @@ def short(out: Path, problem: Problem, n_total: int = 12) -> Run:
     return optimize(problem, proposer="rules", n_init=4, n_step=4, n_total=n_total, out=out)
 
 
+@pytest.mark.slow
 def test_every_figure_as_png_and_pdf(tmp_path: Path) -> None:
     short(tmp_path, Problem(load_task("target-2")))
-    for path in write_figures(tmp_path):
+    written = write_figures(tmp_path)
+    assert {"hypervolume.png", "samples.png", "front.png", "arms.png", "credit.png"} <= {path.name for path in written}
+    for path in written:
         assert path.read_bytes().startswith(b"\x89PNG")
         assert path.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
 
@@ -26,17 +29,17 @@ def test_every_figure_as_png_and_pdf(tmp_path: Path) -> None:
     "task",
     [
         Task(name="one", targets=((0.3, 0.1, 0.2),)),
-        Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0)),
-        Task(name="same", targets=((0.3, 0.1, 0.2),) * 3),
-        Task(name="many", targets=tuple((0.3, 0.01 * i, 0.2) for i in range(40))),
+        pytest.param(Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0)), marks=pytest.mark.slow),
+        pytest.param(Task(name="same", targets=((0.3, 0.1, 0.2),) * 3), marks=pytest.mark.slow),
+        pytest.param(Task(name="many", targets=tuple((0.3, 0.01 * i, 0.2) for i in range(40))), marks=pytest.mark.slow),
     ],
-    ids=lambda task: task.name,
 )
 def test_odd_tasks_are_drawn_too(tmp_path: Path, task: Task) -> None:
     short(tmp_path, Problem(task), n_total=1)
     assert write_figures(tmp_path)
 
 
+@pytest.mark.slow
 def test_drawing_again_leaves_no_figure_of_a_former_choice(tmp_path: Path) -> None:
     problem = Problem(random_task(0))
     short(tmp_path, problem, n_total=2)
