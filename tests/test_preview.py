@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from armwright.cli import app
 from armwright.exceptions import ArmwrightError, RunConflictError
-from armwright.llm.prompt import VARIABLES
+from armwright.llm.prompt_values import VARIABLES
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem import Problem
 from armwright.proposers.llm import LlmProposer

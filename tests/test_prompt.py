@@ -22,14 +22,13 @@ from armwright.llm.feedback import Feedback
 from armwright.llm.prompt import (
     LARGEST_TEMPLATE,
     MOST_TOKENS,
-    VARIABLES,
     Prompt,
     builtin_template,
     estimated_tokens,
     load_prompt,
     parameters_prompt,
-    spread,
 )
+from armwright.llm.prompt_values import VARIABLES, spread
 from armwright.masses import MassPerLink
 from armwright.parameters import exact
 from armwright.problem import Problem

@@ -357,7 +357,8 @@ def prompt_(
     variables: Annotated[bool, typer.Option("--variables", help="Print what a template may use instead.")] = False,
 ) -> None:
     """Print exactly what would be sent to a model for TASK, or how to write a prompt of your own."""
-    from armwright.llm.prompt import VARIABLES, whole_template
+    from armwright.llm.prompt import whole_template
+    from armwright.llm.prompt_values import VARIABLES
     from armwright.preview import preview, preview_after
     from armwright.proposers.asking import Asking
     from armwright.space import load_space

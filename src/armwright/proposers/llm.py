@@ -6,7 +6,8 @@ from typing import Any
 from armwright.exceptions import SettingsError
 from armwright.history import History
 from armwright.llm.feedback import N_PARETO, N_RANDOM
-from armwright.llm.prompt import MOST_TARGETS, MOST_TOKENS, estimated_tokens, parameters_prompt
+from armwright.llm.prompt import MOST_TOKENS, estimated_tokens, parameters_prompt
+from armwright.llm.prompt_values import MOST_TARGETS
 from armwright.problem import Problem
 from armwright.proposers.asking import Asking, PromptedProposer
 
