@@ -220,7 +220,7 @@ def test_nothing_of_a_task_without_constraints_tells_of_any(tmp_path: Path) -> N
     run = optimize(Problem(task()), proposer="none", n_total=3, out=tmp_path / "run")
     assert all("constraints" not in line for line in lines(tmp_path / "run"))
     assert "feasibility" not in run.summary
-    assert run.history.counted is run.history.values
+    assert run.history.masked_objectives is run.history.values
     assert all(trial.is_feasible for trial in run.trials)
 
 
@@ -250,7 +250,7 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
     run = optimize(problem, proposer="rules", n_total=60, seed=1, out=tmp_path / "run")
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
-    assert np.array_equal(run.history.broken, broken)
+    assert np.array_equal(run.history.violations, broken)
     feasible = np.all(broken <= 0.0, axis=1)
     assert 0 < feasible.sum() < len(feasible)
     values = np.array([trial.values for trial in run.trials])
@@ -282,7 +282,7 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     assert polished.added
     assert all(trial.is_feasible for trial in polished.history.trials[len(run.trials) :])
     refined = [trial.design for trial in polished.history]
-    assert np.array_equal(polished.history.broken, problem.evaluate(refined).violations)
+    assert np.array_equal(polished.history.violations, problem.evaluate(refined).violations)
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
@@ -384,7 +384,7 @@ def test_a_study_of_ones_own_says_how_far_its_trials_break_constraints() -> None
     rows = zip(designs, values.tolist(), broken.tolist(), strict=True)
     trials = [FinishedTrial(i, "bbo", d, tuple(v), constraints=tuple(b)) for i, (d, v, b) in enumerate(rows)]
     box.restore(trials)
-    assert np.array_equal(study_history(box.study, problem).broken, broken)
+    assert np.array_equal(study_history(box.study, problem).violations, broken)
     silent = BlackBox(SPACE, "random", 0)
     silent.restore([replace(trial, constraints=()) for trial in trials])
     with pytest.raises(SettingsError, match=r'set_constraint\("worst_error <= 0.4"'):
@@ -395,7 +395,9 @@ def test_a_search_for_the_front_keeps_the_bounds_and_goes_on_to_the_bit(tmp_path
     problem = Problem(task(*BOUNDS))
     whole = find_front(problem, budget=12_000, stop_at_stall=False, out=tmp_path / "whole")
     assert np.all(whole.history.feasible)
-    assert np.array_equal(whole.history.broken, problem.evaluate([m.design for m in whole.history.trials]).violations)
+    assert np.array_equal(
+        whole.history.violations, problem.evaluate([m.design for m in whole.history.trials]).violations
+    )
     assert 0 < whole.summary["search"]["infeasible"] < whole.summary["search"]["evaluations"]
     free = find_front(Problem(task()), budget=12_000, stop_at_stall=False)
     assert 0.0 < whole.summary["hypervolume"]["final"] < free.summary["hypervolume"]["final"]
@@ -450,7 +452,7 @@ def test_pymoos_constrained_nsga2_finds_no_front_that_ours_misses_by_much() -> N
 def test_feedback_of_infeasible_designs_begins_with_the_nearest() -> None:
     history = fixed_history(FixedProblem(task("mass <= 0.0001")))
     assert history.front == []
-    assert history.nearest(3) == np.argsort(history.broken[:, 0], kind="stable")[:3].tolist()
+    assert history.nearest(3) == np.argsort(history.violations[:, 0], kind="stable")[:3].tolist()
 
 
 def test_optuna_itself_calls_feasible_what_is_not_above_0() -> None:

@@ -31,7 +31,7 @@ def finished(number: int, design: object, values: tuple[float, ...], broken: flo
 
 
 def assert_same(one: History, other: History) -> None:
-    for name in ("values", "broken", "counted", "feasible", "hypervolumes", "hypervolume"):
+    for name in ("values", "violations", "masked_objectives", "feasible", "hypervolumes", "hypervolume"):
         mine, theirs = getattr(one, name), getattr(other, name)
         assert mine.shape == theirs.shape, name
         assert np.array_equal(mine, theirs), name
@@ -53,7 +53,9 @@ def test_a_history_that_grew_is_the_history_of_all_its_trials(
     for n in [*sorted(min(step, len(rows)) for step in steps), len(rows)]:
         history = history.grown(everything[:n], point if n >= found_at else None)
         met.append(history)
-        for name in data.draw(st.sets(st.sampled_from(["values", "front", "hypervolumes", "proposed", "counted"]))):
+        for name in data.draw(
+            st.sets(st.sampled_from(["values", "front", "hypervolumes", "proposed", "masked_objectives"]))
+        ):
             getattr(history, name)
         if n and data.draw(st.booleans()):
             history.has_tried(DESIGNS[0])

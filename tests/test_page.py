@@ -230,7 +230,7 @@ def test_infeasible_designs_are_hollow_on_no_front_and_say_what_they_break(tmp_p
     assert f"infeasible {len(infeasible)}" in tab.text("#facts")
     numbers = [int(text) for text in tab.page.locator("#table tbody tr td:first-child").all_inner_texts()]
     assert numbers == [member.number for member in history.front]
-    worst = max(infeasible, key=lambda number: history.broken[number, 0])
+    worst = max(infeasible, key=lambda number: history.violations[number, 0])
     tab.ask(f"armwright.set({{ design: {worst} }})")
     error = history.evaluation([worst]).position_error.max()
     assert f"Infeasible; worst_error <= 0.4: {error:.4g} m (broken); length >= 0.5: " in tab.text("#design-words")

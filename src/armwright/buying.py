@@ -301,11 +301,11 @@ def _known(quantity: Quantity, evaluation: Evaluation) -> float | None:
 def _of_front(history: History) -> list[ComparedArm]:
     """Of the front its most precise design, its knee, and the one with least of the last objective."""
     reference = history.reference_point or (np.inf,) * len(history.problem.objectives)
-    numbers = front_numbers(history.counted)
+    numbers = front_numbers(history.masked_objectives)
     if not numbers:
         return []
-    first, last = solution_numbers(history.counted, reference) or (numbers[0], numbers[-1])
-    knee = knee_number(history.counted, reference)
+    first, last = solution_numbers(history.masked_objectives, reference) or (numbers[0], numbers[-1])
+    knee = knee_number(history.masked_objectives, reference)
     chosen = [number for number in dict.fromkeys((first, knee, last)) if number is not None]
     return [_of_design(history, history.member(number)) for number in chosen]
 

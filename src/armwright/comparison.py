@@ -59,7 +59,7 @@ class Run:
             return float(self.curve[-1])
         if self._as_it_ran:
             return float(self.summary["hypervolume"]["final"])
-        return hypervolume(self.history().counted, self.reference_point)
+        return hypervolume(self.history().masked_objectives, self.reference_point)
 
     @cached_property
     def gained(self) -> Mapping[str, float]:

@@ -25,7 +25,7 @@ class Credit:
 
 def credit_by_source(history: History) -> dict[str, Credit]:
     """The credit of each source, in the order in which they first occur."""
-    gains, on_front = hypervolume_gains(history), front_mask(history.counted)
+    gains, on_front = hypervolume_gains(history), front_mask(history.masked_objectives)
     credit: dict[str, Credit] = {}
     for source, mine in masks_by_source(history).items():
         gained = None if gains is None else float(gains[mine].sum())
@@ -62,11 +62,11 @@ def gained_by_source(history: History) -> dict[str, Array] | None:
 def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
     """For each source (I + 1,): how many of its trials are on the front after 0, 1, …, I counted iterations."""
     first, *_ = last = _last_trials(history).tolist()
-    on_front = np.flatnonzero(front_mask(history.counted[:first]))
+    on_front = np.flatnonzero(front_mask(history.masked_objectives[:first]))
     fronts = [on_front]
     for number in range(first, last[-1]):  # one trial more; what has left a front never comes back
         on_front = np.append(on_front, number)
-        on_front = on_front[front_mask(history.counted[on_front])]
+        on_front = on_front[front_mask(history.masked_objectives[on_front])]
         fronts.append(on_front)
     return {
         source: np.array([np.count_nonzero(mine[front]) for front in fronts])

@@ -31,7 +31,15 @@ START = "start"  # an arm that is there already
 POLISH = "polish"  # a design of the front, refined
 FRONT = "front"  # of a search for the whole front
 NOT_PROPOSED = (RANDOM, BBO, START, POLISH, FRONT)
-GROWING = ("values", "broken", "counted", "front", "proposed", "_course", "_first_of")  # what more trials add to
+GROWING = (
+    "values",
+    "violations",
+    "masked_objectives",
+    "front",
+    "proposed",
+    "_course",
+    "_first_of",
+)  # what more trials add to
 
 
 @dataclass(frozen=True)
@@ -90,29 +98,29 @@ class History:
         return np.vstack([known, np.array(rows, dtype=np.float64).reshape(len(rows), known.shape[1])])
 
     @cached_property
-    def broken(self) -> Array:
-        """(N, C) how far each constraint of the task is broken; <= 0: not at all."""
-        known, new = self._known("broken", np.empty((0, len(self.problem.constraints))))
+    def violations(self) -> Array:
+        """(N, C) violation of each constraint of the task; satisfied at <= 0."""
+        known, new = self._known("violations", np.empty((0, len(self.problem.constraints))))
         rows = [trial.constraints for trial in new]
         return np.vstack([known, np.array(rows, dtype=np.float64).reshape(len(rows), known.shape[1])])
 
     @cached_property
     def feasible(self) -> NDArray[np.bool_]:
         """(N,) whether all constraints are met; of a task without any: always."""
-        return feasible_mask(self.broken)
+        return feasible_mask(self.violations)
 
     @cached_property
-    def counted(self) -> Array:
+    def masked_objectives(self) -> Array:
         """(N, M) `values`, infinite where a design is infeasible: what fronts and hypervolumes are made of."""
         if not self.problem.constraints:
             return self.values
-        known, _ = self._known("counted", np.empty((0, len(self.problem.objectives))))
+        known, _ = self._known("masked_objectives", np.empty((0, len(self.problem.objectives))))
         n = len(known)
-        return np.vstack([known, masked_objectives(self.values[n:], self.broken[n:])])
+        return np.vstack([known, masked_objectives(self.values[n:], self.violations[n:])])
 
     def nearest(self, most: int) -> list[int]:
         """The numbers of so many designs at most that break the constraints least, summed; the nearest first."""
-        return np.argsort(total_violation(self.broken), kind="stable")[:most].tolist()
+        return np.argsort(total_violation(self.violations), kind="stable")[:most].tolist()
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:
@@ -125,7 +133,7 @@ class History:
         known, new = self._known("front", [])
         members = {member.number: member for member in known}
         numbers = [*sorted(members), *range(len(self) - len(new), len(self))]
-        on_front = [numbers[place] for place in front_numbers(self.counted[numbers])] if numbers else []
+        on_front = [numbers[place] for place in front_numbers(self.masked_objectives[numbers])] if numbers else []
         return [members[number] if number in members else self.member(number) for number in on_front]
 
     @cached_property
@@ -164,7 +172,7 @@ class History:
         tracker = FrontTracker(len(self.problem.objectives), self.reference_point)
         (known, tracker), _ = self._known("_course", (np.zeros(0), tracker))
         tracker, new = copy(tracker), np.zeros(len(self) - len(known))
-        for i, row in enumerate(self.counted[len(known) :]):
+        for i, row in enumerate(self.masked_objectives[len(known) :]):
             tracker.add(row)
             new[i] = tracker.hypervolume
         return np.concatenate([known, new]), tracker
@@ -181,7 +189,7 @@ class History:
 
     def found_reference_point(self) -> tuple[float, ...]:
         """For a task that states none, from the first n_init trials."""
-        return found_reference_point(self.values[: self.n_init], self.broken[: self.n_init])
+        return found_reference_point(self.values[: self.n_init], self.violations[: self.n_init])
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
         """The physics of these trials' designs, computed again (the kernels give the same bits)."""

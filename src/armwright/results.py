@@ -124,7 +124,7 @@ def summarize(
             "mean": float(counted.mean()) if len(counted) else None,
             "history": curve.tolist(),
         },
-        "best_known": _standing_record(history, history.counted),
+        "best_known": _standing_record(history, history.masked_objectives),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         "evaluations": sum(trial.evaluations for trial in history),
@@ -178,7 +178,7 @@ def resummarize(
 def unmet(history: History) -> str:
     """Where no design is feasible: how near the nearest comes, and which constraint is in the way."""
     (number,) = history.nearest(1)
-    broken = history.broken[number]
+    broken = history.violations[number]
     constraints = history.problem.constraints
     words = [
         f"{constraints[i].words} ({constraints[i].measured(float(broken[i])):.4g} {constraints[i].quantity.unit})"
@@ -197,14 +197,16 @@ def _feasibility_record(history: History) -> dict[str, Any]:
     constraints = history.problem.constraints
     if not constraints:
         return {}
-    breaking = (history.broken > 0.0).sum(axis=0).tolist()
+    breaking = (history.violations > 0.0).sum(axis=0).tolist()
     nearest = None
     if len(history) and not history.feasible.any():
         (number,) = history.nearest(1)
-        measured = {c.words: c.measured(value) for c, value in zip(constraints, history.broken[number], strict=True)}
+        measured = {
+            c.words: c.measured(value) for c, value in zip(constraints, history.violations[number], strict=True)
+        }
         nearest = {
             "number": number,
-            "violation": float(total_violation(history.broken[[number]])[0]),
+            "violation": float(total_violation(history.violations[[number]])[0]),
             "measured": measured,
         }
     return {

@@ -206,7 +206,7 @@ class Study:
         self._refined = sum(trial.refines is not None for trial in self.trials)
         self._latest = History(problem, (), self.method.n_init, config.reference_point)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
-        for row in self._history().counted:
+        for row in self._history().masked_objectives:
             self._tracker.add(row)
         self._freeze_reference_point()
         self._judging: Judging = Here(problem)

@@ -88,7 +88,7 @@ def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[s
         history = runs[0].history()
         if len(history.problem.objectives) > 1:
             yield f"samples-{task}", draw_samples(history)
-        solutions = solution_numbers(history.counted, comparison.reference_point(task))
+        solutions = solution_numbers(history.masked_objectives, comparison.reference_point(task))
         for i, number in enumerate(dict.fromkeys(solutions or ()), start=1):
             title = f"{task}, {shown}, seed {runs[0].seed}: Solution {i}"
             yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number))
@@ -132,7 +132,7 @@ def draw_area(comparison: Comparison) -> Figure:
     reference = run.reference_point
     values = history.values[: config.study.n_trials, :2]
     figure, axes = one_panel(4.4, 3.8)
-    kept = history.counted[: config.study.n_trials, :2]
+    kept = history.masked_objectives[: config.study.n_trials, :2]
     inside = values[[n for n in front_numbers(kept) if np.all(values[n] < reference[:2])]]
     axes.scatter(*values.T, s=12, color="#9A9A9A", label="designs")
     if len(inside):
@@ -157,7 +157,7 @@ def draw_area(comparison: Comparison) -> Figure:
     axes.set_xlim(0, 1.15 * reference[0])
     axes.set_ylim(0, 1.15 * reference[1])
     _name_axes(axes, config)
-    area = hypervolume(history.counted[: config.study.n_trials], reference)
+    area = hypervolume(history.masked_objectives[: config.study.n_trials], reference)
     axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
     axes.legend(loc="lower left")
     return figure
@@ -368,7 +368,7 @@ def _name_axes(axes: Any, config: RunConfig) -> None:
 
 def _front(run: Run) -> np.ndarray:
     """Return the front of a run in the first two objectives, (K, 2)."""
-    counted = run.history().counted
+    counted = run.history().masked_objectives
     return counted[front_numbers(counted)][:, :2]
 
 

@@ -168,7 +168,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
         "values": history.values[numbers.start : numbers.stop],
         "params": space.matrix([trial.design for trial in trials]),
-        "broken": history.broken[numbers.start : numbers.stop],
+        "broken": history.violations[numbers.start : numbers.stop],
         "q": evaluation.q.astype(np.float32),
         **_arm_arrays(arms, evaluation.arms.dof),
     }
@@ -292,7 +292,7 @@ def _goals(goals: TargetArrays) -> dict[str, Any]:
 def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return the results of the run so far."""
     reference = history.reference_point
-    final = hypervolume(history.counted, reference) if reference is not None and len(history) else None
+    final = hypervolume(history.masked_objectives, reference) if reference is not None and len(history) else None
     found: dict[str, Any] = {
         "finished": summary is not None,
         "hypervolume": final,

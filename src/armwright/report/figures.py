@@ -86,11 +86,11 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     to feasibility is returned.
     """
     reference, objectives = _reference(history), history.problem.objectives
-    numbers = front_numbers(history.counted)
+    numbers = front_numbers(history.masked_objectives)
     if not numbers:
         return [("Nearest to feasible", history.member(number)) for number in history.nearest(1)]
     first, last = (f"least {objective.label.lower()}" for objective in (objectives[0], objectives[-1]))
-    solutions = solution_numbers(history.counted, reference)
+    solutions = solution_numbers(history.masked_objectives, reference)
     if solutions is None:
         lowest = min(numbers, key=lambda n: history.values[n, -1])
         titled = {numbers[0]: f"{first.capitalize()} of all", lowest: f"{last.capitalize()} of all"}
@@ -99,7 +99,7 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     if numbers[0] != solutions[0]:
         best = "Most precise" if objectives[0] is POSITION_ERROR else first.capitalize()
         titled = {numbers[0]: f"{best} of all, beyond the reference point", **titled}
-    knee = knee_number(history.counted, reference)
+    knee = knee_number(history.masked_objectives, reference)
     if knee is not None:
         titled.setdefault(knee, "Knee of the front")
     titled.setdefault(solutions[1], f"Solution 2: {last}")
@@ -110,7 +110,7 @@ def draw_hypervolume(history: History) -> Figure:
     """Draw the hypervolume over the counted trials; proposals that enlarged it are marked."""
     figure, axes = one_panel(5.2, 3.2)
     curve = history.hypervolume
-    start = hypervolume(history.counted[: history.n_init], _reference(history))
+    start = hypervolume(history.masked_objectives[: history.n_init], _reference(history))
     iterations = np.arange(len(curve) + 1)
     axes.step(iterations, [start, *curve], where="post", color=FRONT, linewidth=1.4, label="hypervolume")
     gains = np.diff(np.array([start, *curve])) > 0.0
@@ -221,7 +221,7 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
     axes.set_ylabel(_label(history, 1))
     shown = _draw_existing(axes, reference, existing)
     axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if shown else [])], loc="upper right")
-    area = hypervolume(history.counted, reference)
+    area = hypervolume(history.masked_objectives, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     return figure
 
@@ -288,7 +288,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
             zorder=3,
             **_paint(style),
         )
-    front = values[front_numbers(history.counted)]
+    front = values[front_numbers(history.masked_objectives)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # more than two objectives have no front line
         x = [inside[0, 0], *inside[:, 0], reference[0]]
@@ -304,7 +304,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
 
 def _best_known(axes: Any, history: History) -> None:
     """Draw a line at the best known hypervolume of the task, if one is known."""
-    found = standing(history.problem, history.counted, _reference(history))
+    found = standing(history.problem, history.masked_objectives, _reference(history))
     if found is not None:
         label = f"best known ({found.hypervolume:.2f})"
         axes.axhline(found.hypervolume, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=label)
