@@ -176,7 +176,7 @@ def test_version_and_help() -> None:
         (("bad.yaml",), 'unknown key "target".'),
         (("nan.yaml",), "finite number (got nan)"),
         (("empty.yaml",), "targets is empty"),
-        (("target-1", "--space", "upside.yaml"), "upside down"),
+        (("target-1", "--space", "upside.yaml"), "is reversed"),
         (("target-1", "--space", "nothing.yaml"), "cannot read nothing.yaml"),
         (("target-1", "--n-step", "0"), "n_step = 0: a whole number from 1 to"),
         (("target-1", "--n-total", "-5"), "n_total = -5"),

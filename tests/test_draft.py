@@ -185,7 +185,7 @@ REFUSED = {
     "actuators missing": (ANSWER[: ANSWER.index("SPACE")], "objective torque_utilisation needs actuators"),
     "price missing": (ANSWER.replace("XM430-W350", "MG996R"), "objective price needs the price of every actuator"),
     "torque missing": (ANSWER.replace("XM430-W350", "AK60-6"), "actuator AK60-6 has no stall torque"),
-    "range": (ANSWER.replace("[0.1, 0.4]", "[0.4, 0.1]"), "is upside down"),
+    "range": (ANSWER.replace("[0.1, 0.4]", "[0.4, 0.1]"), "is reversed"),
     "default's name": (ANSWER.replace("name: cart-arm", "name: paper"), "the space needs a name of its own"),
     "built-in name": (ANSWER.replace("name: wall", "name: shelf"), '"shelf" is that of a built-in task'),
     "no provenance": (re.sub("provenance.*\n", "", ANSWER), "provenance is missing"),

@@ -1,4 +1,4 @@
-"""The physical chain: a base position, then joints and links in turn. It knows no search."""
+"""The physical arm: a base position, then joints and links in turn."""
 
 import math
 from dataclasses import dataclass
@@ -12,15 +12,19 @@ Vector = tuple[float, float, float]
 
 AXES: tuple[Axis, ...] = ("x", "y", "z")
 GRAVITY = 9.81  # [m/s²] along -z
-UNIT = 1e-6  # by which a unit vector's length may be off
+UNIT = 1e-6  # tolerance on the length of a unit vector
 
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """What turns a joint. It sits there and is carried by the link before.
+    """The actuator of a joint, carried by the link before it.
 
-    mass: [kg]. effort: the torque that may be asked of it [N m]. speed: the largest [rad/s], and price: [USD]; None
-    where not known.
+    Attributes:
+        name: Its name in the catalogue or the space file.
+        mass: Its mass [kg].
+        effort: Its allowed torque [N m].
+        speed: Its maximum speed [rad/s]; None if unknown.
+        price: Its price [USD]; None if unknown.
     """
 
     name: str
@@ -30,18 +34,22 @@ class Actuator:
     price: float | None = None
 
     def __post_init__(self) -> None:
-        said = [self.mass, self.effort, self.speed or 1.0, self.price or 0.0]
-        if not all(math.isfinite(v) for v in said) or min(self.mass, self.price or 0.0) < 0.0 or self.effort <= 0.0:
+        stated = [self.mass, self.effort, self.speed or 1.0, self.price or 0.0]
+        if not all(math.isfinite(v) for v in stated) or min(self.mass, self.price or 0.0) < 0.0 or self.effort <= 0.0:
             raise ArmError(f"an actuator needs mass >= 0 kg, effort > 0 and price >= 0, all finite: {self}")
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint about (revolute) or along (prismatic) a local axis.
+    """A joint about (revolute) or along (prismatic) a local axis.
 
-    lower, upper: the limits [rad] or [m]; a fixed joint has none and does not move.
-    actuator: what turns it; None where that is not chosen.
-    travel: of a prismatic joint for each radian that its actuator turns [m/rad]; 1 of the others.
+    Attributes:
+        kind: Its type; a fixed joint has no limits and does not move.
+        axis: Its local axis.
+        lower: The lower limit [rad] or [m].
+        upper: The upper limit [rad] or [m].
+        actuator: Its actuator; None if not chosen.
+        travel: Travel of a prismatic joint per radian of its actuator [m/rad]; 1 for other joints.
     """
 
     kind: JointKind
@@ -61,19 +69,21 @@ class Joint:
             raise ArmError(f"joint limits must be finite: [{self.lower}, {self.upper}] {unit}")
         if self.kind != "fixed" and not self.lower < self.upper:
             raise ArmError(
-                f"joint limits are upside down: lower < upper is needed, not {self.lower} and {self.upper} {unit}"
+                f"joint limits are reversed: expected lower < upper, got {self.lower} and {self.upper} {unit}"
             )
         if not 0.0 < self.travel < math.inf or (self.kind != "prismatic" and self.travel != 1.0):
-            raise ArmError(f"travel = {self.travel} m/rad: above 0 of a prismatic joint, 1 of any other")
+            raise ArmError(
+                f"travel = {self.travel} m/rad: expected a value above 0 for a prismatic joint, 1 for any other"
+            )
 
     @property
     def effort(self) -> float | None:
-        """What its actuator can do at the joint: a torque [N m], or a force [N] where it slides; None where unknown."""
+        """The limit of its actuator at the joint: a torque [N m], or a force [N] if prismatic; None if unknown."""
         return None if self.actuator is None else self.actuator.effort / self.travel
 
     @property
     def speed(self) -> float | None:
-        """The fastest that its actuator can move it [rad/s] or [m/s]; None where unknown."""
+        """The maximum speed of the joint [rad/s] or [m/s]; None if unknown."""
         if self.actuator is None or self.actuator.speed is None:
             return None
         return self.actuator.speed * self.travel
@@ -83,10 +93,13 @@ class Joint:
 class Link:
     """The rigid body after a joint, in the frame that the joint moves.
 
-    offset: from this joint to the next, or to the tip of the arm [m].
-    mass: [kg].  com: centre of mass from this joint [m].  radius: of its round section [m].
-    end_mass: of a point that it carries at its end, too, such as the next joint's actuator [kg].
-    end_shift: from its end to that point [m].
+    Attributes:
+        offset: Vector from this joint to the next, or to the end of the arm [m].
+        mass: Its mass without the end mass [kg].
+        com: Its centre of mass, from this joint [m].
+        radius: The radius of its round section [m].
+        end_mass: A point mass that it carries at its end, such as the next joint's actuator [kg].
+        end_shift: Vector from its end to that point [m].
     """
 
     offset: Vector
@@ -105,12 +118,12 @@ class Link:
 
     @property
     def total_mass(self) -> float:
-        """With what sits at its end [kg]."""
+        """The mass including the end mass [kg]."""
         return self.mass + self.end_mass
 
     @property
     def total_com(self) -> Vector:
-        """The centre of that mass from this joint [m]."""
+        """The centre of the total mass, from this joint [m]."""
         if self.end_mass == 0.0:
             return self.com
         (x, y, z), (u, v, w), total = self.com, self.end_place, self.total_mass
@@ -122,25 +135,28 @@ class Link:
 
     @property
     def end_place(self) -> Vector:
-        """Of `end_mass`, from this joint [m]."""
+        """The position of the end mass, from this joint [m]."""
         (x, y, z), (u, v, w) = self.offset, self.end_shift
         return (x + u, y + v, z + w)
 
     @property
     def length(self) -> float:
-        """From this joint to the next [m]."""
+        """The distance from this joint to the next [m]."""
         return math.hypot(*self.offset)
 
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """A serial arm. With all joints at 0 every local frame stands parallel to the world's.
+    """A serial arm. With all joints at 0, every local frame is parallel to the world frame.
 
-    base: the first joint's position in the world [m].
-    joints, links: joint j moves link j and all that follows it.
-    tool: from the end of the last link to the tip, in the frame of that link [m].
-    tool_axis, tool_side: the world's directions of the tool's own z and x when all joints are at 0.
-    base_mass: of what stands with the base, such as the first joint's actuator [kg].
+    Attributes:
+        base: The position of the first joint in the world [m].
+        joints: Joint j moves link j and everything after it.
+        links: The links, one after each joint.
+        tool: Vector from the end of the last link to the tip, in the frame of that link [m].
+        tool_axis: World direction of the tool's z axis with all joints at 0.
+        tool_side: World direction of the tool's x axis with all joints at 0.
+        base_mass: Mass that does not move, such as the first joint's actuator [kg].
 
     Examples:
         >>> import armwright as aw
@@ -176,22 +192,22 @@ class Arm:
 
     @property
     def mass(self) -> float:
-        """Of all, what stands with the base included [kg]."""
+        """The total mass, including the base mass [kg]."""
         return self.base_mass + sum(link.total_mass for link in self.links)
 
     @property
     def length(self) -> float:
-        """Of all links [m]."""
+        """The total length of the links [m]."""
         return sum(link.length for link in self.links)
 
     @property
     def reach(self) -> float:
-        """The longest distance from the first joint that the tip could have [m]."""
+        """The largest possible distance of the tip from the first joint [m]."""
         strokes = sum(max(abs(j.lower), abs(j.upper)) for j in self.joints if j.kind == "prismatic")
         return strokes + self.length + math.hypot(*self.tool)
 
 
 def uniform_link(offset: Vector, mass: float, radius: float) -> Link:
-    """A link of uniform density: its centre of mass lies half way along `offset` [m]."""
+    """Return a link of uniform density, with its centre of mass halfway along `offset` [m]."""
     x, y, z = offset
     return Link(offset=offset, mass=mass, com=(x / 2, y / 2, z / 2), radius=radius)

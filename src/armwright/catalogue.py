@@ -1,6 +1,6 @@
-"""Real actuators: what their makers state, each number with its source; a field without a source is empty.
+"""Real actuators with the data of their makers and its source; fields without a source are empty.
 
-Shipped in actuators.csv. A space names those that its joints may have, or describes others.
+The data is in actuators.csv. A space file names actuators of the catalogue, or describes others.
 """
 
 import csv
@@ -19,7 +19,7 @@ TorqueKind = Literal["stall", "rated", "peak"]
 
 
 class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """An actuator as a data sheet tells of it; None where it does not.
+    """The data sheet of an actuator; None for values that it does not state.
 
     Masses in kg, torques in N m, speed in rad/s without load, size in m, price in USD.
     """
@@ -41,11 +41,15 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     note: str = Field(default="", max_length=1000)  # what else is to be known
 
     def torque(self, kind: TorqueKind) -> float | None:
-        """The stall, rated or peak torque [N m]."""
+        """Return the stall, rated or peak torque [N m]."""
         return {"stall": self.stall_torque, "rated": self.rated_torque, "peak": self.peak_torque}[kind]
 
     def actuator(self, kind: TorqueKind, safety_factor: float) -> Actuator:
-        """What the arm knows of it: its torque of that kind, divided by the factor; SpaceError where none is stated."""
+        """Return the actuator of an arm, with this torque divided by the safety factor.
+
+        Raises:
+            SpaceError: If that torque is not stated.
+        """
         torque = self.torque(kind)
         if torque is None:
             stated = [other for other in ("stall", "rated", "peak") if self.torque(other) is not None]
@@ -56,7 +60,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
 @cache
 def catalogue() -> Mapping[str, ActuatorRecord]:
-    """The actuators that come with armwright, by name."""
+    """Return the actuators that come with armwright, by name."""
     text = (resources.files("armwright") / CATALOGUE).read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     records = [
@@ -67,7 +71,7 @@ def catalogue() -> Mapping[str, ActuatorRecord]:
 
 
 def resolved(entry: Any) -> Any:
-    """The record of a name in a space file; anything else as it is, to be checked as a record."""
+    """Return the record of a named actuator; anything else unchanged, to be validated as a record."""
     if not isinstance(entry, str):
         return entry
     known = catalogue()

@@ -1,23 +1,23 @@
-"""Files replaced in one step, text that they can hold, and names that they can have."""
+"""Atomic replacement of files, and text and names that any file system accepts."""
 
 import os
 import re
 import shutil
 from pathlib import Path
 
-# What Windows takes for a device, whatever its ending; and a dot at the end, which it drops.
+# Windows reserves device names, whatever their suffix, and drops a dot at the end.
 _NO_FILE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?|.*\.", re.IGNORECASE)
 
 
 def replace_file(target: Path, content: bytes) -> None:
-    """Writes a file so that a crash, and whoever reads it meanwhile, finds the old one or the new one."""
+    """Replace a file atomically: readers, and a crash, leave the old or the new content."""
     part = target.with_name(target.name + ".part")
     part.write_bytes(content)
     os.replace(part, target)
 
 
 def replace_folder(target: Path, part: Path | None = None) -> None:
-    """Puts the folder `part` in the place of another, or nothing; a crash leaves the old one, none or the new one."""
+    """Replace a folder by `part`, or remove it; a crash leaves the old folder, none or the new one."""
     old = target.with_name(target.name + ".old")
     if old.exists():
         shutil.rmtree(old)
@@ -30,12 +30,12 @@ def replace_folder(target: Path, part: Path | None = None) -> None:
 
 
 def writable(text: str) -> str:
-    """Without lone surrogates, which JSON and names of files can carry and UTF-8 cannot."""
+    """Return text without lone surrogates, which JSON and file names allow and UTF-8 does not."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def check_name(name: str) -> str:
-    """A name of letters that any file can have; ValueError where a file of this name can be made on no Windows."""
+    """Return the name; raise ValueError if Windows does not allow a file of this name."""
     if _NO_FILE.fullmatch(name):
         raise ValueError(f'"{name}" cannot be the name of a file on Windows; choose another')
     return name

@@ -1,4 +1,4 @@
-"""Designs from files, to start a search with: an arm that is there already, or one of another run."""
+"""Design files: an existing arm or a design of another run, to start a search with."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from armwright.space import DesignSpace
 
 
 class DesignFile(BaseModel, frozen=True, extra="forbid"):
-    """A design as a run writes it into designs/NNNN/design.json; of a file of one's own, `params` is enough."""
+    """A design as a run writes it into designs/NNNN/design.json; a file written by hand only needs `params`."""
 
     params: dict[str, float | str]  # a value for each parameter of the space, by its name
     number: Any = None
@@ -26,7 +26,11 @@ class DesignFile(BaseModel, frozen=True, extra="forbid"):
 
 
 def read_design(path: str | Path, space: DesignSpace) -> Design:
-    """The design of a YAML or JSON file; DesignError where it is none of this space."""
+    """Read a design from a YAML or JSON file.
+
+    Raises:
+        DesignError: If it is not in the space.
+    """
     content = read_document(Path(path), DesignFile, DesignError)
     try:
         return space.design(content.params)
