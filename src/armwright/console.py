@@ -75,7 +75,7 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     console.print(f"{summary['n_trials']} trials{more}{broken}: {sources}; {_seconds(summary['seconds'])}")
     if summary["same_arms"]:
         console.print(
-            f"{summary['same_arms']} trials were the same arm as an earlier one, and were not evaluated again"
+            f"{summary['same_arms']} trials repeated the design of an earlier one and were not evaluated again"
         )
     _show_proposer(console, summary["proposer"])
     scaled = TORQUE in history.problem.objectives

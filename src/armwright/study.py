@@ -7,14 +7,13 @@ trials before it, so a killed run goes on where it stopped and ends as if it had
 import operator
 import time
 from collections import Counter
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from armwright.arrays import Array
-from armwright.canonical import SameArms
 from armwright.control import Channel
 from armwright.exceptions import ArmwrightError, ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, START, FrontMember, History
@@ -198,10 +197,9 @@ class Study:
         self.black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
         self.trials = folder.open_trials(problem.space, n_objectives, len(names)) if folder is not None else []
         self.black_box.restore(self.trials)
-        self._same_arms = SameArms(problem)
-        self._first_of: dict[Hashable, int] = {}  # the first trial of each arm
+        self._first_of: dict[Design, int] = {}  # the first trial of each design
         for trial in self.trials:
-            self._first_of.setdefault(self._same_arms.key(trial.design), trial.number)
+            self._first_of.setdefault(trial.design, trial.number)
         self._faults = Counter(trial.fault for trial in self.trials if trial.fault)
         self._refined = sum(trial.refines is not None for trial in self.trials)
         self._latest = History(problem, (), self.method.n_init, config.reference_point)
@@ -276,7 +274,7 @@ class Study:
             raise
         for trial in judging.begun(len(self.trials)):
             optunas, design = self.black_box.inject(trial.design, trial.number, trial.source, trial.proposal)
-            self._first_of.setdefault(self._same_arms.key(design), trial.number)
+            self._first_of.setdefault(design, trial.number)
             self._refined += trial.refines is not None
             self._under_way[trial.number] = _Begun(optunas, trial, None, None, 0.0, 0.0)
             if self._asker is not None and trial.proposal is not None:
@@ -376,10 +374,9 @@ class Study:
         refinement = self._refinement(number) if turn is None else None
         trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
-        arm = self._same_arms.key(design)
-        same_as = self._first_of.setdefault(arm, number)
+        same_as = self._first_of.setdefault(design, number)
         if same_as > number:  # one that workers were given in an earlier session, and that is recorded later
-            same_as = self._first_of[arm] = number
+            same_as = self._first_of[design] = number
         finished = _begun(number, source, design, turn)
         if same_as != number:
             finished = replace(finished, same_as=same_as, evaluations=0)

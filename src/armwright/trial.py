@@ -42,7 +42,7 @@ class FinishedTrial:
         feedback: how many finished trials the proposer knew, if not all before this one.
         refines: the trial whose design was refined for this one.
         evaluations: designs that were evaluated to find it: many for a refined one, none for a duplicate.
-        same_as: the earlier trial with the same arm, whose values it has.
+        same_as: the earlier trial with an equal design, whose values it has.
         seconds: wall time by part (total, proposing, sampling, evaluation).
         sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
         constraints: violation of each constraint; satisfied at <= 0.
