@@ -60,6 +60,7 @@ def changed(folder: Path, change: Callable[[dict], None]) -> None:
 
 
 def test_the_numbers_of_the_table_are_those_of_the_histories(runs: Path, comparison: Comparison) -> None:
+    assert comparison.rows
     for row in comparison.rows:
         proposer = "none" if row.method.startswith("BBO (") else "rules"
         summaries = [json.loads((runs / f"{row.task}-{proposer}-{s}/summary.json").read_text()) for s in SEEDS]
@@ -81,6 +82,7 @@ def test_shares_are_given_where_a_front_is_known(comparison: Comparison) -> None
 
 
 def test_contrasts_pair_the_seeds(comparison: Comparison) -> None:
+    assert comparison.contrasts
     for contrast in comparison.contrasts:
         ours, theirs = (
             [run.curve.mean() for run in comparison.of(method, contrast.task)]
@@ -116,6 +118,7 @@ def test_over_all_tasks_each_counts_once(runs: Path) -> None:
 
 
 def test_times_say_how_many_got_there(comparison: Comparison) -> None:
+    assert comparison.times
     for time in comparison.times:
         curves = comparison.curves(time.method, time.task)
         there = [next((i + 1 for i, v in enumerate(curve) if v >= time.hypervolume), None) for curve in curves]
@@ -181,6 +184,7 @@ def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest
     shared = tuple(max(values) for values in zip(*own, strict=True))
     assert found.widened == ["mine"]
     assert found.reference_point("mine") == shared
+    assert found.runs
     for run in found.runs:
         values = read_run(run.folder)[1].values
         if len(run.curve):  # pymoo's hypervolume, after each counted trial

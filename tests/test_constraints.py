@@ -265,6 +265,7 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     # on disk
     _, there = read_run(tmp_path / "run")
     assert list(there) == list(run.trials)
+    assert run.front
     for member in run.front:
         design = json.loads((tmp_path / "run" / "designs" / f"{member.number:04d}" / "design.json").read_text())
         assert list(design["constraints"].values()) == broken[member.number].tolist()

@@ -114,6 +114,7 @@ def test_without_a_proposer_there_is_nothing_to_diagnose() -> None:
 def test_designs_of_the_front(run: Run) -> None:
     written = sorted(path.name for path in (folder(run) / "designs").iterdir())
     assert written == sorted(f"{member.number:04d}" for member in run.front)
+    assert run.front
     for member in run.front:
         place = folder(run) / "designs" / f"{member.number:04d}"
         record = json.loads((place / "design.json").read_text())
