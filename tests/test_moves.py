@@ -324,6 +324,7 @@ def test_the_suggested_step_is_taken() -> None:
     Task.model_validate({"name": "x", "targets": targets, "moves": "in_order", "move_step": 0.023})
 
 
+@pytest.mark.slow
 def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
     text = f"name: line\ntargets: {[list(point) for point in CORNERS]}\nmoves: in_order\nobjectives: "
     (in_folder / "line.yaml").write_text(f"{text} [position_error, path_error]\n")

@@ -100,6 +100,7 @@ def test_a_run_completes_resumes_and_counts_right(tmp_path: Path, problem: Probl
     assert sum(gained) == pytest.approx(run.summary["hypervolume"]["final"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", [one(OPEN), three(OPEN)])
 def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, problem: Problem) -> None:
     run = short(problem, 12, tmp_path / "run")
@@ -199,6 +200,7 @@ def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path
         assert str(refusal.value).count("now called") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "names",
     [

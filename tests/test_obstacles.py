@@ -149,6 +149,7 @@ def test_the_paper_s_objectives_do_not_see_them() -> None:
     assert Problem(with_, objectives=(OBJECTIVES["collision"],)).uses(*OF_CLEARANCE)
 
 
+@pytest.mark.slow
 def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
     file = tmp_path / "way.yaml"
     said = {"name": "way", "targets": POINTS, "obstacles": RECORDS, "objectives": ["worst_error", "collision"]}
