@@ -15,8 +15,8 @@ LINK = uniform_link((0.0, 0.3, 0.4), 0.2, 0.015)
 @pytest.mark.parametrize(
     ("kind", "axis", "lower", "upper", "words"),
     [
-        ("revolute", "y", 1.0, -1.0, "reversed.*1.0 and -1.0 rad"),
-        ("revolute", "y", 0.5, 0.5, "lower < upper is needed"),
+        ("revolute", "y", 1.0, -1.0, "expected lower < upper, got 1.0 and -1.0 rad"),
+        ("revolute", "y", 0.5, 0.5, "expected lower < upper"),
         ("prismatic", "z", 0.2, 0.1, "0.2 and 0.1 m"),
         ("revolute", "y", -math.inf, 1.0, r"finite: \[-inf, 1.0\] rad"),
         ("prismatic", "y", 0.0, math.nan, r"finite: \[0.0, nan\] m"),

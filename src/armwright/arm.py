@@ -68,9 +68,7 @@ class Joint:
         if not (math.isfinite(self.lower) and math.isfinite(self.upper)):
             raise ArmError(f"joint limits must be finite: [{self.lower}, {self.upper}] {unit}")
         if self.kind != "fixed" and not self.lower < self.upper:
-            raise ArmError(
-                f"joint limits are reversed: expected lower < upper, got {self.lower} and {self.upper} {unit}"
-            )
+            raise ArmError(f"joint limits: expected lower < upper, got {self.lower} and {self.upper} {unit}")
         if not 0.0 < self.travel < math.inf or (self.kind != "prismatic" and self.travel != 1.0):
             raise ArmError(
                 f"travel = {self.travel} m/rad: expected a value above 0 for a prismatic joint, 1 for any other"
