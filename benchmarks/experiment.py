@@ -8,9 +8,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from armwright.cluster import Workers
 from armwright.experiment.outcome import collect, published
 from armwright.experiment.plan import cells_of, load_experiment, with_only, with_seeds
-from armwright.experiment.running import run_here
+from armwright.experiment.running import run_cells
 from armwright.report.tables import markdown
 
 
@@ -29,14 +30,14 @@ def main() -> None:
     print(table.split("## At the end")[0].split("## Hypervolume over the trials")[1].strip())
 
 
-def run(seeds: int, jobs: int) -> tuple[float, str]:
+def run(seeds: int, n_workers: int) -> tuple[float, str]:
     """The seconds that the cells take, and their tables."""
     plan, beside = load_experiment("paper")
     plan = with_seeds(with_only(plan, ["bbo", "rules"], []), seeds)
     with tempfile.TemporaryDirectory() as out:
         cells, _ = cells_of(plan, beside, Path(out))
         started = time.perf_counter()
-        faults = [outcome.fault for outcome in run_here(cells, jobs) if outcome.fault]
+        faults = [outcome.fault for outcome in run_cells(cells, Workers(n_workers), print) if outcome.fault]
         seconds = time.perf_counter() - started
         assert not faults, faults
         return seconds, markdown(collect(plan, cells), "", published(plan), plan.published_in)

@@ -3,10 +3,9 @@
     pip install mujoco
     armwright optimize target-1 --evaluator examples/mujoco_simulation.py:follow --n-total 50
 
-or, in several processes (the same on other machines, with --storage postgresql://...):
+or, in two processes (on other machines, with --scheduler tcp://HOST:PORT of a Dask cluster):
 
     armwright optimize target-1 --evaluator examples/mujoco_simulation.py:follow --workers 2
-    armwright worker runs/target-1-seed0 --evaluator examples/mujoco_simulation.py:follow     # twice
 
 Motors hold the joints by a PD law with limited torque. The arm begins straight and has a second for each target; what
 counts is how far its tip is from the target then, summed, and the work that its motors did.

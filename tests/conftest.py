@@ -16,10 +16,9 @@ from playwright.sync_api import Browser
 
 from tests import browser as browsers
 from tests.chat_server import ChatServer
-from tests.postgres import PostgresServer, binaries
 
 SLOW_FOLDERS = frozenset({"torture", "fuzz"})
-SLOW_FIXTURES = frozenset({"browser", "guide", "postgres"})
+SLOW_FIXTURES = frozenset({"browser", "guide", "shell"})
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -45,19 +44,6 @@ def chat_server() -> Iterator[ChatServer]:
     """An OpenAI-compatible server on 127.0.0.1 that answers as a test tells it."""
     with ChatServer() as server:
         yield server
-
-
-@pytest.fixture(scope="session")
-def postgres() -> Iterator[PostgresServer]:
-    """A real PostgreSQL, running."""
-    programs = binaries()
-    if programs is None:
-        pytest.skip("PostgreSQL is not installed (on Debian and Ubuntu: sudo apt install postgresql)")
-    server = PostgresServer(programs)
-    server.start()
-    yield server
-    server.stop()
-    server.remove()
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,6 @@ import pytest
 import yaml
 from rich.console import Console
 
-from armwright.cli import _same_command
 from armwright.console import show_result, watching
 from armwright.llm import chat
 from armwright.problem import Problem
@@ -350,21 +349,6 @@ def test_ctrl_c_ends_the_calls_under_way(
     transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
     kept = [(call["step"], call["requests"], call["fault"]) for call in map(json.loads, transcript)]
     assert kept == [("check", 1, None), ("reasoning", 1, None), ("parameters", 1, "cancelled")][: 2 + refused]
-
-
-@pytest.mark.parametrize(
-    ("given", "shown"),
-    [
-        ("postgresql://ada:secret@host/db", "postgresql://ada@host/db"),
-        ("--storage=postgresql+psycopg://ada:se@cret:x@host/db", "--storage=postgresql+psycopg://ada@host/db"),
-        ("postgresql://ada@host:5432/db", "postgresql://ada@host:5432/db"),
-        ("http://127.0.0.1:8000/v1", "http://127.0.0.1:8000/v1"),
-        ("--base-url=https://host:8000/a@b", "--base-url=https://host:8000/a@b"),
-    ],
-)
-def test_a_command_is_told_without_its_password(monkeypatch: pytest.MonkeyPatch, given: str, shown: str) -> None:
-    monkeypatch.setattr(sys, "argv", ["armwright", "optimize", given])
-    assert _same_command() == f"armwright optimize {shown}"
 
 
 DROPPED = """

@@ -2,18 +2,12 @@
 
 import csv
 import json
-import multiprocessing
-import os
 import shlex
-import signal
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -31,9 +25,9 @@ from armwright.experiment.plan import (
     with_only,
     with_seeds,
 )
-from armwright.experiment.running import finished_before, run_cell, run_here, run_on_dask
+from armwright.experiment.running import run_cell
 from armwright.task import builtin_tasks
-from tests.chat_server import Answer, ChatServer, Request, designer
+from tests.chat_server import ChatServer
 
 SMALL: dict[str, Any] = {
     "name": "small",
@@ -66,6 +60,11 @@ def asking(server: ChatServer, **settings: Any) -> dict[str, Any]:
 
 def invoke(*arguments: str | Path) -> Any:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def run_here(file: Path, *options: str) -> Any:
+    """The command for an experiment, whose cells run in this process."""
+    return invoke("experiment", file, "--workers", "0", "--no-figures", *options)
 
 
 def test_the_paper_s_experiment_is_the_paper_s() -> None:
@@ -152,9 +151,9 @@ def test_cells_without_a_model_are_skipped_and_said_so(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
     file = file_of(in_folder)
-    result = invoke("experiment", file, "--jobs", "2", "--no-figures")
+    result = invoke("experiment", file, "--workers", "2", "--no-figures")
     assert result.exit_code == 0, result.output
-    assert "8 cells: 8 to run, 2 at a time, 0 finished before, 0 skipped" in result.output
+    assert "8 cells: 8 to run on 2 local workers, 0 finished before, 0 skipped" in result.output
     assert "With fewer than six seeds, no test can reject at 5 %" in result.output
     out = in_folder / "experiments" / "small"
     rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
@@ -163,19 +162,19 @@ def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
     }
     stamps = {path: path.stat().st_mtime_ns for path in out.glob("runs/**/trials.jsonl")}
     assert len(stamps) == 8
-    again = invoke("experiment", file, "--no-figures")
+    again = run_here(file)
     assert "8 cells: nothing to run, 8 finished before" in again.output
     assert {path: path.stat().st_mtime_ns for path in stamps} == stamps
-    more = invoke("experiment", file, "--seeds", "3", "--method", "bbo", "--no-figures", "--json")
+    more = run_here(file, "--seeds", "3", "--method", "bbo", "--json")
     assert more.exit_code == 0
     assert json.loads(more.stdout)["cells"] == 6
 
 
 @pytest.mark.slow
 def test_a_changed_file_is_not_taken_for_the_run_that_lies_there(in_folder: Path) -> None:
-    assert invoke("experiment", file_of(in_folder, seeds=1, tasks=["random-3"]), "--no-figures").exit_code == 0
+    assert run_here(file_of(in_folder, seeds=1, tasks=["random-3"])).exit_code == 0
     methods = {**SMALL["methods"], "rules": {**SMALL["methods"]["rules"], "n_step": 2}}
-    result = invoke("experiment", file_of(in_folder, seeds=1, tasks=["random-3"], methods=methods), "--no-figures")
+    result = run_here(file_of(in_folder, seeds=1, tasks=["random-3"], methods=methods))
     assert result.exit_code == 1
     assert "FAILED: BBO/rules, random-3, seed 0" in result.output
     assert "n_step: 3 there, 2 asked" in result.output
@@ -186,7 +185,7 @@ def test_a_failing_cell_is_reported_and_does_not_stop_the_others(in_folder: Path
     blocked = in_folder / "experiments/small/runs/rules/target-1"
     blocked.mkdir(parents=True)
     (blocked / "seed1").write_text("a file where a folder should be")
-    result = invoke("experiment", file_of(in_folder), "--no-figures")
+    result = run_here(file_of(in_folder))
     assert result.exit_code == 1
     assert "FAILED: BBO/rules, target-1, seed 1" in result.output
     assert "Traceback" not in result.output
@@ -195,7 +194,7 @@ def test_a_failing_cell_is_reported_and_does_not_stop_the_others(in_folder: Path
     finished = list(in_folder.glob("experiments/small/runs/*/*/*/summary.json"))
     assert len(finished) == 7
     (blocked / "seed1").unlink()
-    mended = invoke("experiment", file_of(in_folder), "--no-figures")
+    mended = run_here(file_of(in_folder))
     assert mended.exit_code == 0
     assert "1 to run" in mended.output
 
@@ -213,10 +212,10 @@ def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
     assert [line.split()[0] for line in lines] == ["armwright"] * 3
     for line in lines:
         subprocess.run([sys.executable, "-m", *shlex.split(line), "--no-figures"], check=True, capture_output=True)
-    result = invoke("experiment", file, "--no-figures")
+    result = run_here(file)
     assert result.exit_code == 0, result.output
     # A search is asked again whether its budget is spent; nothing is computed.
-    assert "3 cells: 1 to run, " in result.output
+    assert "3 cells: 1 to run one after another, " in result.output
     assert "2 finished before" in result.output
     plan, beside = load_experiment(str(file))
     cells, _ = cells_of(plan, beside, in_folder / "experiments" / "small")
@@ -227,12 +226,12 @@ def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
 def test_a_recorded_experiment_is_played_again_without_a_model(in_folder: Path, chat_server: ChatServer) -> None:
     settings: dict[str, Any] = {"tasks": ["random-3"], "methods": {"llm": asking(chat_server)}}
     file = file_of(in_folder, **settings)
-    first = invoke("experiment", file, "--out", "first", "--no-figures")
+    first = run_here(file, "--out", "first")
     assert first.exit_code == 0, first.output
     assert "2 of them ask test-model for some 4 proposals in all" in first.output
     assert "[scripted]" in (in_folder / "first" / "table.md").read_text()
     chat_server.requests.clear()
-    again = invoke("experiment", file, "--out", "again", "--replay", "first", "--no-figures", "--seeds", "3")
+    again = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")
     assert again.exit_code == 0, again.output
     assert not chat_server.requests
     assert "skipped: BBO/LLM+, 1 cell: first holds no record of it" in again.output
@@ -240,130 +239,6 @@ def test_a_recorded_experiment_is_played_again_without_a_model(in_folder: Path, 
         runs = [in_folder / place / f"runs/llm/random-3/seed{seed}/trials.jsonl" for place in ("first", "again")]
         one, other = ([json.loads(line)["params"] for line in run.read_text().splitlines()] for run in runs)
         assert one == other
-
-
-def killing(server: ChatServer, workers: Iterator[int]) -> Any:
-    """Answers, but kills these processes before the first answer: while a cell is surely under way."""
-    once = threading.Lock()
-
-    def answer(request: Request) -> Answer:
-        if once.acquire(blocking=False):
-            for worker in workers:
-                os.kill(worker, signal.SIGKILL)
-        return designer(request)
-
-    return answer
-
-
-@pytest.mark.slow
-def test_a_killed_worker_s_cells_are_run_again(tmp_path: Path, chat_server: ChatServer) -> None:
-    plan = plan_of(tasks=["random-3"], methods={"llm": asking(chat_server)})
-    cells, _ = cells_of(plan, tmp_path, tmp_path)
-    others = {child.pid for child in multiprocessing.active_children()}
-    workers = (c.pid for c in multiprocessing.active_children() if c.pid is not None and c.pid not in others)
-    chat_server.answer = killing(chat_server, workers)
-    outcomes = list(run_here(cells, jobs=1))
-    assert [outcome.fault for outcome in outcomes] == ["", ""]
-    assert all(finished_before(cell) for cell in cells)
-    assert not {child.pid for child in multiprocessing.active_children()} - others
-
-
-@pytest.mark.slow
-def test_a_cell_that_always_kills_its_worker_is_given_up_and_the_others_are_not(
-    tmp_path: Path, chat_server: ChatServer
-) -> None:
-    methods = {"llm": asking(chat_server), **SMALL["methods"]}
-    cells, _ = cells_of(plan_of(tasks=["random-3"], seeds=1, methods=methods), tmp_path, tmp_path)
-    mine = os.getpid()
-
-    def answer(request: Request) -> Answer:
-        for child in multiprocessing.active_children():
-            if child.pid is not None and child.pid != mine:
-                os.kill(child.pid, signal.SIGKILL)
-        return designer(request)
-
-    chat_server.answer = answer
-    faults = {outcome.cell.method: outcome.fault for outcome in run_here(cells, jobs=2)}
-    assert faults["bbo"] == faults["rules"] == ""
-    assert "killed 3 times" in faults["llm"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT], ids=["kill", "Ctrl-C"])
-def test_workers_end_with_the_process_that_they_work_for(
-    tmp_path: Path, chat_server: ChatServer, how: signal.Signals
-) -> None:
-    file = file_of(tmp_path, tasks=["random-3"], seeds=1, methods={"llm": asking(chat_server)})
-    reached, released = threading.Event(), threading.Event()
-
-    def answer(request: Request) -> Answer:
-        reached.set()
-        released.wait(120)
-        return designer(request)
-
-    chat_server.answer = answer
-    command = [sys.executable, "-m", "armwright", "experiment", str(file), "--out", str(tmp_path / "out")]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert reached.wait(120)
-    workers = psutil.Process(process.pid).children(recursive=True)
-    assert workers
-    process.send_signal(how)
-    said, complained = process.communicate()
-    _, alive = psutil.wait_procs(workers, timeout=60)
-    released.set()
-    assert not alive
-    if how == signal.SIGINT:
-        assert process.returncode == 130
-        assert "Go on with:" in said
-        assert "Traceback" not in complained
-
-
-@pytest.mark.slow
-def test_dask_runs_a_killed_worker_s_cells_on_another_one(tmp_path: Path, chat_server: ChatServer) -> None:
-    plan = plan_of(tasks=["random-3"], methods={"llm": asking(chat_server)})
-    cells, _ = cells_of(plan, tmp_path, tmp_path / "out")
-    places = tmp_path / "scheduler.json"
-    dask = [sys.executable, "-m", "dask"]
-    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
-    flags = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(places)]
-    processes = [subprocess.Popen([*dask, "scheduler", "--port", "0", *flags], **quiet)]
-    try:
-        worker = [*dask, "worker", "--scheduler-file", str(places), "--no-nanny", "--nthreads", "1", "--no-dashboard"]
-        processes += [subprocess.Popen([*worker, "--host", "127.0.0.1"], **quiet) for _ in range(2)]
-        both = threading.Barrier(2)  # so that each of the two is in the middle of a cell
-        kill = killing(chat_server, iter([processes[1].pid]))
-
-        def answer(request: Request) -> Answer:
-            if len(chat_server.requests) <= 2:
-                both.wait(120)
-            return kill(request)
-
-        chat_server.answer = answer
-        address = address_of(places, processes[0])
-        outcomes = list(run_on_dask(cells, address))
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-    assert [outcome.fault for outcome in outcomes] == ["", ""]
-    assert all(finished_before(cell) for cell in cells)
-    assert processes[1].returncode == -signal.SIGKILL
-
-
-def address_of(places: Path, scheduler: subprocess.Popen[bytes]) -> str:
-    """The scheduler's address, once it has written it."""
-    while scheduler.poll() is None:
-        if places.is_file() and places.stat().st_size:
-            return str(json.loads(places.read_text())["address"])
-        threading.Event().wait(0.05)
-    raise AssertionError("the scheduler ended")
-
-
-def test_a_scheduler_that_is_not_there_is_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armwright.experiment.running.CONNECT_SECONDS", 0.5)
-    cells, _ = cells_of(plan_of(), tmp_path, tmp_path)
-    with pytest.raises(FailureError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
-        list(run_on_dask(cells, "tcp://127.0.0.1:9"))
 
 
 def test_nothing_finished_is_nothing_to_compare(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ import pytest
 import armwright as aw
 from armwright import extras
 from armwright.exceptions import MissingExtraError, UsageError
-from armwright.experiment.running import run_on_dask
 from armwright.extras import EXTRAS, missing_packages, needed
 from armwright.live import begin_server, serve
 from armwright.urdf.names import find_urdf
@@ -55,7 +54,7 @@ def test_packages_of_an_extra_are_in_its_distributions(extra: str) -> None:
 
 ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
     "arms": ("arms", "robot_descriptions", lambda: find_urdf("ur5e")),
-    "distributed": ("distributed", "distributed", lambda: list(run_on_dask([], "tcp://127.0.0.1:9"))),
+    "distributed": ("distributed", "distributed", lambda: aw.Workers(2)),
     "gp": ("gp", "torch", lambda: aw.optimize(aw.Problem(aw.load_task("target-1")), sampler="gp")),
     "page": ("live", "uvicorn", lambda: serve(Path("run"), print)),
     "page of a run": ("live", "starlette", lambda: begin_server(Path("run"))),

@@ -14,7 +14,7 @@ import numpy as np
 import optuna
 import pytest
 from optuna.samplers import NSGAIIISampler, NSGAIISampler, TPESampler
-from optuna.storages import InMemoryStorage, JournalStorage, RDBStorage
+from optuna.storages import InMemoryStorage, JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
@@ -158,12 +158,12 @@ def test_with_threads_each_block_has_exactly_one_proposal(sampler: optuna.sample
 WORKER = """
 import sys, warnings
 import optuna
-from optuna.storages import JournalStorage, RDBStorage
+from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 import armwright as aw
 
-kind, place, url, seed = sys.argv[1:]
-storage = RDBStorage(place) if kind == "postgres" else JournalStorage(JournalFileBackend(place))
+place, url, seed = sys.argv[1:]
+storage = JournalStorage(JournalFileBackend(place))
 sampler = optuna.samplers.NSGAIISampler(population_size=8, seed=int(seed))
 study = optuna.load_study(study_name="shared", storage=storage, sampler=sampler)
 
@@ -177,15 +177,12 @@ study.optimize(objective, n_trials=10, callbacks=[aw.ProposalCallback(proposer, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["postgres", "journal"])
-def test_several_processes_on_one_storage_share_the_proposals(
-    kind: str, chat_server: ChatServer, tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
+def test_several_processes_on_one_storage_share_the_proposals(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.125}, "reason": "an eighth"}'
-    place = request.getfixturevalue("postgres").database() if kind == "postgres" else str(tmp_path / "journal")
-    storage = RDBStorage(place) if kind == "postgres" else JournalStorage(JournalFileBackend(place))
+    place = str(tmp_path / "journal")
+    storage = JournalStorage(JournalFileBackend(place))
     study = optuna.create_study(study_name="shared", storage=storage, directions=["minimize"] * 2)
-    command = [sys.executable, "-c", WORKER, kind, place, chat_server.url]
+    command = [sys.executable, "-c", WORKER, place, chat_server.url]
     workers = [subprocess.Popen([*command, str(seed)]) for seed in range(3)]
     assert [worker.wait() for worker in workers] == [0, 0, 0]
     finished = [trial.number for trial in study.trials if trial.state.is_finished()]
@@ -199,9 +196,6 @@ def test_several_processes_on_one_storage_share_the_proposals(
     assert {trial.params["x"] for trial in came} == {0.125}
     assert {trial.state for trial in came} == {TrialState.COMPLETE}
     assert all("NSGAIISampler:generation" in trial.system_attrs for trial in came)
-    if isinstance(storage, RDBStorage):
-        storage.remove_session()
-        storage.engine.dispose()
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")

@@ -57,6 +57,7 @@ NEEDS = (
     ("llm", "experiment", "paper", "--model", "openai-chat:gpt-4o", "--out", "other"),
     ("llm", "draft", "reach a shelf", "--model", "openai-chat:gpt-4o"),
     ("distributed", "experiment", "two-methods.yaml", "--seeds", "3", "--scheduler", "tcp://127.0.0.1:9"),
+    ("distributed", "optimize", "target-1", "--workers", "2", "--out", "other"),
     ("gp", "optimize", "target-1", "--sampler", "gp", "--out", "other"),
     ("gp", "experiment", "gp.yaml"),
     ("arms", "compare-arms", "target-1", "ur5e"),
@@ -108,7 +109,7 @@ def main(folder: Path) -> None:
 
     armwright("front", "target-1", "--budget", "100000", "--out", "front")
     Path("two-methods.yaml").write_text(EXPERIMENT)
-    told = json.loads(armwright("experiment", "two-methods.yaml", "--jobs", "2", "--out", "cells", "--json").stdout)
+    told = json.loads(armwright("experiment", "two-methods.yaml", "--out", "cells", "--json").stdout)
     assert told
     armwright("compare", "cells", "--out", "compared")
     armwright("runs", ".")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from armwright.any_study.rules import StudyRulesProposer
     from armwright.arm import Arm, Joint, Link, uniform_link
     from armwright.buying import ArmComparison, ComparedArm, compare_arms
+    from armwright.cluster import Workers
     from armwright.comparison import Comparison, compare_runs
     from armwright.drafting import Draft, draft
     from armwright.evaluation import Evaluation, evaluate
@@ -48,8 +49,6 @@ if TYPE_CHECKING:
     from armwright.task import Task, builtin_tasks, load_task, random_task
     from armwright.trial import FinishedTrial
     from armwright.urdf.reading import UrdfArm, read_urdf
-    from armwright.workers.plan import Workers
-    from armwright.workers.worker import work
 
 # Where each public name lives. Modules load when a name of theirs is first used, so that the command line
 # answers at once and nobody pays for what is not used.
@@ -88,7 +87,7 @@ _PLACES = {
     "Task": "task",
     "UrdfArm": "urdf.reading",
     "UsageError": "exceptions",
-    "Workers": "workers.plan",
+    "Workers": "cluster",
     "builtin_tasks": "task",
     "compare_arms": "buying",
     "compare_runs": "comparison",
@@ -114,7 +113,6 @@ _PLACES = {
     "to_xacro": "export.xacro",
     "uniform_link": "arm",
     "verify_run": "results",
-    "work": "workers.worker",
     "write_figures": "report.figures",
     "write_report": "report.page",
 }
@@ -180,7 +178,6 @@ __all__ = [
     "to_xacro",
     "uniform_link",
     "verify_run",
-    "work",
     "write_figures",
     "write_report",
 ]

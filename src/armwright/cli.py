@@ -1,7 +1,6 @@
 """The command line: parses, calls, prints. Heavy imports wait until a command needs them."""
 
 import os
-import re
 import shlex
 import signal
 import sys
@@ -24,6 +23,7 @@ from armwright.exceptions import (
 )
 
 if TYPE_CHECKING:
+    from armwright.cluster import Workers
     from armwright.problem import Problem
 
 app = typer.Typer(
@@ -50,6 +50,8 @@ def main() -> NoReturn:
     try:
         app()
     except ArmwrightError as error:
+        for note in getattr(error, "__notes__", ()):  # the traceback of an evaluator's code
+            print(note, file=sys.stderr)
         print(f"armwright: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
     except OSError as fault:
@@ -138,6 +140,10 @@ EvaluatorName = Annotated[
     ),
 ]
 BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(help="Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight."),
+]
 
 
 @app.command()
@@ -147,16 +153,9 @@ def optimize(
     objectives: Objectives = None,
     evaluator: EvaluatorName = None,
     workers: Annotated[
-        int | None,
-        typer.Option(help="So many designs at a time are evaluated by other processes: armwright worker RUN."),
-    ] = None,
-    storage: Annotated[
-        str | None,
-        typer.Option(
-            help="With --workers: URL of a database that all of them reach, such as postgresql://user@host/database. "
-            "[default: ARMWRIGHT_STORAGE, else a SQLite file in the run folder]"
-        ),
-    ] = None,
+        int, typer.Option(help="Local processes that evaluate designs; 0: this process (extra distributed).")
+    ] = 0,
+    scheduler: Scheduler = None,
     sampler: Annotated[
         str, typer.Option(help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.")
     ] = "tpe",
@@ -240,7 +239,6 @@ def optimize(
     from armwright.proposers.choice import Wishes, choose_proposer
     from armwright.starts import read_design
     from armwright.study import optimize as run_study
-    from armwright.workers.plan import Workers
 
     words = view.stderr_console() if json_ else view.stdout_console()
     problem = _problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
@@ -251,8 +249,6 @@ def optimize(
     )  # fmt: skip
     if in_flight is not None and not overlap:
         raise SettingsError(f"--in-flight {in_flight} goes with --overlap")
-    if storage is not None and workers is None:
-        raise SettingsError("--storage goes with --workers")
     choice = choose_proposer(wishes)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     words.print(choice.reason)
@@ -274,7 +270,7 @@ def optimize(
                 start=starts,
                 on_model_failure=on_model_failure,
                 verify=verify,
-                workers=None if workers is None else Workers(workers, storage),
+                workers=_workers(workers, scheduler),
                 seed=seed,
                 out=folder,
                 watch=watch,
@@ -305,26 +301,6 @@ def optimize(
     elif run.resumed:
         words.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
     view.show_result(words, run, drawn)
-
-
-@app.command()
-def worker(
-    run: Annotated[Path, typer.Argument(help="A run folder that optimize --workers began, or a copy of it.")],
-    evaluator: EvaluatorName = None,
-    storage: Annotated[
-        str | None,
-        typer.Option(help="URL of the database.  [default: ARMWRIGHT_STORAGE, else as the run folder says]"),
-    ] = None,
-) -> None:
-    """Evaluate designs of RUN until its search is over. Start as many as you like, on any machine."""
-    from armwright.measuring import load_evaluator
-    from armwright.workers.plan import STORAGE_VARIABLE
-    from armwright.workers.worker import work
-
-    measured = None if evaluator is None else load_evaluator(evaluator)
-    url = storage or os.environ.get(STORAGE_VARIABLE)
-    done = work(run, measured, url, lambda words: print(words, flush=True))
-    print(f"the search is over; {done} designs were evaluated here")
 
 
 @app.command(name="prompt")
@@ -477,10 +453,14 @@ def experiment(
     replay: Annotated[
         Path | None, typer.Option(help="Folder of an earlier experiment, whose recorded calls stand for the model.")
     ] = None,
-    jobs: Annotated[int | None, typer.Option(help="Cells at a time.  [default: one a core]")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Run the cells on the Dask cluster at this address (tcp://HOST:PORT).")
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            help="Local processes that run the cells; 0: this process.  [default: one a core with the extra "
+            "distributed, else 0]"
+        ),
     ] = None,
+    scheduler: Scheduler = None,
     print_commands: Annotated[
         bool, typer.Option("--print-commands", help="Print one command for each cell that is to be run, and end.")
     ] = False,
@@ -497,9 +477,6 @@ def experiment(
     if print_:
         print(plan.builtin_text(name), end="")
         return
-    jobs = running.most_jobs() if jobs is None else jobs
-    if jobs < 1:
-        raise SettingsError(f"--jobs {jobs}: a whole number from 1 is needed")
     words = view.stderr_console() if json_ or print_commands else view.stdout_console()
     whole, beside = plan.load_experiment(name)
     chosen = plan.with_model(plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds), model, base_url)
@@ -508,14 +485,16 @@ def experiment(
     before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
     finished = {done.cell for done in before}
     due = [cell for cell in cells if cell not in finished]
-    view.show_plan(words, due, len(before), skipped, None if scheduler else jobs)
+    default = workers is None and scheduler is None
+    placed = running.default_workers(len(due)) if default else _workers(workers, scheduler)
+    view.show_plan(words, due, len(before), skipped, placed)
     if print_commands:
         print("\n".join(cell.command for cell in due))
         return
     failed: list[running.Outcome] = []
     try:
         outcome.write_plan(chosen, out)
-        ended = running.run_on_dask(due, scheduler) if scheduler else running.run_here(due, jobs)
+        ended = running.run_cells(due, placed, words.print)
         for number, done in enumerate(ended, start=1):
             view.show_outcome(words, done, number, len(due))
             failed += [done] if done.fault else []
@@ -990,12 +969,20 @@ def _problem(
     )
 
 
+def _workers(n_workers: int | None, scheduler: str | None) -> "Workers | None":
+    """What --workers and --scheduler stand for; None for this process."""
+    from armwright.cluster import Workers
+
+    if not n_workers and not scheduler:
+        return None
+    return Workers(n_workers or None, scheduler)
+
+
 def _same_command() -> str:
-    """The command that was given, for a shell; a database's password is not repeated."""
+    """The command that was given, for a shell."""
     program, *given = sys.argv
     called = ["python", "-m", "armwright"] if Path(program).name == "__main__.py" else [program]
-    url = r"^((--storage=)?(?!https?:)[a-z0-9+]+://[^:/@]*):.*@"
-    return shlex.join([*called, *(re.sub(url, r"\1@", word) for word in given)])
+    return shlex.join([*called, *given])
 
 
 def _print_json(content: Any) -> None:

@@ -19,9 +19,11 @@ from rich.text import Text
 from armwright.baselines import Baseline, baselines, baselines_of
 from armwright.buying import MEASURES, ArmComparison, ComparedArm
 from armwright.catalogue import ActuatorRecord
+from armwright.cluster import Workers
 from armwright.drafting import Draft
 from armwright.experiment.plan import Cell, Skipped
 from armwright.experiment.running import Outcome
+from armwright.extras import command, missing_packages
 from armwright.front import FrontProgress, FrontRun
 from armwright.history import FrontMember, History
 from armwright.objectives import OF_CLEARANCE, OF_MOVES, POSITION_ERROR, TORQUE, TORQUE_SCALE, UNCOVERED_FRACTION
@@ -159,12 +161,14 @@ def _show_places(console: Console, folder: Path | None, figures: Sequence[Path])
 
 
 def show_plan(
-    console: Console, due: Sequence[Cell], finished: int, skipped: Sequence[Skipped], jobs: int | None
+    console: Console, due: Sequence[Cell], finished: int, skipped: Sequence[Skipped], workers: Workers | None
 ) -> None:
-    """What an experiment is about to do."""
-    where = "on the cluster" if jobs is None else f"{jobs} at a time"
-    parts = [f"{len(due)} to run, {where}" if due else "nothing to run", f"{finished} finished before"]
+    """Say what an experiment is about to do."""
+    where = "one after another" if workers is None else f"on {workers.description}"
+    parts = [f"{len(due)} to run {where}" if due else "nothing to run", f"{finished} finished before"]
     console.print(f"{len(due) + finished + len(skipped)} cells: {', '.join(parts)}, {len(skipped)} skipped")
+    if len(due) > 1 and missing_packages("distributed"):
+        console.print(f"several at a time: {command('distributed')}")
     for note in notes_on_cells(skipped, ()):
         console.print(note)
     asking = [cell for cell in due if cell.plan.asks_a_model and cell.replay is None]

@@ -16,8 +16,8 @@
         ├── ModelError          a language model that cannot be used
         ├── ReplayError         a recorded run that cannot be played again, or not to the letter
         ├── ProposalError       a proposer gave no design; the trial becomes a black-box one
-        ├── EvaluatorError      an evaluator of one's own failed, or the workers that run it
-        └── StorageError        the database that workers share does not answer, or holds no such study
+        ├── EvaluatorError      a custom evaluator failed, or the workers that ran it were lost
+        └── ClusterError        a Dask cluster does not answer, was lost, or has other versions
 
 A message is one line in the user's words: it names the value with its unit, what is allowed, and the
 way out. What it repeats of files and answers cannot break the line, or speak to a terminal.
@@ -114,11 +114,14 @@ class ProposalError(FailureError):
 
 
 class EvaluatorError(FailureError):
-    """An evaluator of one's own failed, or the workers that run it."""
+    """A custom evaluator failed, or the workers that ran it were lost.
+
+    Where its code raised, the traceback is a note of the exception (`__notes__`).
+    """
 
 
-class StorageError(FailureError):
-    """The database that workers share does not answer, or holds no such study."""
+class ClusterError(FailureError):
+    """A Dask cluster does not answer, was lost, or has other versions than this process."""
 
 
 class AnswerPendingError(ArmwrightError):

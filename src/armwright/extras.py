@@ -9,7 +9,7 @@ from armwright.exceptions import MissingExtraError
 # The packages that an extra brings: as they are imported, and as they are installed.
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     "arms": {"robot_descriptions": "robot_descriptions", "xacrodoc": "xacrodoc"},
-    "distributed": {"distributed": "distributed", "psycopg": "psycopg"},
+    "distributed": {"cryptography": "cryptography", "distributed": "distributed"},
     "gp": {"greenlet": "greenlet", "torch": "torch"},
     "live": {"starlette": "starlette", "uvicorn": "uvicorn"},
     "llm": {

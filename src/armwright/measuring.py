@@ -8,14 +8,16 @@ def simulate(arm, task):
 
 import hashlib
 import importlib
+import importlib.abc
 import importlib.util
 import math
 import os
 import re
 import sys
+import traceback
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
@@ -45,6 +47,7 @@ class Evaluator:
     worst: what an arm counts for which the function raises, or gives what is no finite number; None: the run stops.
     version: of the file that it is from; empty where it is from none.
     place: as `load_evaluator` was given it.
+    source: of the file; a pickle holds it, so that other processes need no copy.
     """
 
     name: str
@@ -53,6 +56,16 @@ class Evaluator:
     worst: tuple[float, ...] | None = None
     version: str = field(default="", compare=False)
     place: str = field(default="", compare=False)
+    source: bytes = field(default=b"", compare=False, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle a file by its source, a module's evaluator by name, and any other by value."""
+        where, _, function = (self.place or self.name).rpartition(":")
+        if self.source:
+            return _from_source, (f"{Path(where).resolve()}:{function}", self.source)
+        if where != "__main__" and (self.place or getattr(sys.modules.get(where), function, None) is self):
+            return load_evaluator, (f"{where}:{function}",)
+        return Evaluator.__new__, (Evaluator,), self.__dict__
 
     def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
         """The objectives of an arm; EvaluatorError where the function fails, or asks for the end of its process."""
@@ -60,7 +73,9 @@ class Evaluator:
             with _staying():
                 made = self.measure(arm, task)
         except (Exception, SystemExit) as fault:
-            raise EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
+            failure = EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})")
+            failure.add_note(_traceback(fault))
+            raise failure from fault
         names = [objective.name for objective in self.objectives]
         values = _numbers(made)
         if len(values) != len(names):
@@ -109,21 +124,41 @@ def load_evaluator(place: str) -> Evaluator:
     where, _, function = place.rpartition(":")
     if not where or not function:
         raise SettingsError(f'--evaluator "{place}": FILE.py:FUNCTION or MODULE:FUNCTION is needed')
-    is_file = where.endswith(".py")
-    module = _file_module(Path(where)) if is_file else _module(where)
-    found = getattr(module, function, None)
-    if not isinstance(found, Evaluator):
-        there = [name for name, value in vars(module).items() if isinstance(value, Evaluator)]
-        if callable(found):
-            raise SettingsError(
-                f'{place} is a plain function: put @armwright.evaluator("OBJECTIVE [UNIT]", ...) above it'
-            )
-        known = f"Evaluators there: {', '.join(there)}" if there else "There is no evaluator"
-        raise SettingsError(f"{where} has no evaluator {function}.{did_you_mean(function, there)} {known}")
-    name = f"{Path(where).name if is_file else where}:{function}"
+    if where.endswith(".py"):
+        if not Path(where).is_file():
+            raise SettingsError(f"cannot read {where}: there is no such file")
+        return _from_source(place, Path(where).read_bytes())
+    module = _module(where)
+    found = _found(module, where, function)
     file = getattr(module, "__file__", None)
-    version = "" if file is None else hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12]
-    return Evaluator(name, found.measure, found.objectives, found.worst, version, place)
+    version = "" if file is None else _version(Path(file).read_bytes())
+    return replace(found, name=f"{where}:{function}", version=version, place=place)
+
+
+def _from_source(place: str, source: bytes) -> Evaluator:
+    """Load the evaluator of `file.py:function`, whether or not the file is here."""
+    where, _, function = place.rpartition(":")
+    found = _found(_file_module(Path(where), source), where, function)
+    name = f"{Path(where).name}:{function}"
+    return replace(found, name=name, version=_version(source), place=place, source=source)
+
+
+def _version(source: bytes) -> str:
+    return hashlib.sha256(source).hexdigest()[:12]
+
+
+def _found(module: ModuleType, where: str, function: str) -> Evaluator:
+    """The evaluator `function` of a module; SettingsError where there is none."""
+    found = getattr(module, function, None)
+    if isinstance(found, Evaluator):
+        return found
+    if callable(found):
+        raise SettingsError(
+            f'{where}:{function} is a plain function: put @armwright.evaluator("OBJECTIVE [UNIT]", ...) above it'
+        )
+    there = [name for name, value in vars(module).items() if isinstance(value, Evaluator)]
+    known = f"Evaluators there: {', '.join(there)}" if there else "There is no evaluator"
+    raise SettingsError(f"{where} has no evaluator {function}.{did_you_mean(function, there)} {known}")
 
 
 def _numbers(made: object) -> tuple[float, ...]:
@@ -164,14 +199,14 @@ def _objective(given: str, words: str, name: str) -> Objective:
             f'objective "{given}": a name of at most {LONGEST_NAME} small letters, digits and _, with its unit in '
             'brackets where it has one, is needed, such as "energy [J]"'
         )
-    if match[1] in OBJECTIVES:
-        raise SettingsError(f'objective "{match[1]}" is one of armwright\'s own; give another name')
+    own, unit = match[1], match[2] or ""
+    if own in OBJECTIVES:
+        raise SettingsError(f'objective "{own}" is one of armwright\'s own; give another name')
 
     def each(_: Evaluation) -> Array:
-        raise SettingsError(f"{match[1]} is measured by {name}, design by design, and only in `armwright optimize`")
+        raise SettingsError(f"{own} is measured by {name}, design by design, and only in `armwright optimize`")
 
-    label = match[1].replace("_", " ").capitalize()
-    return Objective(match[1], label, match[2] or "", f"E_{match[1]}", words, each, over="arm")
+    return Objective(own, own.replace("_", " ").capitalize(), unit, f"E_{own}", words, each, over="arm")
 
 
 def _module(name: str) -> ModuleType:
@@ -181,15 +216,27 @@ def _module(name: str) -> ModuleType:
         raise SettingsError(f"cannot import {name}: {type(fault).__name__}: {fault}") from fault
 
 
-def _file_module(path: Path) -> ModuleType:
+class _Source(importlib.abc.SourceLoader):
+    """Loads a module from source in memory; tracebacks show its lines where the file is missing."""
+
+    def __init__(self, path: Path, source: bytes) -> None:
+        self._path = path
+        self._source = source
+
+    def get_filename(self, fullname: str) -> str:
+        return str(self._path)
+
+    def get_data(self, path: str) -> bytes:
+        return self._source
+
+
+def _file_module(path: Path, source: bytes) -> ModuleType:
     """A Python file as a module; what lies beside it can be imported there, as where it is run as a program."""
-    if not path.is_file():
-        raise SettingsError(f"cannot read {path}: there is no such file")
     name = f"armwright_evaluator_{path.stem}"
     beside = str(path.resolve().parent)
     if beside not in sys.path:
         sys.path.insert(0, beside)
-    spec = importlib.util.spec_from_file_location(name, path)
+    spec = importlib.util.spec_from_loader(name, _Source(path, source))
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -199,6 +246,12 @@ def _file_module(path: Path) -> ModuleType:
     except (Exception, SystemExit) as fault:
         raise SettingsError(f"cannot load {path}: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
     return module
+
+
+def _traceback(fault: BaseException) -> str:
+    """Return the traceback of an evaluator's code, without our own frame."""
+    trace = fault.__traceback__
+    return "".join(traceback.format_exception(type(fault), fault, trace and trace.tb_next)).rstrip()
 
 
 def _place(fault: BaseException) -> str:

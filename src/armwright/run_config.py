@@ -76,21 +76,6 @@ class FrontMethod(BaseModel, frozen=True, extra="forbid"):
         return 0
 
 
-class WorkersRecord(BaseModel, frozen=True, extra="forbid"):
-    """Where the designs of a study wait for workers (`armwright worker`).
-
-    storage: the URL of the database that search and workers share, without its password.
-    study: the name of Optuna's study there.
-    at_a_time: designs under way at most.
-    heartbeat: [s] between two signs of life of a worker; it counts as dead after some without.
-    """
-
-    storage: str
-    study: str
-    at_a_time: int = Field(ge=1, le=10_000)
-    heartbeat: int = Field(default=10, ge=1, le=3600)
-
-
 class ObjectiveRecord(BaseModel, frozen=True, extra="forbid"):
     """An objective as a run's settings tell of it; its formula is code."""
 
@@ -122,7 +107,6 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     method: Method | FrontMethod
     seed: int
     evaluator: str | None = None  # of one's own that measured designs in place of ours, by name; never loaded from here
-    workers: WorkersRecord | None = None
     versions: dict[str, str]
     earlier_versions: list[dict[str, str]] = []  # of sessions that made earlier trials, where they were others
 
@@ -206,7 +190,6 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     content = config.model_dump(mode="json")
     content["task"] = {key: content["task"][key] for key in IDENTITY}
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
-    content["workers"] = None if content["workers"] is None else "evaluate"  # how many, and where, may change
     method = content.pop("method")
     method.pop("n_total", None)
     if method.get("begin_with"):

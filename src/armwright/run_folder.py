@@ -52,7 +52,6 @@ class RunFolder:
         self._lock = FileLock(path / LOCK)
         self._place: os.stat_result | None = None
         self._trials: BinaryIO | None = None
-        self._is_new = False
 
     def __enter__(self) -> Self:
         try:
@@ -83,14 +82,9 @@ class RunFolder:
         if not self._holds_run():
             self._check_free()
             self.write_config(config)
-            self._is_new = True
             return config
         there = read_config(self.path)
         check_same_run(self.path, there, config)
-        if config.workers is not None and there.workers is not None and config.workers != there.workers:
-            workers = config.workers.model_copy(update={"study": there.workers.study})  # where its designs lie
-            there = there.model_copy(update={"workers": workers})
-            self.write_config(there)
         if config.method != there.method:  # a larger n_total
             if self._n_trials() > there.study.n_trials:
                 raise RunConflictError(
@@ -99,11 +93,6 @@ class RunFolder:
             there = there.model_copy(update={"method": config.method})
             self.write_config(there)
         return there
-
-    def forget(self) -> None:
-        """Takes the settings of a run away that could not begin; those of an earlier session stay."""
-        if self._is_new:
-            (self.path / CONFIG).unlink(missing_ok=True)
 
     def note_versions(self, config: RunConfig, evaluator: Evaluator | None = None) -> RunConfig:
         """The configuration of a run that goes on: where the versions are others now, those before are noted."""
@@ -115,10 +104,8 @@ class RunFolder:
         return config
 
     def _holds_run(self) -> bool:
-        """Whether a run lies here that came to a trial, or a first state of its search, or whose workers may have."""
-        if (self.path / SEARCH).exists() or self._n_trials():
-            return True
-        return (self.path / CONFIG).is_file() and read_config(self.path).workers is not None
+        """Whether a run lies here that came to a trial, or a first state of its search."""
+        return (self.path / SEARCH).exists() or self._n_trials() > 0
 
     def _n_trials(self) -> int:
         trials = self.path / TRIALS

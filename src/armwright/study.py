@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from armwright.arrays import Array
+from armwright.cluster import Workers
 from armwright.control import Channel
-from armwright.exceptions import ArmwrightError, ModelError, SettingsError, StoppedError
+from armwright.dask_backend import DaskBackend
+from armwright.evaluation_backend import Evaluated, EvaluationBackend, InProcessBackend
+from armwright.exceptions import ModelError, SettingsError, StoppedError
 from armwright.history import BBO, POLISH, RANDOM, START, FrontMember, History
-from armwright.judging import Here, Judged, Judging
 from armwright.parameters import Design
 from armwright.pareto import FrontTracker
 from armwright.problem import Outcome, Problem
@@ -25,17 +27,16 @@ from armwright.proposers.choice import choose_proposer
 from armwright.proposers.proposer import Proposer
 from armwright.refining import Refinement, refine_one
 from armwright.results import discard_results, read_summary, results_are_there, summarize, write_results
-from armwright.run_config import Method, RunConfig, WorkersRecord, record_objectives, versions
+from armwright.run_config import Method, RunConfig, record_objectives, versions
 from armwright.run_folder import RunFolder
 from armwright.sampling import BlackBox, SamplerFactory, sampler_name
 from armwright.trial import FinishedTrial
 from armwright.turns import Asker, Nobody, Recorded, Schedule, Turn, Turns, asking_turns, past_turns
 from armwright.verification import verify_front
-from armwright.workers.plan import Workers
 
 LARGEST = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
-PAUSE_SECONDS = 0.1  # between two looks at what is asked of a paused study
+LOOK_SECONDS = 0.1  # between two looks at what the watcher asks for, while there is nothing else to do
 
 
 @dataclass(frozen=True)
@@ -62,20 +63,26 @@ class Progress:
 
 
 @dataclass
-class _Begun:
-    """A trial that is under way.
+class _Pending:
+    """A trial that has begun and is not recorded.
 
-    trial: Optuna's.  finished: the trial as far as it is known.
-    proposing, sampling: seconds so far.
+    Attributes:
+        optuna_trial: Optuna's object.
+        trial: the trial as far as it is known; it has values once it is evaluated.
+        turn: the proposer's turn, if it was one.
+        proposing: seconds spent on the proposal.
+        sampling: seconds spent in the sampler.
     """
 
-    trial: Any
-    finished: FinishedTrial
+    optuna_trial: Any
+    trial: FinishedTrial
     turn: Turn | None
-    refinement: Refinement | None
     proposing: float
     sampling: float
-    judged: Judged | None = None
+
+    @property
+    def is_evaluated(self) -> bool:
+        return bool(self.trial.values)
 
 
 @dataclass(frozen=True)
@@ -131,7 +138,7 @@ def optimize(
     polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
     start: designs to begin with, such as an arm that is there already: the first of the n_init trials are theirs.
     verify: whether the front is verified where results are written (`verification.py`); not with an evaluator.
-    workers: processes that evaluate in place of this one (`armwright worker`); needs `out`.
+    workers: processes that evaluate designs in place of this one.
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials; a run
         that has begun always goes on.
 
@@ -158,9 +165,9 @@ def optimize(
         problem.space.design(design)  # says what is wrong before anything is begun
     if problem.evaluator is not None and method.polish_every is not None:
         raise SettingsError("--polish-every does not go with an evaluator: a refinement takes a thousand evaluations")
-    check_workers(workers, method, out)
-    record = None if workers is None or out is None else workers.record(Path(out))
-    config = study_config(problem, method, seed, record)
+    if workers is not None and in_flight is not None:
+        raise SettingsError("--overlap does not go with --workers: these go on while a question is asked")
+    config = study_config(problem, method, seed)
     with ExitStack() as stack:
         folder = None
         if out is not None:
@@ -207,8 +214,9 @@ class Study:
         for row in self._history().masked_objectives:
             self._tracker.add(row)
         self._freeze_reference_point()
-        self._judging: Judging = Here(problem)
-        self._under_way: dict[int, _Begun] = {}  # by number; a trial is recorded when all before it are
+        self._backend: EvaluationBackend = InProcessBackend(problem)
+        self._pending: dict[int, _Pending] = {}  # by number; a trial is recorded when all before it are
+        self._is_paused = False
 
     @property
     def n_trials(self) -> int:
@@ -229,7 +237,7 @@ class Study:
             self._channel.say("stopped", len(self.trials), None if meant else str(end) or type(end).__name__)
             raise
         finally:
-            self._judging.close()
+            self._backend.close()
         self._channel.finish(len(self.trials))
         return run
 
@@ -239,84 +247,67 @@ class Study:
         if self.proposer is not None:
             self._check(on_model_failure)
         self._begin()
-        if self.workers is not None and self.config.workers is not None:
-            self._judging = self._with_workers(self.workers, self.config.workers)
+        if self.workers is not None:
+            self._backend = DaskBackend(self.problem, self.workers, self._notify)
         with closing(self._turns()) as turns:
             for number in range(first, self.n_trials):
-                if number < len(self.trials) or number in self._under_way:
-                    continue  # it was begun in an earlier session
-                self._record_ready(turns)  # one that is an earlier one's arm waits for nobody
-                while not self._may_begin(number):
-                    self._hear()
-                    self._record_ready(turns)
-                self._obey(number)
+                self._wait_for_room(number, turns)
                 self._begin_trial(number, turns)
-                if self._n_waited_for and self._under_way[number].finished.same_as is not None:
-                    self._hear()  # else many such trials would be begun without what is known meanwhile
-            while self._n_waited_for:
-                self._hear()
-                if self._n_waited_for:
-                    self._record_ready(turns)
-            self._judging.finish()  # before the last is recorded: else a kill here would leave workers waiting
-            self._record_ready(turns)
+            while self._pending:
+                self._take_results(turns, LOOK_SECONDS)
 
-    def _with_workers(self, workers: Workers, record: WorkersRecord) -> Judging:
-        """The workers; what they did in earlier sessions, and what they do still, is under way."""
-
-        def say(words: str) -> None:
-            self._report("beginning", len(self.trials), "", note=words)
-
-        assert self.folder is not None
-        try:
-            judging = workers.begin(self.problem, record, say)
-        except ArmwrightError:  # there is no such database
-            self.folder.forget()
-            raise
-        for trial in judging.begun(len(self.trials)):
-            optunas, design = self.black_box.inject(trial.design, trial.number, trial.source, trial.proposal)
-            self._first_of.setdefault(design, trial.number)
-            self._refined += trial.refines is not None
-            self._under_way[trial.number] = _Begun(optunas, trial, None, None, 0.0, 0.0)
-            if self._asker is not None and trial.proposal is not None:
-                self._asker.entered(trial.proposal)
-        say(workers.command(self.folder.path, self.problem.evaluator))
-        return judging
+    def _wait_for_room(self, number: int, turns: Turns) -> None:
+        """Take results until trial `number` may begin; StoppedError if the watcher ended the session."""
+        self._take_results(turns, 0.0)
+        while not self._may_begin(number):
+            self._take_results(turns, LOOK_SECONDS)
+        self._channel.say("evaluating", number)
 
     def _may_begin(self, number: int) -> bool:
-        """Whether there is room for one more trial; what depends on the random ones waits for all of them."""
-        if self.method.n_init == number and self._n_waited_for:
-            return False
-        return self._n_waited_for < self._judging.at_a_time
+        """Return whether the watcher allows one more trial and a worker is free for it.
 
-    @property
-    def _n_waited_for(self) -> int:
-        """Trials that are being judged."""
-        return sum(begun.judged is None and begun.finished.same_as is None for begun in self._under_way.values())
-
-    def _hear(self) -> None:
-        """Takes what has been judged."""
-        for number, judged in self._judging.results().items():
-            self._tell(self._under_way[number], judged)
-
-    def _record_ready(self, turns: Turns) -> None:
-        """Records the trials before which nothing is missing any more."""
-        while (begun := self._under_way.get(len(self.trials))) is not None and self._is_ready(begun):
-            del self._under_way[len(self.trials)]
-            self._record(begun, turns)
-
-    def _obey(self, number: int) -> None:
-        """Waits as long as the watcher wants the study paused; StoppedError where it is to end."""
+        The first counted trial waits for all random ones, on which it depends.
+        """
         asked = self._channel.asked()
-        if asked.paused and not asked.stop:
-            self._channel.say("paused", number)
-            self._report("paused", number, "", note="paused by its watcher, who can let it go on; Ctrl-C ends it")
-        while asked.paused and not asked.stop:
-            time.sleep(PAUSE_SECONDS)
-            asked = self._channel.asked()
         if asked.stop:
+            if self._pending:
+                return False
             assert self.folder is not None
             raise StoppedError(self.folder.path)
-        self._channel.say("evaluating", number)
+        if asked.paused and not self._is_paused:
+            self._channel.say("paused", number)
+            self._report("paused", number, "", note="paused by its watcher, who can let it go on; Ctrl-C ends it")
+        self._is_paused = asked.paused
+        if asked.paused or (self._pending and number == self.method.n_init):
+            return False
+        return sum(not pending.is_evaluated for pending in self._pending.values()) < self._backend.capacity
+
+    def _take_results(self, turns: Turns, timeout: float) -> None:
+        """Tell the sampler all results that there are, and record what can be.
+
+        Args:
+            turns: asked how many questions are under way.
+            timeout: how long to wait for the first result [s].
+        """
+        while (result := self._backend.next_result(timeout)) is not None:
+            number, evaluated = result
+            self._tell(self._pending[number], evaluated)
+            for pending in self._pending.values():
+                if pending.trial.same_as == number and not pending.is_evaluated:
+                    self._tell(pending, Evaluated(evaluated.outcome, 0.0))
+            self._record_ready(turns)
+            timeout = 0.0
+        self._record_ready(turns)  # duplicates have no result of their own
+
+    def _record_ready(self, turns: Turns) -> None:
+        """Record the trials before which none is missing."""
+        while (pending := self._pending.get(len(self.trials))) is not None and pending.is_evaluated:
+            del self._pending[len(self.trials)]
+            self._record(pending, turns)
+
+    def _notify(self, note: str) -> None:
+        """Pass on news from the workers."""
+        self._report("beginning", len(self.trials), "", note=note)
 
     def _check(self, on_model_failure: str) -> None:
         """Says what the proposals will take, and makes sure that they are to be had."""
@@ -366,58 +357,52 @@ class Study:
         self.config = self.folder.note_versions(self.config, self.problem.evaluator)
 
     def _begin_trial(self, number: int, turns: Turns) -> None:
-        """The next trial: whose turn it is, its design, and, where that is new, somebody who judges it."""
+        """Choose the design of a trial and start its evaluation; a duplicate takes the values of the first."""
         started = time.perf_counter()
         turn = turns.next(number)
         self._channel.say("evaluating", number, _fault_words(turn))
         proposed = time.perf_counter()
         refinement = self._refinement(number) if turn is None else None
-        trial, design, source = self._ask(number, turn, refinement)
+        optuna_trial, design, source = self._ask(number, turn, refinement)
         sampled = time.perf_counter()
-        same_as = self._first_of.setdefault(design, number)
-        if same_as > number:  # one that workers were given in an earlier session, and that is recorded later
-            same_as = self._first_of[design] = number
-        finished = _begun(number, source, design, turn)
-        if same_as != number:
-            finished = replace(finished, same_as=same_as, evaluations=0)
+        first = self._first_of.setdefault(design, number)
+        trial = _begun(number, source, design, turn)
+        if first != number:
+            trial = replace(trial, same_as=first, evaluations=0)
         if refinement is not None:
-            finished = replace(
-                finished, refines=refinement.refines, evaluations=finished.evaluations + refinement.evaluations
-            )
-        self._under_way[number] = _Begun(trial, finished, turn, refinement, proposed - started, sampled - proposed)
-        if same_as == number:
-            self._judging.post(finished)
+            trial = replace(trial, refines=refinement.refines, evaluations=trial.evaluations + refinement.evaluations)
+        pending = _Pending(optuna_trial, trial, turn, proposed - started, sampled - proposed)
+        self._pending[number] = pending
+        if first == number:
+            self._backend.submit(number, design)
+            return
+        known = self._pending[first].trial if first in self._pending else self.trials[first]
+        if known.values:
+            self._tell(pending, Evaluated(Outcome(known.values, known.constraints, known.failure), 0.0))
 
-    def _tell(self, begun: _Begun, judged: Judged) -> None:
-        """Lets the black box learn from a trial at once, whatever is before it."""
+    def _tell(self, pending: _Pending, evaluated: Evaluated) -> None:
+        """Let the sampler learn from a trial at once, whatever is before it."""
         started = time.perf_counter()
-        noted = self.black_box.tell(begun.trial, judged.judgement.values, judged.judgement.violations)
-        begun.sampling += time.perf_counter() - started
-        begun.judged = judged
-        begun.finished = replace(
-            begun.finished,
-            values=judged.judgement.values,
-            constraints=judged.judgement.violations,
-            failure=judged.judgement.failure,
+        outcome = evaluated.outcome
+        noted = self.black_box.tell(pending.optuna_trial, outcome.values, outcome.violations)
+        sampling = pending.sampling + time.perf_counter() - started
+        pending.trial = replace(
+            pending.trial,
+            values=outcome.values,
+            constraints=outcome.violations,
+            failure=outcome.failure,
             sampler_notes=noted,
             seconds={
-                "total": round(begun.proposing + begun.sampling + judged.seconds, 6),
-                "sampling": round(begun.sampling, 6),
-                "evaluation": round(judged.seconds, 6),
-                "proposing": round(begun.proposing, 6),
+                "total": round(pending.proposing + sampling + evaluated.seconds, 6),
+                "sampling": round(sampling, 6),
+                "evaluation": round(evaluated.seconds, 6),
+                "proposing": round(pending.proposing, 6),
             },
         )
 
-    def _is_ready(self, begun: _Begun) -> bool:
-        """Whether the trial that is recorded next has its values; if it is an earlier one's arm, they are known."""
-        if begun.judged is None and begun.finished.same_as is not None:
-            known = self.trials[begun.finished.same_as]
-            self._tell(begun, Judged(Outcome(known.values, known.constraints, known.failure), 0.0))
-        return begun.judged is not None
-
-    def _record(self, begun: _Begun, turns: Turns) -> None:
-        """Writes a trial whose values are known: from now on it is part of the run."""
-        finished, turn = begun.finished, begun.turn
+    def _record(self, pending: _Pending, turns: Turns) -> None:
+        """Write a trial whose values are known: from now on it is part of the run."""
+        finished, turn = pending.trial, pending.turn
         if self.folder is not None:
             self.folder.append(finished)
         self._count(finished)
@@ -545,17 +530,7 @@ def study_method(
     )
 
 
-def check_workers(workers: Workers | None, method: Method, out: str | Path | None) -> None:
-    """SettingsError where workers do not go with the rest."""
-    if workers is None:
-        return
-    if out is None:
-        raise SettingsError("workers need a run folder (out): it tells them what to evaluate")
-    if method.in_flight is not None:
-        raise SettingsError("--overlap does not go with --workers: these go on while a question is asked")
-
-
-def study_config(problem: Problem, method: Method, seed: int, workers: WorkersRecord | None = None) -> RunConfig:
+def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
     """The settings of a new run."""
     return RunConfig(
         task=problem.task,
@@ -567,7 +542,6 @@ def study_config(problem: Problem, method: Method, seed: int, workers: WorkersRe
         method=method,
         seed=whole("seed", seed, 0),
         evaluator=None if problem.evaluator is None else problem.evaluator.name,
-        workers=workers,
         versions=versions(problem.evaluator),
     )
 

@@ -87,9 +87,7 @@ def trial_line(trial: FinishedTrial) -> bytes:
     )
 
 
-def parse_trial(
-    line: bytes, number: int | None, space: DesignSpace, n_objectives: int, n_constraints: int
-) -> FinishedTrial:
+def parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int, n_constraints: int) -> FinishedTrial:
     """Return the trial of a line.
 
     Raises:
@@ -101,6 +99,6 @@ def parse_trial(
         raise ValueError(f"expected {n_objectives} values, found {len(trial.values)}")
     if len(trial.constraints) != n_constraints:
         raise ValueError(f"expected {n_constraints} violations, found {len(trial.constraints)}")
-    if number is not None and trial.number != number:
+    if trial.number != number:
         raise ValueError(f"expected trial number {number}, found {trial.number}")
     return replace(trial, design=space.design(trial.design.params))

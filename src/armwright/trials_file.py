@@ -1,31 +1,16 @@
 """Read and write trials.jsonl: one line a finished trial, written before the next begins."""
 
-import json
 import os
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
 
 from armwright.exceptions import DesignError, RunFolderError
 from armwright.run_config import RunConfig
 from armwright.space import DesignSpace
-from armwright.trial import FinishedTrial, parse_trial, trial_line
+from armwright.trial import FinishedTrial, parse_trial
 
 TRIALS = "trials.jsonl"
-
-
-def begun_record(trial: FinishedTrial) -> dict[str, Any]:
-    """Return a trial that has no values yet, for `read_begun` in another process."""
-    return json.loads(trial_line(trial))
-
-
-def read_begun(record: Any, space: DesignSpace) -> FinishedTrial:
-    """Return the trial of a record; RunFolderError if it is none of this space."""
-    try:
-        return parse_trial(json.dumps(record).encode(), None, space, 0, 0)
-    except (ValueError, DesignError) as fault:
-        raise RunFolderError(f"a trial that was posted for workers is damaged: {_message(fault)}") from fault
 
 
 def read_trials(

@@ -93,17 +93,11 @@ class Asker:
         self._seed = seed
         self._tell = tell
         self._given_up: str | None = None  # the kind of that fault
-        self._entered: set[str] = set()  # proposals of trials that are under way
         self._lock = threading.Lock()
 
     def unused(self, history: History) -> list[Turn]:
         """The turns of proposals of earlier sessions that no trial has used yet."""
-        unused = [p for p in self._proposer.unused(history) if p.id not in self._entered]
-        return [Turn(p.asked, p.known or 0, p, note=p.note) for p in unused]
-
-    def entered(self, proposal: str) -> None:
-        """A proposal of an earlier session is a trial that is under way, which no history tells of yet."""
-        self._entered.add(proposal)
+        return [Turn(p.asked, p.known or 0, p, note=p.note) for p in self._proposer.unused(history)]
 
     def ask(self, history: History, number: int) -> list[Turn]:
         """The turns that come of asking for trial `number` after `history`: one a design, or one with a fault."""

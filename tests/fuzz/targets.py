@@ -720,7 +720,7 @@ def argument_seeds() -> list[bytes]:
     return [json.dumps(line).encode() for line in lines]
 
 
-NEVER = ("live", "--live", "--call", "--scheduler")  # they wait for others
+NEVER = ("live", "--live", "--call", "--scheduler", "--workers")  # they wait for others, or begin processes
 
 
 def run_arguments(data: bytes) -> None:

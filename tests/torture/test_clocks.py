@@ -88,6 +88,7 @@ def test_a_search_and_an_experiment_under_a_clock_that_jumps(
     plan = tmp_path / "small.yaml"
     content = {"name": "small", "tasks": ["target-1"], "seeds": 1, "n_init": 4, "n_total": 6}
     plan.write_text(yaml.safe_dump({**content, "methods": {"rules": {"label": "R", "proposer": "rules", "n_step": 3}}}))
-    done = armwright("experiment", plan, "--no-figures", "--out", tmp_path / "experiment", environment=clock)
+    here = ("--workers", "0", "--no-figures", "--out", tmp_path / "experiment")
+    done = armwright("experiment", plan, *here, environment=clock)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     record_property("clock", "jumps between 70 years ago and 100 years ahead, every 0.02 s")

@@ -36,7 +36,8 @@ Tell = Callable[[str, object], None]
 SHARES = {
     "optimize, rules": 0.2,
     "optimize, NSGA-II": 0.15,
-    "optimize, a larger --n-total": 0.1,
+    "optimize, a larger --n-total": 0.05,
+    "optimize, a local worker": 0.05,
     "optimize, a model": 0.125,
     "optimize, a model with --overlap": 0.125,
     "front": 0.15,
@@ -104,6 +105,12 @@ def test_a_study_that_was_finished_and_is_extended(
             begin, lambda folder: max(0.0, (n_lines(folder / "trials.jsonl") - 25) / 30), is_beginning, is_same_run
         ),
     )
+
+
+def test_a_study_with_a_local_worker(torture: Callable[[str, Scenario], Counter[str]]) -> None:
+    """Killed: its process, its worker, or all at once."""
+    scenario = study(40, "--proposer", "rules", "--workers", "1", "--no-figures")
+    torture("optimize, a local worker", replace(scenario, victims=("process", "worker", "all")))
 
 
 def thoughtful(request: Request) -> Answer:
@@ -258,7 +265,7 @@ def test_an_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp_pat
     torture(
         "experiment",
         Scenario(
-            lambda folder: ["experiment", str(file), "--jobs", "2", "--no-figures", "--out", str(folder)],
+            lambda folder: ["experiment", str(file), "--workers", "2", "--no-figures", "--out", str(folder)],
             progress, check, same, victims=victims,
         ),
     )  # fmt: skip

@@ -1,22 +1,17 @@
-"""Runs cells: here in a pool of processes, or on the workers of a Dask cluster."""
+"""Runs cells: in this process, or on workers."""
 
-import multiprocessing
-import os
-import signal
-import threading
 import time
-from collections import Counter
-from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, cast
+from typing import Any
 
-from armwright.exceptions import ArmwrightError, FailureError
+from armwright.cluster import MOST_LOSSES, Cluster, Finished, Workers
+from armwright.exceptions import ArmwrightError
 from armwright.experiment.plan import Cell
-from armwright.extras import needed
+from armwright.extras import missing_packages
 from armwright.front import find_front
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem import Problem
@@ -30,9 +25,7 @@ from armwright.study import optimize, study_config, study_method
 from armwright.task import load_task
 from armwright.tolerance import TOLERANCE
 
-MOST_DEATHS = 3  # of workers that had the same cell; with the last one it is alone
-THREADS = "OMP_NUM_THREADS"  # which our kernels obey, too
-CONNECT_SECONDS = 20.0
+LOOK_SECONDS = 1.0  # between two looks whether the cluster is still there
 
 
 @dataclass(frozen=True)
@@ -116,111 +109,46 @@ def _check_extras(cells: Sequence[Cell]) -> None:
             import_module("armwright.llm.chat")
 
 
-def run_here(cells: Sequence[Cell], jobs: int) -> Iterator[Outcome]:
-    """Runs cells in `jobs` processes with one thread each, and tells of each as it ends.
+def run_cells(cells: Sequence[Cell], workers: Workers | None, notify: Callable[[str], None]) -> Iterator[Outcome]:
+    """Run cells, and return the outcome of each as it ends.
 
-    A cell whose worker is killed is run again, and goes on from its last finished trial.
+    A cell whose worker is lost is run again by another worker, which resumes from its last finished trial.
+
+    Args:
+        cells: what to run.
+        workers: where; None for one after another in this process.
+        notify: called with news of the workers for the user.
+
+    Raises:
+        ClusterError: the workers did not start, or the scheduler was lost.
     """
     _check_extras(cells)
-    deaths: Counter[Cell] = Counter()
-    waiting = list(cells)
-    while waiting:
-        trusted = [cell for cell in waiting if deaths[cell] < MOST_DEATHS - 1]
-        # What was there when workers died more than once is run alone, so that it alone is to blame.
-        batch, size = (trusted, jobs) if trusted else (waiting[:1], 1)
-        done: set[Cell] = set()
-        for cell, outcome in _in_pool(batch, size):
-            if outcome is not None:
-                done.add(cell)
-                yield outcome
-                continue
-            deaths[cell] += 1
-            if deaths[cell] == MOST_DEATHS:
-                done.add(cell)
-                yield Outcome(cell, 0.0, fault=f"its process was killed {MOST_DEATHS} times (out of memory?)")
-        waiting = [cell for cell in waiting if cell not in done]
+    if workers is None or not cells:
+        return map(run_cell, cells)
+    return _run_on(workers, cells, notify)
 
 
-def _in_pool(cells: Sequence[Cell], jobs: int) -> Generator[tuple[Cell, Outcome | None]]:
-    """The outcomes of one pool's life; None for those that ran when a worker was killed, nothing for those after."""
-    others = set(multiprocessing.active_children())
-    futures: dict[Future[Outcome], Cell] = {}
-    waiting = iter(cells)
-    with _one_thread_each():
-        pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), initializer=_begin_worker)
-        try:
-            # No more at a time than there are workers, so that what was given is what ran.
-            _give(pool, futures, waiting, jobs)
-            while futures:
-                future = next(as_completed(futures))
-                outcome = future.result()
-                yield futures.pop(future), outcome
-                _give(pool, futures, waiting, 1)
-            pool.shutdown()
-        except BrokenProcessPool:
-            yield from ((cell, None) for cell in futures.values())
-        finally:
-            for worker in set(multiprocessing.active_children()) - others:
-                worker.kill()  # finished trials are on disk
-            pool.shutdown(wait=False, cancel_futures=True)
+def _run_on(workers: Workers, cells: Sequence[Cell], notify: Callable[[str], None]) -> Iterator[Outcome]:
+    with closing(Cluster(workers, notify)) as cluster:
+        waiting = deque(cells)
+        while waiting or cluster.n_in_flight:
+            # A worker has no cell beside the one that it runs, which would be blamed with it for its end.
+            while waiting and cluster.n_in_flight < cluster.capacity:
+                cell = waiting.popleft()
+                cluster.submit(cell, cell.words, run_cell, cell)
+            finished = cluster.wait(LOOK_SECONDS)
+            if finished is not None:
+                yield _outcome_of(finished)
 
 
-def _give(pool: ProcessPoolExecutor, futures: dict[Future[Outcome], Cell], cells: Iterator[Cell], n: int) -> None:
-    for _, cell in zip(range(n), cells, strict=False):
-        futures[pool.submit(run_cell, cell)] = cell
+def _outcome_of(finished: Finished) -> Outcome:
+    cell: Any = finished.key
+    if finished.is_lost:
+        return Outcome(cell, 0.0, fault=f"{MOST_LOSSES} workers were lost over it (killed, or out of memory?)")
+    return finished.value if finished.error is None else Outcome(cell, 0.0, fault=str(finished.error))
 
 
-def _begin_worker() -> None:
-    """A worker ends with Ctrl-C, and with the process that it works for, at once: nothing can be lost."""
-    signal.signal(signal.SIGINT, _end_at_once)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_at_once(*_: object) -> None:
-    os._exit(1)
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-@contextmanager
-def _one_thread_each() -> Generator[None]:
-    """Processes that begin within have one thread each for numbers."""
-    before = os.environ.get(THREADS)
-    os.environ[THREADS] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[THREADS]
-        else:
-            os.environ[THREADS] = before
-
-
-def run_on_dask(cells: Sequence[Cell], address: str) -> Iterator[Outcome]:
-    """Runs cells on the workers of the Dask scheduler at `address`, which must see the same files.
-
-    Dask gives the cells of a worker that died to another one, which goes on from the last finished trial.
-    """
-    with needed("distributed", "--scheduler"):
-        from distributed import Client, as_completed
-    try:
-        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as fault:
-        raise FailureError(f"no Dask scheduler answers at {address} ({' '.join(str(fault).split())})") from fault
-    with client:
-        futures: dict[Any, Cell] = {client.submit(run_cell, cell, pure=False): cell for cell in cells}
-        for future in cast("Iterator[Any]", as_completed(list(futures), loop=client.loop)):
-            if future.status == "finished":
-                yield future.result()
-            else:
-                yield Outcome(futures[future], 0.0, fault=f"Dask gave it up: {future.exception()}")
-
-
-def most_jobs() -> int:
-    """How many cells run at a time where nothing else is said: one a core."""
-    return cores()
+def default_workers(n_cells: int) -> Workers | None:
+    """Return one local worker a core, but no more than there are cells; None without the extra or with one."""
+    n_workers = min(cores(), n_cells)
+    return None if n_workers < 2 or missing_packages("distributed") else Workers(n_workers)
