@@ -1,4 +1,4 @@
-"""The stored baselines of the built-in tasks (src/armwright/baselines.csv), and their page (docs/suite.md).
+"""The stored baselines of the built-in tasks (src/armwright/experiments/baselines.csv), and their page (docs/suite.md).
 
 armwright experiment suite --no-figures      # 31 tasks x 2 methods x 5 seeds: some 20 minutes on two idle cores
 python benchmarks/baselines.py experiments/suite
@@ -11,10 +11,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 import armwright
-from armwright.baselines import BASELINES, baselines, baselines_of
-from armwright.best_known import best_known_hypervolume
-from armwright.results import as_csv
-from armwright.task import builtin_tasks
+from armwright.experiments.baselines import BASELINES, baselines, baselines_of
+from armwright.files import as_csv
+from armwright.runs.best_known import best_known_hypervolume
+from armwright.tasks.task import builtin_tasks
 
 PACKAGE = Path(armwright.__file__).parent
 PAGE = PACKAGE.parents[1] / "docs" / "suite.md"
@@ -34,7 +34,7 @@ def main(folder: Path) -> None:
     ]
     made = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
     head = f"# armwright experiment suite, with {made} on Python {platform.python_version()}; benchmarks/baselines.py\n"
-    (PACKAGE / BASELINES).write_text(head + as_csv(records), encoding="utf-8")
+    (PACKAGE / "experiments" / BASELINES).write_text(head + as_csv(records), encoding="utf-8")
     baselines.cache_clear()
     PAGE.write_text(page(), encoding="utf-8")
 

@@ -11,14 +11,14 @@ from collections.abc import Callable
 
 from one_core import on_one_core, print_rates, rates_in_turn, seconds
 
-from armwright.batch_builder import stack_designs
-from armwright.evaluation import evaluate_arrays
 from armwright.kinematics.clearance import clearances
-from armwright.objectives import named_objectives
-from armwright.obstacles import Box, Cylinder, Ground
-from armwright.problem import Problem
-from armwright.space import paper_space
-from armwright.task import load_task
+from armwright.problem.evaluation import evaluate_arrays
+from armwright.problem.objectives import named_objectives
+from armwright.problem.problem import Problem
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import paper_space
+from armwright.tasks.obstacles import Box, Cylinder, Ground
+from armwright.tasks.task import load_task
 
 N, ROUNDS = 4000, 7
 OBSTACLES = (

@@ -25,15 +25,15 @@ import pinocchio as pin
 from skrobot.coordinates import Coordinates
 from skrobot.model import RobotModel
 
-from armwright.batch_builder import stack_designs
-from armwright.evaluation import evaluate
-from armwright.export.urdf import to_urdf
 from armwright.kinematics.arm_arrays import ArmArrays, Precision, stack_arms
-from armwright.kinematics.solve import UPDATES, solve_postures
-from armwright.masses import MassPerMetre
-from armwright.problem import Problem
-from armwright.space import paper_space
-from armwright.task import load_task
+from armwright.kinematics.ik import UPDATES, solve_postures
+from armwright.problem.evaluation import evaluate
+from armwright.problem.problem import Problem
+from armwright.robot.urdf_writer import to_urdf
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import paper_space
+from armwright.spaces.link_mass import MassPerMetre
+from armwright.tasks.task import load_task
 
 TARGETS = load_task("target-1").points
 PROBLEM = Problem(load_task("target-1"))

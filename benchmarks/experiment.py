@@ -8,11 +8,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from armwright.cluster import Workers
-from armwright.experiment.outcome import collect, published
-from armwright.experiment.plan import cells_of, load_experiment, with_only, with_seeds
-from armwright.experiment.running import run_cells
+from armwright.experiments.outcome import collect, published
+from armwright.experiments.plan import cells_of, load_experiment, with_only, with_seeds
+from armwright.experiments.runner import run_cells
 from armwright.report.tables import markdown
+from armwright.study.cluster import Workers
 
 
 def main() -> None:

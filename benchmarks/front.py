@@ -16,11 +16,11 @@ import numpy as np
 from peers import Nsga2
 
 from armwright.arrays import Array
-from armwright.best_known import known_front
 from armwright.pareto import default_reference_point, hypervolume
-from armwright.problem import Problem
-from armwright.search.front import FrontSearch
-from armwright.task import builtin_tasks
+from armwright.problem.problem import Problem
+from armwright.runs.best_known import known_front
+from armwright.search.front_search import FrontSearch
+from armwright.tasks.task import builtin_tasks
 
 BUDGETS = (10_000, 20_000, 50_000, 100_000, 200_000)
 PEERS_BUDGET = 100_000  # evaluations

@@ -32,7 +32,7 @@ from scipy.stats import rankdata
 
 import armwright as aw
 from armwright.pareto import front_mask
-from armwright.sampling import distributions
+from armwright.spaces.optuna_distributions import distributions
 
 Evaluate = Callable[[dict[str, float]], Sequence[float]]
 Matrix = np.ndarray

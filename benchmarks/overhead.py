@@ -17,12 +17,13 @@ from pathlib import Path
 
 import optuna
 
-from armwright.problem import Problem
+from armwright.problem.problem import Problem
 from armwright.report.figures import write_figures
-from armwright.sampling import distributions, sampler_factory
+from armwright.search.samplers import sampler_factory
 from armwright.seeding import derived_seed
-from armwright.study import Run, optimize
-from armwright.task import load_task
+from armwright.spaces.optuna_distributions import distributions
+from armwright.study.study import Run, optimize
+from armwright.tasks.task import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 ROUNDS = 5
@@ -78,7 +79,7 @@ def whole_process() -> None:
     command = [sys.executable, "-m", "armwright"]
     helps = [seconds_and_memory([*command, "--help"])[0] for _ in range(5)]
     print(f"  armwright --help                       {statistics.median(helps):6.2f} s")
-    imports = "import armwright.study, armwright.sampling, warp, optuna"
+    imports = "import armwright.study.study, armwright.search.samplers, warp, optuna"
     print(f"  imports of a run                       {seconds_and_memory([sys.executable, '-c', imports])[0]:6.2f} s")
     with tempfile.TemporaryDirectory() as folder:
         load = "from armwright.kinematics.devices import load; load('float32', 8, 'cpu')"

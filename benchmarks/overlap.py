@@ -12,12 +12,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from armwright.parameters import Design
-from armwright.problem import Outcomes, Problem
+from armwright.problem.problem import Outcomes, Problem
 from armwright.proposers.llm import LlmProposer
-from armwright.study import Run, optimize
-from armwright.task import load_task
-from tests.chat_server import Answer, ChatServer, Request
+from armwright.spaces.parameters import Design
+from armwright.study.study import Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import Answer, ChatServer, Request
 
 LATENCY = 2.0  # [s] of a call
 EVALUATION = 0.5  # [s] of a trial of the slow evaluator

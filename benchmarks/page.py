@@ -17,7 +17,7 @@ import numpy as np
 import armwright as aw
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from tests.browser import Tab, browser, program
+from tests.support.browser import Tab, browser, program
 
 SELECT = """async () => {
   const { content, set } = armwright, front = content.head.front, found = [];

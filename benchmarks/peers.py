@@ -13,9 +13,9 @@ from pymoo.core.termination import Termination
 from pymoo.optimize import minimize
 
 from armwright.arrays import Array
-from armwright.parameters import FloatParameter
 from armwright.pareto import front_mask
-from armwright.problem import Problem
+from armwright.problem.problem import Problem
+from armwright.spaces.parameters import FloatParameter
 
 
 class Nsga2:

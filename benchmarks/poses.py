@@ -21,12 +21,12 @@ ARMS, TARGETS = 4000, 8
 def main() -> None:
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])  # before any thread begins
     os.environ["WARP_CACHE_PATH"] = tempfile.mkdtemp(prefix="armwright-poses-")  # where nothing is compiled yet
-    from armwright.batch_builder import stack_designs
     from armwright.kinematics.devices import load
-    from armwright.kinematics.solve import LANES, solve_postures
+    from armwright.kinematics.ik import LANES, solve_postures
     from armwright.rotations import rotation_from_rpy
-    from armwright.space import paper_space
-    from armwright.targets import AXIS, ORIENTATION, position_targets
+    from armwright.spaces.batch_builder import stack_designs
+    from armwright.spaces.design_space import paper_space
+    from armwright.tasks.targets import AXIS, ORIENTATION, position_targets
 
     compiled = {}
     for rows in ("position", "pose"):

@@ -8,9 +8,9 @@ each joint; position, orientation, collision and torque use are asked. Beside it
 
 from one_core import on_one_core, print_rates, rates_in_turn
 
-from armwright.problem import Problem
-from armwright.space import DesignSpace
-from armwright.task import Task, load_task
+from armwright.problem.problem import Problem
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task, load_task
 
 N, ROUNDS = 4000, 7
 REAL = Task.model_validate(

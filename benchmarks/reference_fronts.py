@@ -1,4 +1,4 @@
-"""The best known fronts of the built-in tasks (src/armwright/fronts/), and how they are made.
+"""The best known fronts of the built-in tasks (src/armwright/runs/best_known_fronts/), and how they are made.
 
 Of each task the union of: our search with several seeds; our search within each joint sequence by itself, which no
 other sequence can crowd out; pymoo's NSGA-II; and what was known before. So a run of this script never makes a front
@@ -19,13 +19,13 @@ from peers import Nsga2
 
 import armwright
 from armwright.arrays import Array
-from armwright.best_known import known_front
-from armwright.parameters import FloatParameter
 from armwright.pareto import default_reference_point, hypervolume
-from armwright.problem import Problem
-from armwright.search.front import FrontSearch
+from armwright.problem.problem import Problem
+from armwright.runs.best_known import known_front
+from armwright.search.front_search import FrontSearch
 from armwright.search.survival import front, thinned
-from armwright.task import builtin_tasks
+from armwright.spaces.parameters import FloatParameter
+from armwright.tasks.task import builtin_tasks
 
 SEEDS = range(3)
 EVALUATIONS = 250_000  # for each seed
@@ -33,7 +33,7 @@ PER_SEQUENCE = 2_000
 PYMOO_EVALUATIONS = 30_000
 MOST = 1000  # designs of a shipped front
 DECIMALS = 9  # of its parameters: a nanometre, as a micrometre already costs 0.1 % of target-2's hypervolume
-PLACE = Path(armwright.__file__).parent / "fronts"
+PLACE = Path(armwright.__file__).parent / "runs" / "best_known_fronts"
 
 
 def main() -> None:

@@ -14,14 +14,14 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 from scipy.stats import qmc
 
-from armwright.history import History
-from armwright.parameters import FloatParameter, ParameterValue
-from armwright.problem import Problem
+from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.proposers.rules import RulesProposer
-from armwright.space import DesignSpace
-from armwright.study import optimize
-from armwright.task import load_task, random_task
+from armwright.runs.history import History
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.parameters import FloatParameter, ParameterValue
+from armwright.study.study import optimize
+from armwright.tasks.task import load_task, random_task
 
 METHODS = ("TPE", "Sobol", "rules")
 PAPER_TASKS = ("target-1", "target-2", "target-3")

@@ -27,14 +27,14 @@ import optuna
 import psutil
 from matplotlib.figure import Figure
 
-from armwright.front import find_front
-from armwright.parameters import FloatParameter
-from armwright.problem import Problem
-from armwright.run_folder import read_run
-from armwright.sampling import sampler_factory
+from armwright.problem.problem import Problem
+from armwright.runs.folder import read_run
+from armwright.search.samplers import sampler_factory
 from armwright.seeding import derived_seed
-from armwright.study import optimize
-from armwright.task import load_task
+from armwright.spaces.parameters import FloatParameter
+from armwright.study.front_run import find_front
+from armwright.study.study import optimize
+from armwright.tasks.task import load_task
 
 TASK = "target-1"
 STUDIES = {"random": ("none", "random", 100_000), "tpe": ("none", "tpe", 2_000), "rules": ("rules", "random", 20_000)}

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser
 
-from tests import browser as browsers
-from tests.chat_server import ChatServer
+from tests.support import browser as browsers
+from tests.support.chat_server import ChatServer
 
 SLOW_FOLDERS = frozenset({"torture", "fuzz"})
 SLOW_FIXTURES = frozenset({"browser", "guide", "shell"})

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from armwright.documents import LARGEST_DOCUMENT
 from armwright.exceptions import (
     ArmwrightError,
     RunFolderError,
@@ -18,16 +17,17 @@ from armwright.exceptions import (
     SpaceError,
     TaskError,
 )
-from armwright.experiment.plan import cells_of, load_experiment
+from armwright.experiments.plan import cells_of, load_experiment
 from armwright.llm.prompt import load_prompt
 from armwright.llm.transcript import Transcript
 from armwright.report.page import write_report
-from armwright.results import read_summary
-from armwright.run_folder import read_config
-from armwright.space import load_space
-from armwright.task import Task, load_task
-from armwright.task_template import task_template
-from armwright.urdf.reading import read_urdf
+from armwright.robot.urdf_reader import read_urdf
+from armwright.runs.folder import read_config
+from armwright.runs.results import read_summary
+from armwright.spaces.design_space import load_space
+from armwright.tasks.task import Task, load_task
+from armwright.tasks.task_template import task_template
+from armwright.yaml_documents import LARGEST_DOCUMENT
 from tests.fuzz.targets import a_run, looked_at
 
 
@@ -179,7 +179,7 @@ def test_transcript_with_an_invalid_proposal_is_refused(run: Path, value: str) -
 
 @pytest.mark.parametrize("url", ["http://a:x/v1", "http://[::1", "http://", "http://\x01/v1", "http://a b/v1"])
 def test_invalid_server_address_is_refused(url: str) -> None:
-    from armwright.llm.chat import ModelClient
+    from armwright.llm.client import ModelClient
 
     with pytest.raises(SettingsError, match="is no address"):
         ModelClient("openai-chat:x", url)

@@ -5,7 +5,7 @@ from typing import Any
 import typer
 from typer.cli import get_docs_for_click
 
-from armwright.cli import app
+from armwright.cli.app import app
 
 
 def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:

@@ -79,7 +79,7 @@ def try_tests(sdist: Path, folder: Path) -> None:
     unpacked = folder / sdist.name.removesuffix(".tar.gz")
     pytest = ("env", f"PYTHONPATH={unpacked / 'src'}", sys.executable, "-m", "pytest", "-n", "0")
     run(*pytest, "--collect-only", "--quiet", "--quiet", folder=unpacked)
-    run(*pytest, "tests/test_public.py", "tests/test_task.py", folder=unpacked)
+    run(*pytest, "tests/test_public.py", "tests/tasks/test_task.py", folder=unpacked)
 
 
 def try_newest(wheel: Path, python: str, folder: Path) -> None:

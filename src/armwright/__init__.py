@@ -11,30 +11,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from armwright.any_study.callback import ProposalCallback
-    from armwright.any_study.llm import StudyLlmProposer
-    from armwright.any_study.proposals import StudyProposal, StudyProposer
-    from armwright.any_study.rules import StudyRulesProposer
-    from armwright.arm import Arm, Joint, Link, uniform_link
-    from armwright.buying import ArmComparison, ComparedArm, compare_arms
-    from armwright.cluster import Workers
-    from armwright.comparison import Comparison, compare_runs
-    from armwright.drafting import Draft, draft
-    from armwright.evaluation import Evaluation, evaluate
     from armwright.exceptions import ArmwrightError, FailureError, ProposalError, UsageError
-    from armwright.export.mjcf import to_mjcf
-    from armwright.export.ros2_control import to_ros2_control
-    from armwright.export.sdf import to_sdf
-    from armwright.export.srdf import to_srdf
-    from armwright.export.urdf import to_urdf
-    from armwright.export.xacro import to_xacro
-    from armwright.front import FrontRun, find_front
-    from armwright.history import FrontMember, History
-    from armwright.measuring import Evaluator, evaluator, load_evaluator
-    from armwright.parameters import Design
+    from armwright.experiments.compare_arms import ArmComparison, ComparedArm, compare_arms
+    from armwright.experiments.compare_runs import Comparison, compare_runs
+    from armwright.llm.draft import Draft, draft
     from armwright.pareto import hypervolume
-    from armwright.polish import polish_run
-    from armwright.problem import Problem
+    from armwright.problem.evaluation import Evaluation, evaluate
+    from armwright.problem.evaluators import Evaluator, evaluator, load_evaluator
+    from armwright.problem.problem import Problem
+    from armwright.proposers.for_optuna.callback import ProposalCallback
+    from armwright.proposers.for_optuna.llm import StudyLlmProposer
+    from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
+    from armwright.proposers.for_optuna.rules import StudyRulesProposer
     from armwright.proposers.llm import LlmProposer
     from armwright.proposers.manual import ManualProposer
     from armwright.proposers.proposer import Proposal, Proposer
@@ -42,77 +30,89 @@ if TYPE_CHECKING:
     from armwright.proposers.rules import RulesProposer
     from armwright.report.figures import write_figures
     from armwright.report.page import write_report
-    from armwright.results import verify_run
-    from armwright.run_folder import read_run
-    from armwright.space import DesignSpace, load_space, paper_space
-    from armwright.study import Run, optimize
-    from armwright.task import Task, builtin_tasks, load_task, random_task
-    from armwright.trial import FinishedTrial
-    from armwright.urdf.reading import UrdfArm, read_urdf
+    from armwright.robot.arm import Arm, Joint, Link, uniform_link
+    from armwright.robot.mjcf import to_mjcf
+    from armwright.robot.ros2_control import to_ros2_control
+    from armwright.robot.sdf import to_sdf
+    from armwright.robot.srdf import to_srdf
+    from armwright.robot.urdf_reader import UrdfArm, read_urdf
+    from armwright.robot.urdf_writer import to_urdf
+    from armwright.robot.xacro import to_xacro
+    from armwright.runs.folder import read_run
+    from armwright.runs.history import FrontMember, History
+    from armwright.runs.results import verify_run
+    from armwright.runs.trial import FinishedTrial
+    from armwright.spaces.design_space import DesignSpace, load_space, paper_space
+    from armwright.spaces.parameters import Design
+    from armwright.study.cluster import Workers
+    from armwright.study.front_run import FrontRun, find_front
+    from armwright.study.refine_run import polish_run
+    from armwright.study.study import Run, optimize
+    from armwright.tasks.task import Task, builtin_tasks, load_task, random_task
 
 # Where each public name lives. Modules load when a name of theirs is first used, so that the command line
 # answers at once and nobody pays for what is not used.
 _PLACES = {
-    "Arm": "arm",
-    "ArmComparison": "buying",
+    "Arm": "robot.arm",
+    "ArmComparison": "experiments.compare_arms",
     "ArmwrightError": "exceptions",
-    "ComparedArm": "buying",
-    "Comparison": "comparison",
-    "Design": "parameters",
-    "DesignSpace": "space",
-    "Draft": "drafting",
-    "Evaluation": "evaluation",
-    "Evaluator": "measuring",
+    "ComparedArm": "experiments.compare_arms",
+    "Comparison": "experiments.compare_runs",
+    "Design": "spaces.parameters",
+    "DesignSpace": "spaces.design_space",
+    "Draft": "llm.draft",
+    "Evaluation": "problem.evaluation",
+    "Evaluator": "problem.evaluators",
     "FailureError": "exceptions",
-    "FinishedTrial": "trial",
-    "FrontMember": "history",
-    "FrontRun": "front",
-    "History": "history",
-    "Joint": "arm",
-    "Link": "arm",
+    "FinishedTrial": "runs.trial",
+    "FrontMember": "runs.history",
+    "FrontRun": "study.front_run",
+    "History": "runs.history",
+    "Joint": "robot.arm",
+    "Link": "robot.arm",
     "LlmProposer": "proposers.llm",
     "ManualProposer": "proposers.manual",
-    "Problem": "problem",
+    "Problem": "problem.problem",
     "Proposal": "proposers.proposer",
-    "ProposalCallback": "any_study.callback",
+    "ProposalCallback": "proposers.for_optuna.callback",
     "ProposalError": "exceptions",
     "Proposer": "proposers.proposer",
     "ReplayProposer": "proposers.replay",
     "RulesProposer": "proposers.rules",
-    "Run": "study",
-    "StudyLlmProposer": "any_study.llm",
-    "StudyProposal": "any_study.proposals",
-    "StudyProposer": "any_study.proposals",
-    "StudyRulesProposer": "any_study.rules",
-    "Task": "task",
-    "UrdfArm": "urdf.reading",
+    "Run": "study.study",
+    "StudyLlmProposer": "proposers.for_optuna.llm",
+    "StudyProposal": "proposers.for_optuna.proposer",
+    "StudyProposer": "proposers.for_optuna.proposer",
+    "StudyRulesProposer": "proposers.for_optuna.rules",
+    "Task": "tasks.task",
+    "UrdfArm": "robot.urdf_reader",
     "UsageError": "exceptions",
-    "Workers": "cluster",
-    "builtin_tasks": "task",
-    "compare_arms": "buying",
-    "compare_runs": "comparison",
-    "draft": "drafting",
-    "evaluate": "evaluation",
-    "evaluator": "measuring",
-    "find_front": "front",
+    "Workers": "study.cluster",
+    "builtin_tasks": "tasks.task",
+    "compare_arms": "experiments.compare_arms",
+    "compare_runs": "experiments.compare_runs",
+    "draft": "llm.draft",
+    "evaluate": "problem.evaluation",
+    "evaluator": "problem.evaluators",
+    "find_front": "study.front_run",
     "hypervolume": "pareto",
-    "load_evaluator": "measuring",
-    "load_space": "space",
-    "load_task": "task",
-    "optimize": "study",
-    "paper_space": "space",
-    "polish_run": "polish",
-    "random_task": "task",
-    "read_run": "run_folder",
-    "read_urdf": "urdf.reading",
-    "to_mjcf": "export.mjcf",
-    "to_ros2_control": "export.ros2_control",
-    "to_sdf": "export.sdf",
-    "to_srdf": "export.srdf",
-    "to_urdf": "export.urdf",
-    "to_xacro": "export.xacro",
-    "uniform_link": "arm",
-    "verify_run": "results",
+    "load_evaluator": "problem.evaluators",
+    "load_space": "spaces.design_space",
+    "load_task": "tasks.task",
+    "optimize": "study.study",
+    "paper_space": "spaces.design_space",
+    "polish_run": "study.refine_run",
+    "random_task": "tasks.task",
+    "read_run": "runs.folder",
+    "read_urdf": "robot.urdf_reader",
+    "to_mjcf": "robot.mjcf",
+    "to_ros2_control": "robot.ros2_control",
+    "to_sdf": "robot.sdf",
+    "to_srdf": "robot.srdf",
+    "to_urdf": "robot.urdf_writer",
+    "to_xacro": "robot.xacro",
+    "uniform_link": "robot.arm",
+    "verify_run": "runs.results",
     "write_figures": "report.figures",
     "write_report": "report.page",
 }

@@ -1,9 +1,13 @@
 """Atomic replacement of files, and text and names that any file system accepts."""
 
+import csv
+import io
 import os
 import re
 import shutil
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 # Windows reserves device names, whatever their suffix, and drops a dot at the end.
 _NO_FILE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?|.*\.", re.IGNORECASE)
@@ -39,3 +43,15 @@ def check_name(name: str) -> str:
     if _NO_FILE.fullmatch(name):
         raise ValueError(f'"{name}" cannot be the name of a file on Windows; choose another')
     return name
+
+
+def as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Records of the same keys as CSV, with a first line of these; empty for none."""
+    out = io.StringIO()
+    writer: csv.DictWriter[str] | None = None
+    for row in rows:
+        if writer is None:
+            writer = csv.DictWriter(out, fieldnames=list(row), lineterminator="\n")
+            writer.writeheader()
+        writer.writerow(row)
+    return out.getvalue()

@@ -24,10 +24,10 @@ import yaml
 
 import armwright as aw
 from armwright.exceptions import ArmwrightError, RunFolderError
-from armwright.history import History
-from armwright.problem import Problem
-from armwright.space import DesignSpace, load_space
-from armwright.task import Task, load_task
+from armwright.problem.problem import Problem
+from armwright.runs.history import History
+from armwright.spaces.design_space import DesignSpace, load_space
+from armwright.tasks.task import Task, load_task
 from tests import ROOT
 from tests.fuzz.mutation import changed
 
@@ -173,8 +173,8 @@ def _postures(problem: Problem) -> int:
 
 def used(problem: Problem) -> None:
     """What every run does with a problem: designs are drawn, evaluated, exported, and told to a model."""
-    from armwright.export.urdf import to_urdf
     from armwright.llm.prompt import load_prompt
+    from armwright.robot.urdf_writer import to_urdf
 
     designs = problem.space.sample(2, 0)
     arms = [problem.arm(design) for design in designs]
@@ -189,7 +189,7 @@ def used(problem: Problem) -> None:
 
 def same_when_kept(value: Task | DesignSpace) -> None:
     """What is written into a run's settings is read back as the same."""
-    from armwright.run_folder import _ConfigDumper
+    from armwright.runs.folder import _ConfigDumper
 
     content = value.model_dump(mode="json")
     json.dumps(content, allow_nan=False)
@@ -214,7 +214,7 @@ def run_space(data: bytes) -> None:
 
 
 def run_experiment(data: bytes) -> None:
-    from armwright.experiment.plan import MOST_CELLS, cells_of, load_experiment
+    from armwright.experiments.plan import MOST_CELLS, cells_of, load_experiment
 
     out = folder() / "out"
     plan, beside = load_experiment(str(file_of(data, "experiment.yaml")))
@@ -229,7 +229,7 @@ def run_experiment(data: bytes) -> None:
 
 
 def run_start(data: bytes) -> None:
-    from armwright.starts import read_design
+    from armwright.spaces.design_file import read_design
 
     space = a_problem().space
     design = read_design(file_of(data, "design.json"), space)
@@ -315,7 +315,7 @@ def told() -> Any:
     """Parameters of somebody's Optuna study, and its objectives."""
     import optuna
 
-    from armwright.any_study.parameters import told_parameters
+    from armwright.proposers.for_optuna.parameters import told_parameters
 
     space: dict[str, Any] = {
         "x": optuna.distributions.FloatDistribution(-1.0, 1.0),
@@ -354,15 +354,15 @@ class _Answered:
     def cancel(self) -> None: ...
 
     def ask(self, question: Any) -> Any:
-        from armwright.llm.speaker import Reply
+        from armwright.llm.backend import Reply
 
         return Reply(self.words, requests=1)
 
 
 @cache
 def drafter(written: bool) -> tuple[Any, _Answered]:
-    from armwright.drafting import Drafter
     from armwright.llm.configuration import ModelName
+    from armwright.llm.draft import Drafter
 
     made = Drafter(
         ModelName("openai-chat:stand-in", "http://127.0.0.1:9/v1", "--model"),
@@ -405,7 +405,7 @@ def run_draft(data: bytes) -> None:
 def a_run() -> Path:
     """A small run with a model's stand-in and rules, finished, with its page."""
     from armwright.report.page import write_report
-    from tests.chat_server import ChatServer, designer
+    from tests.support.chat_server import ChatServer, designer
 
     there = folder() / "run"
     with ChatServer() as server:
@@ -446,13 +446,13 @@ def damaged(name: str, data: bytes) -> Iterator[Path]:
 
 def looked_at(there: Path) -> None:
     """What readers of a run folder do."""
-    from armwright.comparison import compare_runs, list_runs
-    from armwright.control import Channel, add_hint, read_control, read_status
-    from armwright.decision import pick_from
-    from armwright.exporting import export_design
+    from armwright.experiments.compare_runs import compare_runs, list_runs
     from armwright.proposers.replay import ReplayProposer
-    from armwright.report.content import RunContent
+    from armwright.report.page_content import RunContent
     from armwright.report.tables import markdown
+    from armwright.runs.control import Channel, add_hint, read_control, read_status
+    from armwright.runs.export import export_design
+    from armwright.runs.selection import pick_from
 
     any_of(
         (
@@ -491,7 +491,7 @@ def replayed(proposer: Any) -> None:
 
 @cache
 def _trials() -> Any:
-    from armwright.run_folder import read_run
+    from armwright.runs.folder import read_run
 
     return read_run(a_run())[1].trials
 
@@ -521,7 +521,7 @@ def replay_seeds() -> list[bytes]:
 
 def run_trials(data: bytes) -> None:
     """trials.jsonl alone, as every reader and a resumed run takes it."""
-    from armwright.run_folder import RunFolder, read_run
+    from armwright.runs.folder import RunFolder, read_run
 
     place = folder() / "trials"
     if not place.exists():
@@ -539,7 +539,7 @@ def run_trials(data: bytes) -> None:
 
 
 def urdf_seeds() -> list[bytes]:
-    from tests.robots import any_arm, with_frames_anyhow
+    from tests.support.robots import any_arm, with_frames_anyhow
 
     with_all = b"""<?xml version="1.0"?>
 <robot name="r"><link name="base"><inertial><mass value="1.5"/><origin xyz="0 0 0.1" rpy="0 0 0"/>
@@ -555,8 +555,8 @@ effort="100" velocity="1"/></joint><joint name="f" type="fixed"><parent link="b"
 
 
 def run_urdf(data: bytes) -> None:
-    from armwright.export.urdf import to_urdf
-    from armwright.urdf.reading import read_urdf
+    from armwright.robot.urdf_reader import read_urdf
+    from armwright.robot.urdf_writer import to_urdf
 
     read = read_urdf(file_of(data, "arm.urdf"))
     to_urdf(read.arm)
@@ -568,10 +568,10 @@ def run_urdf(data: bytes) -> None:
 
 
 def run_points(data: bytes) -> None:
-    from armwright.documents import parse_document
     from armwright.exceptions import TaskError
-    from armwright.points_file import read_points
-    from armwright.task_template import task_template
+    from armwright.tasks.points_file import read_points
+    from armwright.tasks.task_template import task_template
+    from armwright.yaml_documents import parse_document
 
     points = read_points(file_of(data, "points.csv"), "mm", (0.0, 1.0, 0.0))
     parse_document(task_template(Path("x y.yaml"), points), Task, TaskError, "x y.yaml")
@@ -583,9 +583,9 @@ def point_seeds() -> list[bytes]:
 
 def run_words(data: bytes) -> None:
     """Sentences of options and of task files: nothing of them is evaluated."""
-    from armwright.constraints import read_constraints
-    from armwright.decision import read_condition, read_weights
-    from armwright.front import Budget
+    from armwright.problem.constraints import read_constraints
+    from armwright.runs.selection import read_condition, read_weights
+    from armwright.study.front_run import Budget
 
     text = data.decode("utf-8", "replace")
     reads = (read_condition, read_weights, Budget.of, lambda words: read_constraints(words.split("\n")))
@@ -609,7 +609,7 @@ class _Server:
     app: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        from armwright.live import Pages, live_app
+        from armwright.report.live_server import Pages, live_app
 
         self.app = live_app(self.folder, self.token, lambda host: host == "127.0.0.1:9", Pages())
 
@@ -725,7 +725,7 @@ NEVER = ("live", "--live", "--call", "--scheduler", "--workers")  # they wait fo
 
 def run_arguments(data: bytes) -> None:
     """A command line, in this process; what would search does so for a few trials."""
-    from armwright.cli import app
+    from armwright.cli.app import app
 
     try:
         content = json.loads(data)

@@ -12,15 +12,15 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import ArmwrightError, RunConflictError
-from armwright.front import find_front
-from armwright.problem import Problem
+from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.report.page import write_report
-from armwright.run_config import versions
-from armwright.run_folder import read_config
-from armwright.study import Run, optimize
-from armwright.task import load_task
-from tests.chat_server import ChatServer
+from armwright.runs.config import versions
+from armwright.runs.folder import read_config
+from armwright.study.front_run import find_front
+from armwright.study.study import Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import ChatServer
 from tests.torture.lives import trials
 from tests.torture.test_kills import thoughtful
 

@@ -14,10 +14,10 @@ import pytest
 
 from armwright.exceptions import RunFolderError
 from armwright.files import replace_folder
-from armwright.problem import Problem
-from armwright.run_folder import RunFolder, is_held
-from armwright.study import Progress, optimize
-from armwright.task import load_task
+from armwright.problem.problem import Problem
+from armwright.runs.folder import RunFolder, is_held
+from armwright.study.study import Progress, optimize
+from armwright.tasks.task import load_task
 from tests.torture.lives import is_beginning, is_same_run, n_lines, trials
 from tests.torture.short import N_TRIALS, armwright, as_a_plain_user, command, one_line, run, study
 
@@ -78,7 +78,7 @@ def test_the_lock_of_a_killed_process_is_free(tmp_path: Path, whole: Path) -> No
 def test_looking_whether_a_folder_is_held_keeps_nobody_out(tmp_path: Path) -> None:
     """A process that looks all the time, while others come and go."""
     looking = (
-        "import sys; from pathlib import Path; from armwright.run_folder import is_held\n"
+        "import sys; from pathlib import Path; from armwright.runs.folder import is_held\n"
         "while True: is_held(Path(sys.argv[1]))"
     )
     looks = [subprocess.Popen([sys.executable, "-c", looking, str(tmp_path)]) for _ in range(2)]

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 import yaml
 
-from armwright.run_folder import is_held
-from tests.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
+from armwright.runs.folder import is_held
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
 from tests.torture.lives import (
     Scenario,
     files,
@@ -178,7 +178,7 @@ def test_a_study_that_asks_a_model_while_it_goes_on(
 
 
 # Its state is written every 5 s; here more often, so that short searches go on, too.
-OFTEN = "import armwright.front as f; f.SAVE_SECONDS = 0.1; from armwright.cli import main; main()"
+OFTEN = "import armwright.study.front_run as f; f.SAVE_SECONDS = 0.1; from armwright.cli.app import main; main()"
 BUDGET = 30_000
 
 

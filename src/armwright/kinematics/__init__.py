@@ -1,1 +1,1 @@
-"""Inverse kinematics and gravity torque of many arms at many targets at once."""
+"""Arms stacked in arrays: inverse kinematics, torques, clearance and dynamics."""

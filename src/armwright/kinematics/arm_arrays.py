@@ -7,9 +7,9 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import AXES, Arm, Joint
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
+from armwright.robot.arm import AXES, Arm, Joint
 
 MAX_JOINTS = 16
 MAX_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
@@ -48,7 +48,7 @@ class Actuation:
 class Bodies:
     """Rigid bodies of the links of N arms of up to D joints, in float64 whatever the precision of the arms.
 
-    A link is a solid cylinder that carries a point mass at its end (`armwright.arm.Link`).
+    A link is a solid cylinder that carries a point mass at its end (`armwright.robot.arm.Link`).
     """
 
     mass: Array  # (N, D) of the cylinder [kg]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, load_clearance
-from armwright.kinematics.solve import in_threads
-from armwright.obstacles import SHAPES, Obstacle
+from armwright.kinematics.ik import in_threads
+from armwright.tasks.obstacles import SHAPES, Obstacle
 
 LARGEST_CHUNK = 2**14  # postures at a time, whose links fit into a core's cache; on a GPU, so many times GPU_CHUNKS
 SMALLEST_CHUNK = 256  # postures; below it a thread costs more than it brings

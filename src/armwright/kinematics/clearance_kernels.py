@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Precision
-from armwright.obstacles import SHAPES
+from armwright.tasks.obstacles import SHAPES
 
 _OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
 _kernel = partial(wp.kernel, enable_backward=False, module="unique", module_options=_OPTIONS)

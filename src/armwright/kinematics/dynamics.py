@@ -12,13 +12,13 @@ from typing import cast
 
 import numpy as np
 
-from armwright.arm import GRAVITY
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, ArmArrays
 from armwright.kinematics.forward import Frames, forward_kinematics
 from armwright.kinematics.jacobian import jacobian_of, jacobian_rate
 from armwright.kinematics.paths import Paths, largest_of
-from armwright.moves import Moves, Timing, timing_of
+from armwright.robot.arm import GRAVITY
+from armwright.tasks.moves import Moves, Timing, timing_of
 
 DAMPING = 0.005  # of an arm's size, docs/method.md §17
 AT_ONCE = 2**12  # postures, whose arrays stay in a core's cache

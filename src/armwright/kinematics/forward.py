@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armwright.arm import Arm
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import PRISMATIC, ArmArrays, stack_arms
+from armwright.robot.arm import Arm
 
 
 @dataclass(frozen=True)

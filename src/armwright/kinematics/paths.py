@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.devices import Device
-from armwright.kinematics.solve import solve_postures
-from armwright.moves import Lines, Moves, lines_of
+from armwright.kinematics.ik import solve_postures
+from armwright.tasks.moves import Lines, Moves, lines_of
 
 UPDATES_OF_STEP = 10  # of the inverse kinematics from one sample to the next, docs/method.md §14
 

@@ -17,9 +17,9 @@ from typing import Any
 
 import warp as wp
 
-from armwright.arm import GRAVITY
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Motions, Precision
 from armwright.kinematics.lane_math import kernel, lane_math
+from armwright.robot.arm import GRAVITY
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""The language model: what it is told, how it is asked, and what was said."""
+"""Communication with a language model: prompts, answers, transcripts, budgets and drafts."""

@@ -14,11 +14,11 @@ from itertools import islice
 from typing import Any, cast
 
 from armwright.exceptions import DesignError
-from armwright.llm.lines import designs_in_lines, plain_number, words_of_lists
-from armwright.llm.words import one_line, without_thoughts
-from armwright.modules import JOINT_DESCRIPTIONS
-from armwright.parameters import CategoricalParameter, Design, Parameter, exact
-from armwright.problem import Problem
+from armwright.llm.answer_format import designs_in_lines, plain_number, words_of_lists
+from armwright.problem.problem import Problem
+from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
+from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, exact
+from armwright.text import one_line, without_thoughts
 
 LONGEST_ANSWER = 100_000  # characters; the end counts
 MOST_OBJECTS = 1000  # braces tried in a free answer, from its end

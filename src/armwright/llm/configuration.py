@@ -7,8 +7,8 @@ from pathlib import Path
 from platformdirs import user_config_path
 from pydantic import BaseModel
 
-from armwright.documents import read_document
 from armwright.exceptions import SettingsError
+from armwright.yaml_documents import read_document
 
 
 @dataclass(frozen=True)

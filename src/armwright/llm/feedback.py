@@ -8,15 +8,15 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.arm import GRAVITY
-from armwright.evaluation import Evaluation
-from armwright.history import History
 from armwright.llm.answer import LONGEST_REASON
-from armwright.llm.lines import LISTS, NOTHING
-from armwright.llm.words import one_line
-from armwright.misses import AT_LIMIT, why_missed
-from armwright.parameters import Design
-from armwright.space import DesignSpace
+from armwright.llm.answer_format import LISTS, NOTHING
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.miss_reasons import AT_LIMIT, why_missed
+from armwright.robot.arm import GRAVITY
+from armwright.runs.history import History
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.parameters import Design
+from armwright.text import one_line
 
 N_PARETO = 5  # members of the front shown
 N_RANDOM = 5  # other finished designs shown

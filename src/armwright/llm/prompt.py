@@ -11,14 +11,14 @@ from typing import Any, Literal, get_args
 
 from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 
-from armwright.control import LONGEST_HINT
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.history import History
 from armwright.llm.feedback import Feedback, proposal_records
 from armwright.llm.prompt_values import MOST_TARGETS, VARIABLES, common_values, shown_values
-from armwright.llm.sandbox import Sandbox, render
-from armwright.llm.words import end_of, fence, one_line, without_thoughts
-from armwright.problem import Problem
+from armwright.llm.template_sandbox import Sandbox, render
+from armwright.problem.problem import Problem
+from armwright.runs.control import LONGEST_HINT
+from armwright.runs.history import History
+from armwright.text import end_of, fence, one_line, without_thoughts
 
 PROMPTS = ("plus", "minus")
 Memory = Literal["none", "own"]

@@ -6,15 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from armwright.arm import GRAVITY
-from armwright.history import History
+from armwright.kinematics.ik import UPDATES
 from armwright.kinematics.paths import UPDATES_OF_STEP
-from armwright.kinematics.solve import UPDATES
+from armwright.llm.answer_format import LISTS
 from armwright.llm.feedback import Feedback, Record, points, vector
-from armwright.llm.lines import LISTS
-from armwright.llm.words import one_line
-from armwright.modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
-from armwright.objectives import (
+from armwright.problem.objectives import (
     OF_CLEARANCE,
     OF_MOVES,
     OF_THE_WAY,
@@ -25,9 +21,13 @@ from armwright.objectives import (
     UNREACHED_TARGETS,
     Objective,
 )
-from armwright.targets import REACHED, target_words
-from armwright.task import IN_ORDER, Task
-from armwright.tolerance import measured_columns
+from armwright.robot.arm import GRAVITY
+from armwright.runs.history import History
+from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
+from armwright.spaces.tolerance import measured_columns
+from armwright.tasks.targets import REACHED, target_words
+from armwright.tasks.task import IN_ORDER, Task
+from armwright.text import one_line
 
 MOST_TARGETS = 64  # shown
 LONGEST_DESCRIPTION = 2_000  # characters of a task's description

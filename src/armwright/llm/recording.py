@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import ReplayError
-from armwright.llm.speaker import CHECK, CallError, LlmBackend, Question, Reader, Reply
+from armwright.llm.backend import CHECK, CallError, LlmBackend, Question, Reader, Reply
 from armwright.llm.transcript import Call
 
 

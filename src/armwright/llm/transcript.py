@@ -12,8 +12,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from armwright.control import Hint
 from armwright.exceptions import RunFolderError
+from armwright.runs.control import Hint
 
 TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
 FIRST_STEPS = ("reasoning", "answer")  # the steps whose questions are made from the history, and go with hints

@@ -1,1 +1,1 @@
-"""Proposers: where structural ideas come from, one design for every n_step trials."""
+"""Sources of design proposals: rules, language models, recordings and people."""

@@ -4,8 +4,8 @@ import threading
 from collections.abc import Iterable
 from pathlib import Path
 
-from armwright.control import ControlFile, Hint
 from armwright.llm.transcript import Transcript, used_hints
+from armwright.runs.control import ControlFile, Hint
 
 
 class Hints:

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from armwright.exceptions import SettingsError
-from armwright.history import History
 from armwright.llm.feedback import N_PARETO, N_RANDOM
 from armwright.llm.prompt import MOST_TOKENS, estimated_tokens, parameters_prompt
 from armwright.llm.prompt_values import MOST_TARGETS
-from armwright.problem import Problem
-from armwright.proposers.asking import Asking, PromptedProposer
+from armwright.problem.problem import Problem
+from armwright.proposers.prompted import Asking, PromptedProposer
+from armwright.runs.history import History
 
 TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, by what prompts came to
 THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # that a model is taken to write, for an estimate
@@ -47,7 +47,7 @@ class LlmProposer(PromptedProposer):
         max_cost: float | None = None,
         origin: str = "model",
     ) -> None:
-        from armwright.llm.chat import ModelClient
+        from armwright.llm.client import ModelClient
 
         asking = Asking(prompt, memory, answer, proposals)
         if answer == "text":
@@ -66,7 +66,7 @@ class LlmProposer(PromptedProposer):
 
     def forecast(self, problem: Problem, n: int) -> str:
         """About what `n` proposals will take, before any is asked for."""
-        from armwright.llm.chat import describe_cost
+        from armwright.llm.client import describe_cost
 
         calls = -(-n // self.asking.proposals)
         given, written = self._tokens_each(problem)

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from armwright.exceptions import SettingsError
 from armwright.llm.answer import read_text, written_answers
-from armwright.llm.people import ManualBackend
-from armwright.llm.speaker import Question, Reply
-from armwright.problem import Problem
-from armwright.proposers.asking import Asking, PromptedProposer
+from armwright.llm.backend import Question, Reply
+from armwright.llm.manual import ManualBackend
+from armwright.problem.problem import Problem
+from armwright.proposers.prompted import Asking, PromptedProposer
 
 
 class ManualProposer(PromptedProposer):

@@ -1,13 +1,14 @@
 """What a proposer is. Your own needs a name and `propose`; the rest has defaults."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from armwright.history import History
-from armwright.parameters import Design
-from armwright.problem import Problem
+from armwright.problem.problem import Problem
+from armwright.runs.history import History
+from armwright.runs.summary import ProposerSummary
+from armwright.spaces.parameters import Design
 
 
 @dataclass(frozen=True)
@@ -28,31 +29,6 @@ class Proposal:
     asked: int = 0
     known: int | None = None
     note: str = ""
-
-
-@dataclass(frozen=True)
-class ProposerSummary:
-    """What a run's proposer did and cost, for summary.json.
-
-    model: who answered.  origin: what answered: `model`, `manual` (people), `scripted` (a stand-in).
-    calls, requests: questions, and requests to the server (more, where answers were refused).
-    call_failures: failed calls by kind.
-    cost_usd: None where a price is not known.
-    seconds: of all calls together.
-    notes: what else should be known, such as where a replay differs from its record.
-    """
-
-    name: str
-    model: str | None = None
-    origin: str | None = None
-    calls: int = 0
-    requests: int = 0
-    call_failures: Mapping[str, int] = field(default_factory=dict[str, int])
-    input_tokens: int = 0
-    output_tokens: int = 0
-    cost_usd: float | None = None
-    seconds: float = 0.0
-    notes: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True)

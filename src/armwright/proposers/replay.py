@@ -8,18 +8,19 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from armwright.control import Hint
 from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError
-from armwright.history import History
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import ReplayBackend
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of
-from armwright.proposers.asking import LAST_STEPS, Asking, PromptedProposer
-from armwright.proposers.proposer import Proposal, ProposerSummary, Record, RecordedTurn
-from armwright.run_config import RunConfig
-from armwright.run_folder import CONFIG, read_config, read_run
-from armwright.trial import FinishedTrial
-from armwright.trials_file import TRIALS
+from armwright.proposers.prompted import LAST_STEPS, Asking, PromptedProposer
+from armwright.proposers.proposer import Proposal, Record, RecordedTurn
+from armwright.runs.config import RunConfig
+from armwright.runs.control import Hint
+from armwright.runs.folder import CONFIG, read_config, read_run
+from armwright.runs.history import History
+from armwright.runs.summary import ProposerSummary
+from armwright.runs.trial import FinishedTrial
+from armwright.runs.trials_file import TRIALS
 
 
 class ReplayProposer(PromptedProposer):

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.history import FrontMember, History
-from armwright.objectives import PAPER_OBJECTIVES, TORQUE
-from armwright.parameters import Design
+from armwright.problem.objectives import PAPER_OBJECTIVES, TORQUE
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.proposers.rule_helpers import MIDDLE, change_until_new, draw_gap, proposal_id, rule_of
-from armwright.proposers.structures import OPENING, fitted
+from armwright.proposers.rule_structures import OPENING, fitted
+from armwright.runs.history import FrontMember, History
+from armwright.spaces.parameters import Design
 
 PULL = 0.1  # [m] of base motion if all targets were missed in one direction
 REACHED = 0.005  # [m]; a nearer target pulls no more

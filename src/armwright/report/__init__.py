@@ -1,1 +1,1 @@
-"""What people look at, made from a run folder."""
+"""Presentation of a run: figures, tables, the page and the live server."""

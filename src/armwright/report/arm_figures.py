@@ -12,11 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from armwright.evaluation import Evaluation
-from armwright.history import FrontMember, History
 from armwright.kinematics.forward import joint_positions, link_lines, rails
-from armwright.objectives import TORQUE
-from armwright.obstacles import Ground
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.objectives import TORQUE
 from armwright.report.solids import draw_obstacles
 from armwright.report.style import (
     FRONT,
@@ -30,8 +28,10 @@ from armwright.report.style import (
     WAY,
     look,
 )
-from armwright.targets import AXIS
-from armwright.workspace import Region
+from armwright.runs.history import FrontMember, History
+from armwright.tasks.obstacles import Ground
+from armwright.tasks.targets import AXIS
+from armwright.tasks.workspace import Region
 
 ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
 MOST_PANELS = 12

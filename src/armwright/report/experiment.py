@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from armwright.comparison import Comparison
-from armwright.experiment.outcome import published
-from armwright.experiment.plan import ExperimentPlan
-from armwright.report.comparison import Curves, write_comparison_figures
+from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.outcome import published
+from armwright.experiments.plan import ExperimentPlan
+from armwright.report.comparison_figures import Curves, write_comparison_figures
 from armwright.report.tables import write_tables
 
 

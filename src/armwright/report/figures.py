@@ -10,13 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from armwright.best_known import standing
-from armwright.buying import ComparedArm, read_existing_arms
-from armwright.credit import front_by_source, gained_by_source
 from armwright.exceptions import RunFolderError
-from armwright.history import FrontMember, History
-from armwright.objectives import POSITION_ERROR, TORQUE, Objective
+from armwright.experiments.compare_arms import ComparedArm, read_existing_arms
 from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
+from armwright.problem.objectives import POSITION_ERROR, TORQUE, Objective
 from armwright.report.arm_figures import draw_arm, draw_arms
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.style import (
@@ -27,10 +24,13 @@ from armwright.report.style import (
     Look,
     look,
 )
-from armwright.results import FIGURES, read_summary
-from armwright.run_config import FrontMethod, ObjectiveRecord
-from armwright.run_folder import read_run
-from armwright.space import DesignSpace
+from armwright.runs.attribution import front_by_source, gained_by_source
+from armwright.runs.best_known import standing
+from armwright.runs.config import FrontMethod, ObjectiveRecord
+from armwright.runs.folder import read_run
+from armwright.runs.history import FrontMember, History
+from armwright.runs.results import FIGURES, read_summary
+from armwright.spaces.design_space import DesignSpace
 
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # drawn part of the plane, as a multiple of the reference point

@@ -6,19 +6,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from armwright.control import (
+from armwright.exceptions import ArmwrightError
+from armwright.llm.transcript import TRANSCRIPTS, used_hints
+from armwright.report.page_content import RunContent, design_files
+from armwright.runs.control import (
     CONTROL,
     STATUS,
     Hint,
     read_control,
     read_status,
 )
-from armwright.exceptions import ArmwrightError
-from armwright.llm.transcript import TRANSCRIPTS, used_hints
-from armwright.report.content import RunContent, design_files
-from armwright.results import SUMMARY
-from armwright.run_folder import CONFIG, is_held, read_config
-from armwright.trials_file import TRIALS
+from armwright.runs.folder import CONFIG, is_held, read_config
+from armwright.runs.results import SUMMARY
+from armwright.runs.trials_file import TRIALS
 
 WATCHED = (CONFIG, TRIALS, TRANSCRIPTS, SUMMARY, STATUS, CONTROL)
 RECENT = 20  # trials whose mean duration predicts the remaining time

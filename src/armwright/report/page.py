@@ -14,8 +14,8 @@ from importlib import resources
 from pathlib import Path
 
 from armwright.exceptions import RunFolderError
-from armwright.report.content import RunContent
-from armwright.results import REPORT
+from armwright.report.page_content import RunContent
+from armwright.runs.results import REPORT
 
 LIBRARIES = ("plotly-basic.min.js", "three.min.js")
 MAIN = "main.js"

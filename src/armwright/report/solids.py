@@ -7,8 +7,8 @@ import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from armwright.arrays import Array
-from armwright.obstacles import Obstacle, Solid
 from armwright.report.style import OBSTACLE
+from armwright.tasks.obstacles import Obstacle, Solid
 
 EDGE = 0.5  # [pt]
 AROUND, UPWARDS = 32, 12  # faces of round shapes

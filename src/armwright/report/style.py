@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from armwright.history import BBO, RANDOM, START
+from armwright.runs.history import BBO, RANDOM, START
 
 
 class Look(NamedTuple):

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from armwright.comparison import Comparison, Run
-from armwright.statistics import Interval, least_p
+from armwright.experiments.compare_runs import Comparison, Run
+from armwright.experiments.statistics import Interval, least_p
 
 Published = Mapping[tuple[str, str], tuple[float, float]]  # (method, task): (E_hv, σ_hv)
 

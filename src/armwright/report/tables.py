@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from armwright.comparison import Comparison, Row, Run
 from armwright.exceptions import RunFolderError
-from armwright.files import replace_file
+from armwright.experiments.compare_runs import Comparison, Row, Run
+from armwright.experiments.statistics import Interval, least_p
+from armwright.files import as_csv, replace_file
 from armwright.report.table_records import (
     Published,
     contrast_records,
@@ -15,8 +16,6 @@ from armwright.report.table_records import (
     run_records,
     time_records,
 )
-from armwright.results import as_csv
-from armwright.statistics import Interval, least_p
 
 WIDE = 4  # up to this many tasks, each has a column, as in the paper
 DECIMALS = 2

@@ -1,1 +1,1 @@
-"""A vectorised multi-objective search for problems that evaluate a great many designs at once."""
+"""Algorithms that generate designs: Optuna samplers, front search and refinement."""

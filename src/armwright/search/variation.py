@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.search.columns import Columns
+from armwright.search.encoding import Columns
 
 RARE_SHARE = 0.3  # of the parents: of any structure in the pool alike, however few designs there are of it
 MIXED_SHARE = 0.6  # of the batch: two members mixed, of any structure, as a base may be good for many of them

@@ -1,0 +1,119 @@
+"""What is installed, what is configured, and whether it works."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import metadata
+
+from armwright.exceptions import ArmwrightError, ModelError
+from armwright.extras import EXTRAS, command, is_installed, missing_packages
+from armwright.llm.backend import CallError
+from armwright.llm.configuration import configuration_path, configured_model
+from armwright.runs.config import versions
+
+OK, MISSING, WRONG = "ok", "--", "!!"
+
+# Vendor, the package that speaks to it, and the environment variables that it needs; of several names in one place
+# one is enough.
+VENDORS = (
+    ("openai-chat", "openai", ("OPENAI_API_KEY",)),
+    ("anthropic", "anthropic", ("ANTHROPIC_API_KEY",)),
+    ("google", "google.genai", ("GOOGLE_API_KEY or GEMINI_API_KEY",)),
+    ("azure", "openai", ("AZURE_OPENAI_ENDPOINT", "AZURE_OPENAI_API_KEY", "OPENAI_API_VERSION")),
+    ("openrouter", "openai", ("OPENROUTER_API_KEY",)),
+    ("ollama", "openai", ()),
+    ("vllm", "openai", ()),
+)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """mark: ok, -- (not there, and that is fine as long as it is not wanted), !! (wrong)."""
+
+    mark: str
+    subject: str
+    words: str
+
+
+def examine(model: str | None = None, base_url: str | None = None) -> Iterator[Finding]:
+    """What is there, without sending anything anywhere. Values of keys are never shown."""
+    yield Finding(OK, "versions", ", ".join(f"{name} {number}" for name, number in versions().items()))
+    yield _kernels()
+    yield from map(_extra, EXTRAS)
+    yield from _vendors()
+    yield _configured(model, base_url)
+
+
+def try_model(model: str | None = None, base_url: str | None = None) -> str:
+    """One tiny call to the configured model; ModelError where it fails."""
+    configured = configured_model(model, base_url)
+    if configured is None:
+        raise ModelError("no model is configured; give --model, or set ARMWRIGHT_MODEL")
+    from armwright.llm.client import ModelClient
+
+    try:
+        reply = ModelClient(configured.model, configured.base_url).check()
+    except CallError as fault:
+        raise ModelError(f"{fault} ({fault.kind})") from fault
+    cost = "price not known" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
+    return (
+        f'{OK} call: {configured.model} answered "{" ".join(reply.text.split())[:60]}" in {reply.seconds:.1f} s, '
+        f"{reply.input_tokens} tokens in, {reply.output_tokens} out, {cost}"
+    )
+
+
+def _kernels() -> Finding:
+    from armwright.problem.problem import Problem
+    from armwright.tasks.task import load_task
+
+    problem = Problem(load_task("target-1"))
+    try:
+        problem.evaluate(problem.space.sample(2, seed=0))
+    except ArmwrightError as fault:
+        return Finding(WRONG, "kernels", str(fault))
+    return Finding(OK, "kernels", "compiled, and they run on the CPU")
+
+
+def _extra(extra: str) -> Finding:
+    missing = missing_packages(extra)
+    if missing:
+        return Finding(MISSING, f"extra {extra}", f"{', '.join(missing)} not installed: {command(extra)}")
+    found = (f"{name} {metadata.version(name)}" for name in EXTRAS[extra].values())
+    return Finding(OK, f"extra {extra}", ", ".join(found))
+
+
+def _vendors() -> Iterator[Finding]:
+    for vendor, package, variables in VENDORS:
+        if not (is_installed(package) and is_installed("pydantic_ai")):
+            yield Finding(MISSING, vendor, f"not installed: {command('llm')}")
+            continue
+        found = {names: next(filter(os.environ.get, names.split(" or ")), None) for names in variables}
+        unset = [names for names, name in found.items() if name is None]
+        if unset:
+            yield Finding(MISSING, vendor, f"{', '.join(unset)} not set in the environment")
+        else:
+            words = f"{', '.join(map(str, found.values()))} set" if found else "needs no key; its server must run"
+            yield Finding(OK, vendor, words)
+
+
+def _configured(model: str | None, base_url: str | None) -> Finding:
+    try:
+        configured = configured_model(model, base_url)
+    except ArmwrightError as fault:
+        return Finding(WRONG, "model", str(fault))
+    if configured is None:
+        return Finding(
+            MISSING,
+            "model",
+            f"none is configured (--model, ARMWRIGHT_MODEL, {configuration_path()}); the rules propose",
+        )
+    named = f"{configured.model}, named by {configured.named_by}"
+    if configured.base_url:
+        named += f", at {configured.base_url}"
+    try:
+        from armwright.llm.client import ModelClient
+
+        ModelClient(configured.model, configured.base_url)
+    except ArmwrightError as fault:
+        return Finding(WRONG, "model", f"{named}: {fault}")
+    return Finding(OK, "model", f"{named}; --call tries it")

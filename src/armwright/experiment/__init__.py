@@ -1,1 +1,0 @@
-"""Experiments: methods on tasks with seeds, each cell an ordinary run folder."""

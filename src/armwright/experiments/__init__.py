@@ -1,0 +1,1 @@
+"""Many runs, methods and existing arms, executed and compared."""

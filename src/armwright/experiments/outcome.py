@@ -1,0 +1,43 @@
+"""What an experiment came to: its finished cells, side by side."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import yaml
+
+from armwright.exceptions import FailureError, RunFolderError
+from armwright.experiments.compare_runs import Comparison, read_run_record
+from armwright.experiments.plan import Cell, ExperimentPlan
+from armwright.files import replace_file
+from armwright.runs.results import read_summary
+
+PLAN = "experiment.yaml"  # what was run, as it was
+
+
+def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
+    """The finished ones among the cells, with the labels and in the order of the plan."""
+    records = [read_run_record(cell.folder, cell.plan.label) for cell in cells if read_summary(cell.folder) is not None]
+    if not records:
+        raise FailureError("no cell of the experiment is finished, so there is nothing to compare")
+    labels = [method.label for method in plan.methods.values()]
+    tasks = list(dict.fromkeys(cell.task_name for cell in cells))
+    return Comparison(records, labels, tasks, plan.methods[plan.against].label)
+
+
+def published(plan: ExperimentPlan) -> dict[tuple[str, str], tuple[float, float]]:
+    """The numbers to show beside ours, by label and task."""
+    return {
+        (plan.methods[key].label, task): numbers
+        for key, by_task in plan.published.items()
+        for task, numbers in by_task.items()
+    }
+
+
+def write_plan(plan: ExperimentPlan, out: Path) -> None:
+    """Keeps what was run beside its results; only the models that are named in it are those that were asked."""
+    text = yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True), sort_keys=False, allow_unicode=True)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        replace_file(out / PLAN, text.encode())
+    except OSError as fault:
+        raise RunFolderError(f"cannot write {out / PLAN}: {fault.strerror or fault}") from fault

@@ -1,1 +1,0 @@
-"""Arms in the formats of other tools."""

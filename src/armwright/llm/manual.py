@@ -1,0 +1,132 @@
+"""People in the model's place: each question is a file, and so is its answer."""
+
+import os
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import AnswerPendingError, DesignError, FailureError
+from armwright.llm.backend import CHECK, CallError, LlmBackend, Question, Reply, TextReader
+
+LOOK_EVERY = 0.5  # [s]
+ENDINGS = ("md", "json", "txt")  # of an answer's file
+LARGEST_FILE = 10_000_000  # characters
+
+
+class ManualBackend(LlmBackend):
+    """Writes DIR/NNN-prompt.md and takes DIR/NNN-answer.md (or .json), where NNN is the trial's number.
+
+    wait: whether to wait for an answer that is not there; else AnswerPendingError.
+    """
+
+    model = "people"
+    origin = "manual"
+
+    def __init__(self, folder: Path, wait: bool = True) -> None:
+        self.folder = folder
+        self.wait = wait
+        self._cancelled = threading.Event()
+        self._seen: dict[Path, tuple[int, int]] = {}  # files' sizes and times when last looked at
+
+    def begin(self) -> None:
+        """A session begins."""
+        self._cancelled.clear()
+
+    def check(self, question: Question = CHECK) -> Reply:
+        """People are not asked before there is a question."""
+        return Reply("")
+
+    def ask(self, question: Question) -> Reply:
+        """The free answer."""
+        return self.ask_text(question, lambda text: text)
+
+    def ask_for(self, question: Question, schema: Mapping[str, Any], read: Any) -> Reply:
+        """People are asked for text, not for a schema."""
+        raise NotImplementedError
+
+    def cancel(self) -> None:
+        """Waits no longer."""
+        self._cancelled.set()
+
+    def files(self, number: int) -> tuple[Path, Path]:
+        """The question for trial `number`, and its answer."""
+        return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
+
+    def is_answered(self, number: int) -> bool:
+        """Whether an answer lies there that has not been refused."""
+        return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
+
+    def ask_text(self, question: Question, read: TextReader) -> Reply:
+        """The answer as `read` gives it; what it refuses (DesignError) is put aside, with the reason, for another."""
+        started = time.perf_counter()
+        number = int(question.proposal.rpartition("-")[2])
+        asked, _ = self.files(number)
+        answers = self._answers(number)
+        self._ask(asked, answers, question.prompt)
+        refused = ""
+        while True:
+            answer = next(filter(self._is_ready, answers), None)
+            if answer is not None:
+                try:
+                    return Reply(read(self._read(answer)), requests=1, seconds=time.perf_counter() - started)
+                except DesignError as refusal:
+                    refused = str(refusal)
+                    self._refuse(number, answer, refused)
+                    continue  # another file may hold another answer
+            if not self.wait:
+                raise AnswerPendingError(asked, answers[0], refused)
+            if self._cancelled.wait(LOOK_EVERY):
+                raise CallError("cancelled", "the wait for an answer was ended", Reply(""))
+
+    def _answers(self, number: int) -> list[Path]:
+        return [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]
+
+    def _ask(self, file: Path, answers: Sequence[Path], prompt: str) -> None:
+        if os.path.isfile(file):
+            if self._read(file) == prompt:
+                return
+            raise FailureError(
+                f"{file} holds a question of another run, or of another version; give an empty folder, or move "
+                f"{file.name} and its answer away"
+            )
+        early = next((answer for answer in answers if answer.exists()), None)
+        if early is not None:
+            raise FailureError(f"{early} lies there before its question; give an empty folder, or move it away")
+        self._write(file, prompt)
+
+    def _is_ready(self, answer: Path) -> bool:
+        """Whether the answer has something in it and, where there is time to look twice, rests."""
+        if not os.path.isfile(answer):
+            return False
+        found = answer.stat()
+        now = found.st_size, found.st_mtime_ns
+        before, self._seen[answer] = self._seen.get(answer), now
+        return now[0] > 0 and (before == now or not self.wait)
+
+    def _read(self, file: Path) -> str:
+        try:
+            with open(file, encoding="utf-8-sig", errors="replace") as content:
+                return content.read(LARGEST_FILE)
+        except OSError as fault:
+            raise FailureError(f"cannot read {file}: {fault.strerror or fault}") from fault
+
+    def _refuse(self, number: int, answer: Path, reason: str) -> None:
+        try:
+            before = len(list(self.folder.glob(f"{number:03d}-refused-*")))
+            kept = self.folder / f"{number:03d}-refused-{before + 1}{answer.suffix}"
+            os.replace(answer, kept)
+        except OSError as fault:
+            raise FailureError(f"cannot rename {answer}: {fault.strerror or fault}") from fault
+        self._write(
+            self.folder / f"{number:03d}-refused.md",
+            f"{kept.name} was refused:\n\n{reason}\n\nGive another {answer.name}.\n",
+        )
+
+    def _write(self, file: Path, text: str) -> None:
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+        except OSError as fault:
+            raise FailureError(f"cannot write {file}: {fault.strerror or fault}") from fault

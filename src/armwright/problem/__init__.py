@@ -1,0 +1,1 @@
+"""A design in, objective and constraint values out."""

@@ -1,0 +1,269 @@
+"""What the physics says of an arm at its targets: no preference, no sums."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armwright.arrays import Array
+from armwright.exceptions import SettingsError, TaskError
+from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, stack_arms
+from armwright.kinematics.clearance import clearances
+from armwright.kinematics.devices import Device
+from armwright.kinematics.dynamics import Drives, driven
+from armwright.kinematics.ik import Postures, solve_postures
+from armwright.kinematics.jacobian import jacobians
+from armwright.kinematics.paths import Paths, follow
+from armwright.robot.arm import Arm
+from armwright.tasks.moves import NO_MOVES, Moves
+from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.targets import TargetArrays, position_targets
+from armwright.tasks.workspace import Region, points_of
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """N arms of up to J joints at T targets; 0 for joints that an arm does not have.
+
+    Clearances, moves, the workspace and Jacobians are computed when they are first asked for.
+    """
+
+    arms: ArmArrays
+    targets: Array  # (T, 3) [m]
+    payload: Array  # (T,) that the tip carries there [kg]
+    q: Array  # (N, T, J) kept joint angles [rad], or ways [m]; 0 for a fixed joint
+    reached: Array  # (N, T, 3) position of the tip [m]
+    position_error: Array  # (N, T) distance from the target [m]
+    angle_error: Array  # (N, T) of the tool from the target's axis or orientation [rad]; 0 where it has none
+    joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
+    goals: TargetArrays  # how the targets are to be reached
+    obstacles: tuple[Obstacle, ...] = ()
+    device: Device = "cpu"
+    moves: Moves = NO_MOVES
+    workspace: tuple[Region, ...] = ()  # to cover, by W points together
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def motor_torques(self) -> Array:
+        """(N, T, J) at the actuators: of a sliding joint its force times its travel [N m]."""
+        return self.joint_torques * self.arms.travel[:, None]
+
+    def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
+        """(N, T) a measure of motor torques, the largest of a target's posture and of the moves that end there.
+
+        measure: from torques (N, K, J) [N m] to (N, K), of K postures.
+        """
+        at_targets = measure(self.motor_torques)
+        if not self.moves:
+            return at_targets
+        along = measure(self.paths.joint_torques * self.arms.travel[:, None])
+        return self.paths.with_largest(at_targets, along)
+
+    @cached_property
+    def paths(self) -> Paths:
+        """The arms along the moves; SettingsError where there are none."""
+        if not self.moves:
+            raise SettingsError(
+                "path_error, max_joint_step and all else of moves need some in the task: moves: in_order, or "
+                "moves: [[1, 2], [2, 3]]"
+            )
+        return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
+
+    @cached_property
+    def drives(self) -> Drives:
+        """What the joints do along the timed moves; SettingsError where these take no time."""
+        paths = self.paths
+        if not self.moves.times:
+            raise SettingsError(
+                "dynamic_torque, dynamic_utilisation and speed_utilisation need the duration of the task's moves: "
+                "move_time: 1.5 [s], or one for each move"
+            )
+        return driven(self.arms, paths)
+
+    def worst_drives(self, measure: Callable[[Array, Array], Array]) -> Array:
+        """(N, T) a measure of what actuators do, the largest along the moves that end at a target; 0 where none does.
+
+        measure: from torques [N m] and speeds [rad/s], each (N, F, J), to (N, F), of F moments.
+        """
+        drives, travel = self.drives, self.arms.travel[:, None]
+        return drives.largest(measure(drives.torques * travel, drives.speeds / travel), len(self.targets))
+
+    @property
+    def manipulability(self) -> Array:
+        """(N, T) sqrt(det J Jᵀ) of the position Jacobian J in the kept posture (Yoshikawa 1985) [m³]."""
+        return self._singular_values.prod(axis=-1)
+
+    @property
+    def dexterity(self) -> Array:
+        """(N, T) the smallest singular value of J over the largest; 0 where the tip cannot move in some direction."""
+        largest = self._singular_values[..., 0]
+        return self._singular_values[..., -1] / np.where(largest > 0.0, largest, 1.0)
+
+    @cached_property
+    def _singular_values(self) -> Array:
+        """(N, T, 3) of J, from the largest on."""
+        jacobian = jacobians(self.arms, self.q)
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(-1, -2))[..., ::-1], 0.0))
+
+    @cached_property
+    def workspace_error(self) -> Array:
+        """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
+        if not self.workspace:
+            raise SettingsError(
+                "uncovered_fraction needs a workspace in the task: "
+                "workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
+            )
+        points = points_of(self.workspace)
+        reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
+        return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
+
+    @property
+    def missed(self) -> NDArray[np.bool_]:
+        """(N, T) whether the tip or the tool's direction is off by a target's tolerance or more."""
+        goals = self.goals
+        return (self.position_error >= goals.tolerance) | (self.angle_error >= goals.angle_tolerance)
+
+    @property
+    def self_clearance(self) -> Array:
+        """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none.
+
+        It and the other clearances are of a target's posture and of the moves that end there.
+        """
+        return self._clearances[0]
+
+    @property
+    def obstacle_clearance(self) -> Array:
+        """(N, T) smallest distance of a link from an obstacle [m]; infinite where there is none."""
+        return self._clearances[1]
+
+    @property
+    def clearance(self) -> Array:
+        """(N, T) the smaller of both [m]; below 0 where the arm is in an obstacle or in itself."""
+        return np.minimum(*self._clearances)
+
+    @cached_property
+    def _clearances(self) -> tuple[Array, Array]:
+        own, clear = clearances(self.arms, self.q, self.obstacles, self.device)
+        if not self.moves:
+            return own, clear
+        along = clearances(self.arms, self.paths.q, self.obstacles, self.device)
+        own, clear = (-self.paths.with_largest(-at, -way) for at, way in zip((own, clear), along, strict=True))
+        return own, clear
+
+
+def evaluate(
+    arms: Sequence[Arm],
+    targets: ArrayLike,
+    device: Device = "cpu",
+    payload: ArrayLike = 0.0,
+    obstacles: Sequence[Obstacle] = (),
+    goals: TargetArrays | None = None,
+    moves: Moves = NO_MOVES,
+    workspace: Sequence[Region] = (),
+) -> Evaluation:
+    """Every arm at every target. Not reaching a target is a result, never an exception.
+
+    targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
+    obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
+    goals: how they are to be reached (`Task.goals`); without them, as points.
+    moves: lines between targets that the tip goes along.
+    workspace: boxes to cover.
+
+    Examples:
+        >>> import armwright as aw
+        >>> space = aw.paper_space()
+        >>> arms = [space.arm(design) for design in space.sample(3, seed=0)]
+        >>> aw.evaluate(arms, [[0.3, 0.0, 0.2], [0.0, 0.3, 0.2]]).position_error.shape
+        (3, 2)
+    """
+    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, goals, moves, workspace)
+
+
+def evaluate_arrays(
+    arrays: ArmArrays,
+    targets: ArrayLike,
+    device: Device = "cpu",
+    start: ArrayLike | None = None,
+    payload: ArrayLike = 0.0,
+    obstacles: Sequence[Obstacle] = (),
+    goals: TargetArrays | None = None,
+    moves: Moves = NO_MOVES,
+    workspace: Sequence[Region] = (),
+) -> Evaluation:
+    """The same for arms that are stacked already, in their precision.
+
+    start: values [rad] or [m] that broadcast to (N, T, D); None for the straight start. Restarts begin elsewhere.
+    """
+    targets = np.asarray(targets, dtype=np.float64)
+    if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
+        raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
+    loads = _payloads(payload, len(targets))
+    goals = position_targets(len(targets)) if goals is None else goals
+    if len(goals) != len(targets):
+        raise TaskError(f"goals are of {len(goals)} targets, not of the {len(targets)} that are given")
+    postures = _postures(arrays, targets, loads, goals, device, start)
+    for other in _restarts(arrays, goals.restarts):
+        again = _postures(arrays, targets, loads, goals, device, other)
+        postures = _nearer(postures, again, targets, goals)
+    reached = postures.reached.astype(np.float64)
+    return Evaluation(
+        arms=arrays,
+        targets=targets,
+        payload=loads,
+        q=postures.q.astype(np.float64),
+        reached=reached,
+        position_error=np.linalg.norm(reached - targets, axis=-1),
+        angle_error=postures.angle.astype(np.float64),
+        joint_torques=postures.torque.astype(np.float64),
+        goals=goals,
+        obstacles=tuple(obstacles),
+        device=device,
+        moves=moves,
+        workspace=tuple(workspace),
+    )
+
+
+def _postures(
+    arrays: ArmArrays, targets: Array, loads: Array, goals: TargetArrays, device: Device, start: ArrayLike | None
+) -> Postures:
+    return solve_postures(
+        arrays, targets, start=start, payload=loads, goals=goals, precision=arrays.precision, device=device
+    )
+
+
+def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
+    """n times (N, 1, D) postures to start from, each the same share of every joint's range for all arms."""
+    if n == 0:
+        return
+    shares = np.random.default_rng(0).uniform(size=(n, MAX_JOINTS))[:, : arrays.dof]
+    lower, upper = arrays.lower.astype(np.float64), arrays.upper.astype(np.float64)
+    for share in shares:
+        yield np.where(arrays.motion == FIXED, 0.0, lower + share * (upper - lower))[:, None]
+
+
+def _nearer(first: Postures, second: Postures, targets: Array, goals: TargetArrays) -> Postures:
+    """Of each arm and target the posture of the smaller distance, angles counted; the first of equals."""
+
+    def off(postures: Postures) -> Array:
+        distance = np.linalg.norm(postures.reached.astype(np.float64) - targets, axis=-1)
+        return np.hypot(distance, goals.metres_per_radian * postures.angle)
+
+    better = off(second) < off(first)
+    return Postures(
+        q=np.where(better[..., None], second.q, first.q),
+        reached=np.where(better[..., None], second.reached, first.reached),
+        torque=np.where(better[..., None], second.torque, first.torque),
+        angle=np.where(better, second.angle, first.angle),
+    )
+
+
+def _payloads(payload: ArrayLike, t: int) -> Array:
+    """(T,) [kg]."""
+    loads = np.asarray(payload, dtype=np.float64)
+    if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
+        raise TaskError(f"payload must be one number >= 0 kg, or one for each of the {t} targets, not {payload}")
+    return np.broadcast_to(loads, (t,)).copy()

@@ -1,0 +1,264 @@
+"""Evaluators of one's own: a Python function, such as a simulation, that measures an arm in place of our objectives.
+
+@evaluator("settling_error [m]", "energy [J]")
+def simulate(arm, task):
+    ...
+    return error, energy
+"""
+
+import hashlib
+import importlib
+import importlib.abc
+import importlib.util
+import math
+import os
+import re
+import sys
+import traceback
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from numbers import Real
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.objectives import MOST_OBJECTIVES, OBJECTIVES, Objective
+from armwright.robot.arm import Arm
+from armwright.tasks.task import Task
+
+Measure = Callable[[Arm, Task], Sequence[float] | float]
+
+NAMED = re.compile(r"([a-z][a-z0-9_]*)(?: \[([^\[\]]{1,40})\])?")  # such as "energy [J]"
+LONGEST_NAME = 40  # characters
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """A function that measures an arm for a task; each number is an objective, minimised.
+
+    name: `file.py:function` or `module:function`, by which a run's settings know it.
+    worst: what an arm counts for which the function raises, or gives what is no finite number; None: the run stops.
+    version: of the file that it is from; empty where it is from none.
+    place: as `load_evaluator` was given it.
+    source: of the file; a pickle holds it, so that other processes need no copy.
+    """
+
+    name: str
+    measure: Measure
+    objectives: tuple[Objective, ...]
+    worst: tuple[float, ...] | None = None
+    version: str = field(default="", compare=False)
+    place: str = field(default="", compare=False)
+    source: bytes = field(default=b"", compare=False, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle a file by its source, a module's evaluator by name, and any other by value."""
+        where, _, function = (self.place or self.name).rpartition(":")
+        if self.source:
+            return _from_source, (f"{Path(where).resolve()}:{function}", self.source)
+        if where != "__main__" and (self.place or getattr(sys.modules.get(where), function, None) is self):
+            return load_evaluator, (f"{where}:{function}",)
+        return Evaluator.__new__, (Evaluator,), self.__dict__
+
+    def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
+        """The objectives of an arm; EvaluatorError where the function fails, or asks for the end of its process."""
+        try:
+            with _staying():
+                made = self.measure(arm, task)
+        except (Exception, SystemExit) as fault:
+            failure = EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})")
+            failure.add_note(_traceback(fault))
+            raise failure from fault
+        names = [objective.name for objective in self.objectives]
+        values = _numbers(made)
+        if len(values) != len(names):
+            raise EvaluatorError(f"{self.name} gave {made!r:.80}; {len(names)} numbers are needed: {', '.join(names)}")
+        for name, value in zip(names, values, strict=True):
+            if not math.isfinite(value):
+                raise EvaluatorError(
+                    f"{self.name} gave {name} = {value}; it must be a finite number for every arm, a large one for a "
+                    "bad arm"
+                )
+        return values
+
+
+def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callable[[Measure], Evaluator]:
+    """Makes an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
+
+    objectives: their names, each with its unit in brackets where it has one: "energy [J]".
+    worst: what an arm counts for which the function fails, one number for each; without it, the run stops there.
+
+    Examples:
+        >>> @evaluator("reach [m]")
+        ... def shortest(arm, task):
+        ...     return sum(link.length for link in arm.links)
+        >>> shortest.objectives[0].unit
+        'm'
+    """
+    if not 1 <= len(objectives) <= MOST_OBJECTIVES or len(set(objectives)) < len(objectives):
+        raise SettingsError(f"evaluator({', '.join(objectives)}): 1 to {MOST_OBJECTIVES} different names are needed")
+    values = None if worst is None else tuple(float(value) for value in worst)
+    if values is not None and (len(values) != len(objectives) or not all(map(math.isfinite, values))):
+        raise SettingsError(f"worst = {values}: {len(objectives)} finite numbers are needed, one for each objective")
+
+    def decorated(measure: Measure) -> Evaluator:
+        name = f"{measure.__module__}:{measure.__qualname__}"
+        words = " ".join((measure.__doc__ or "").split("\n\n")[0].split()) or f"what {measure.__qualname__} measures"
+        return Evaluator(name, measure, tuple(_objective(given, words, name) for given in objectives), values)
+
+    return decorated
+
+
+def load_evaluator(place: str) -> Evaluator:
+    """The evaluator of `file.py:function` or `module:function`; its code is run, so it has to be one's own.
+
+    SettingsError where there is none.
+    """
+    where, _, function = place.rpartition(":")
+    if not where or not function:
+        raise SettingsError(f'--evaluator "{place}": FILE.py:FUNCTION or MODULE:FUNCTION is needed')
+    if where.endswith(".py"):
+        if not Path(where).is_file():
+            raise SettingsError(f"cannot read {where}: there is no such file")
+        return _from_source(place, Path(where).read_bytes())
+    module = _module(where)
+    found = _found(module, where, function)
+    file = getattr(module, "__file__", None)
+    version = "" if file is None else _version(Path(file).read_bytes())
+    return replace(found, name=f"{where}:{function}", version=version, place=place)
+
+
+def _from_source(place: str, source: bytes) -> Evaluator:
+    """Load the evaluator of `file.py:function`, whether or not the file is here."""
+    where, _, function = place.rpartition(":")
+    found = _found(_file_module(Path(where), source), where, function)
+    name = f"{Path(where).name}:{function}"
+    return replace(found, name=name, version=_version(source), place=place, source=source)
+
+
+def _version(source: bytes) -> str:
+    return hashlib.sha256(source).hexdigest()[:12]
+
+
+def _found(module: ModuleType, where: str, function: str) -> Evaluator:
+    """The evaluator `function` of a module; SettingsError where there is none."""
+    found = getattr(module, function, None)
+    if isinstance(found, Evaluator):
+        return found
+    if callable(found):
+        raise SettingsError(
+            f'{where}:{function} is a plain function: put @armwright.evaluator("OBJECTIVE [UNIT]", ...) above it'
+        )
+    there = [name for name, value in vars(module).items() if isinstance(value, Evaluator)]
+    known = f"Evaluators there: {', '.join(there)}" if there else "There is no evaluator"
+    raise SettingsError(f"{where} has no evaluator {function}.{did_you_mean(function, there)} {known}")
+
+
+def _numbers(made: object) -> tuple[float, ...]:
+    """What a function gave as numbers; none where it is anything else."""
+    if isinstance(made, np.ndarray):
+        made = cast("NDArray[Any]", made).tolist()
+    several = list(cast("tuple[object, ...]", made)) if isinstance(made, (tuple, list)) else [made]
+    numbers = [_number(one) for one in several if isinstance(one, Real)]
+    return tuple(numbers) if len(numbers) == len(several) else ()
+
+
+def _number(one: Real) -> float:
+    try:
+        return float(one)
+    except OverflowError:
+        return math.inf
+
+
+@contextmanager
+def _staying() -> Generator[None]:
+    """Solvers change the working folder, in which the run's folder may be named."""
+    try:
+        here = os.getcwd()
+    except FileNotFoundError:  # it was deleted, and there is nothing to come back to
+        here = None
+    try:
+        yield
+    finally:
+        if here is not None:
+            os.chdir(here)
+
+
+def _objective(given: str, words: str, name: str) -> Objective:
+    """The objective of a name with a unit; its value comes from the evaluator alone."""
+    match = NAMED.fullmatch(given)
+    if match is None or len(match[1]) > LONGEST_NAME:
+        raise SettingsError(
+            f'objective "{given}": a name of at most {LONGEST_NAME} small letters, digits and _, with its unit in '
+            'brackets where it has one, is needed, such as "energy [J]"'
+        )
+    own, unit = match[1], match[2] or ""
+    if own in OBJECTIVES:
+        raise SettingsError(f'objective "{own}" is one of armwright\'s own; give another name')
+
+    def each(_: Evaluation) -> Array:
+        raise SettingsError(f"{own} is measured by {name}, design by design, and only in `armwright optimize`")
+
+    return Objective(own, own.replace("_", " ").capitalize(), unit, f"E_{own}", words, each, over="arm")
+
+
+def _module(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except (Exception, SystemExit) as fault:
+        raise SettingsError(f"cannot import {name}: {type(fault).__name__}: {fault}") from fault
+
+
+class _Source(importlib.abc.SourceLoader):
+    """Loads a module from source in memory; tracebacks show its lines where the file is missing."""
+
+    def __init__(self, path: Path, source: bytes) -> None:
+        self._path = path
+        self._source = source
+
+    def get_filename(self, fullname: str) -> str:
+        return str(self._path)
+
+    def get_data(self, path: str) -> bytes:
+        return self._source
+
+
+def _file_module(path: Path, source: bytes) -> ModuleType:
+    """A Python file as a module; what lies beside it can be imported there, as where it is run as a program."""
+    name = f"armwright_evaluator_{path.stem}"
+    beside = str(path.resolve().parent)
+    if beside not in sys.path:
+        sys.path.insert(0, beside)
+    spec = importlib.util.spec_from_loader(name, _Source(path, source))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # as pickle and dataclasses expect
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as fault:
+        raise SettingsError(f"cannot load {path}: {type(fault).__name__}: {fault} ({_place(fault)})") from fault
+    return module
+
+
+def _traceback(fault: BaseException) -> str:
+    """Return the traceback of an evaluator's code, without our own frame."""
+    trace = fault.__traceback__
+    return "".join(traceback.format_exception(type(fault), fault, trace and trace.tb_next)).rstrip()
+
+
+def _place(fault: BaseException) -> str:
+    """Where it was raised, in the deepest frame: `file.py, line 12`."""
+    trace: Any = fault.__traceback__
+    if isinstance(fault, SyntaxError):
+        return f"{Path(fault.filename or '').name}, line {fault.lineno}"
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return "" if trace is None else f"{Path(trace.tb_frame.f_code.co_filename).name}, line {trace.tb_lineno}"

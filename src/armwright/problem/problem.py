@@ -1,0 +1,277 @@
+"""The problem: a design space, a task, and the objectives to minimise."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.exceptions import EvaluatorError, SettingsError, TaskError
+from armwright.kinematics.arm_arrays import ArmArrays
+from armwright.kinematics.devices import Device, resolve_device
+from armwright.pareto import penalised_objectives
+from armwright.problem.constraints import Constraint, Quantity, read_constraints
+from armwright.problem.evaluation import Evaluation, evaluate_arrays
+from armwright.problem.evaluators import Evaluator
+from armwright.problem.objectives import (
+    OF_ORIENTATION,
+    ORIENTATION_ERROR,
+    PAPER_OBJECTIVES,
+    Objective,
+    named_objectives,
+)
+from armwright.robot.arm import Arm
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.parameters import Design
+from armwright.spaces.tolerance import moved
+from armwright.tasks.task import Task
+
+POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
+NO_MEASUREMENTS: Mapping[str, Array] = {}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Hold the result of evaluating one design.
+
+    Attributes:
+        values: the M objectives, minimised.
+        violations: of the C constraints; satisfied at <= 0.
+        failure: why the evaluator gave no values, so that its worst ones stand here; empty if it gave some.
+    """
+
+    values: tuple[float, ...]
+    violations: tuple[float, ...] = ()
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """Hold the results of evaluating N designs.
+
+    Attributes:
+        values: (N, M) objectives, minimised.
+        violations: (N, C) constraint violations; satisfied at <= 0.
+        failures: why the evaluator gave no values, by row.
+    """
+
+    values: Array
+    violations: Array
+    failures: Mapping[int, str] = field(default_factory=dict[int, str])
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, row: int) -> Outcome:
+        """Return the outcome of one design."""
+        return Outcome(
+            tuple(self.values[row].tolist()), tuple(self.violations[row].tolist()), self.failures.get(row, "")
+        )
+
+    def __iter__(self) -> Iterator[Outcome]:
+        return (self[row] for row in range(len(self)))
+
+    @property
+    def penalised(self) -> Array:
+        """Return (N, M) objectives that a search without constraints can compare designs by (Deb's rules)."""
+        return penalised_objectives(self.values, self.violations)
+
+
+def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
+    """Return the largest of each objective and violation, each by itself, of the same designs in several cases."""
+    return Outcomes(np.max([o.values for o in outcomes], axis=0), np.max([o.violations for o in outcomes], axis=0))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Find the arms of a design space that serve a task best.
+
+    Attributes:
+        task: targets, moves, payloads, obstacles and constraints.
+        space: the designs to choose from.
+        tolerance: build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms
+            with the base or one link off by this much.
+        device: where arms are evaluated; see `resolve_device`.
+        objectives: what is minimised; by default the task's, else the paper's, with the orientation error if a
+            target states an orientation.
+        evaluator: a custom function that measures objectives, such as a simulation.
+        constraints: the task's, parsed.
+
+    Examples:
+        >>> import armwright as aw
+        >>> problem = aw.Problem(aw.load_task("target-1"), aw.paper_space(joints=4))
+        >>> [objective.name for objective in problem.objectives]
+        ['position_error', 'torque']
+        >>> designs = problem.space.sample(1000, seed=0)
+        >>> problem.evaluate(designs).values.shape
+        (1000, 2)
+    """
+
+    task: Task
+    space: DesignSpace = field(default_factory=paper_space)
+    tolerance: float = 0.0
+    device: Device = "cpu"
+    objectives: tuple[Objective, ...] = ()
+    evaluator: Evaluator | None = None
+    constraints: tuple[Constraint, ...] = field(default=(), init=False)
+
+    def __post_init__(self) -> None:
+        """Resolve device, objectives and constraints.
+
+        Raises:
+            TaskError: the reference point is for other objectives, or a constraint cannot be parsed.
+            SettingsError: evaluator, tolerance, objectives and task do not go together.
+        """
+        object.__setattr__(self, "constraints", read_constraints(self.task.constraints))
+        if not self.objectives:
+            object.__setattr__(self, "objectives", self._default_objectives())
+        if self.evaluator is not None and self.tolerance > 0.0:
+            raise SettingsError(
+                f"a tolerance does not go with the evaluator {self.evaluator.name}, which measures an arm as it is"
+            )
+        for objective in self.objectives:
+            if objective in OF_ORIENTATION and not self.task.goals.oriented:
+                raise SettingsError(
+                    f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has "
+                    "an axis or an orientation. Give one to a target, or take another objective"
+                )
+        if self.device not in POSTURES_AT_ONCE:
+            object.__setattr__(self, "device", resolve_device(self.device, many=True))
+        self._check_reference_point()
+
+    def _default_objectives(self) -> tuple[Objective, ...]:
+        if self.task.objectives is not None:
+            return named_objectives(self.task.objectives)
+        if self.evaluator is not None:
+            return self.evaluator.objectives
+        return (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.goals.oriented else PAPER_OBJECTIVES
+
+    def _check_reference_point(self) -> None:
+        point, names = self.reference_point, [objective.name for objective in self.objectives]
+        if point is not None and len(point) != len(names):
+            given = ", ".join(f"{value:g}" for value in point)
+            raise TaskError(
+                f"task {self.task.name} has a reference_point of {len(point)} values ({given}); the problem minimises "
+                f"{len(names)}: {', '.join(names)}. Give one value each, or none: then it is found from the first "
+                "random trials"
+            )
+
+    @property
+    def reference_point(self) -> tuple[float, ...] | None:
+        """Return the worst values that count for the hypervolume, if the task states them."""
+        return self.task.reference_point
+
+    def uses(self, *quantities: Quantity) -> bool:
+        """Return whether any of these is an objective or bounded by a constraint."""
+        used = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
+        return any(quantity.name in used for quantity in quantities)
+
+    def arm(self, design: Design) -> Arm:
+        """Return the physical arm that a design builds."""
+        return self.space.arm(design)
+
+    def evaluate(self, designs: Sequence[Design]) -> Outcomes:
+        """Evaluate N designs: objectives and constraint violations, the worst of all cases and tolerances.
+
+        Raises:
+            EvaluatorError: the custom evaluator failed and states no `worst`.
+            SettingsError: an objective or a violation is not a finite number.
+        """
+        measured, failures = self._measure(designs)
+        found = self._evaluate(self.space.matrix(designs), measured)
+        return Outcomes(found.values, found.violations, failures)
+
+    def evaluate_matrix(self, matrix: Array) -> Outcomes:
+        """Evaluate a large number of designs, given as rows.
+
+        Args:
+            matrix: (N, P) as `DesignSpace.matrix` returns it. Custom evaluators are not called.
+        """
+        return self._evaluate(self.space.normalised(matrix), NO_MEASUREMENTS)
+
+    def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
+        """Return the kinematics and statics of designs at all targets, exact and in the task's first case.
+
+        Args:
+            designs: N designs, or (N, P) their matrix, which may lie outside the ranges of the space.
+        """
+        matrix = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
+        return self.physics_of_arms(stack_designs(self.space, matrix))
+
+    def physics_of_arms(self, arms: ArmArrays, case: int = 0) -> Evaluation:
+        """Return the kinematics and statics of arms at all targets, in one case of the task."""
+        task = self.task
+        points, payloads = task.cases[case]
+        known = (payloads, task.obstacles, task.goals, task.lines, task.workspace)
+        return evaluate_arrays(arms, points, self.device, None, *known)
+
+    def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
+        """Return objectives and violations of evaluated arms.
+
+        Args:
+            evaluation: physics of N arms.
+            measured: (N,) of each objective that the custom evaluator measures.
+
+        Raises:
+            SettingsError: one is not a finite number.
+        """
+        values = [measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives]
+        violations = [constraint(evaluation) for constraint in self.constraints]
+        return Outcomes(
+            _finite(values, [f"objective {o.name}" for o in self.objectives], len(evaluation)),
+            _finite(violations, [f'constraint "{c.words}"' for c in self.constraints], len(evaluation)),
+        )
+
+    def _evaluate(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
+        """Evaluate settled rows, with only the postures of one chunk in memory at a time."""
+        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
+        values = np.empty((len(matrix), len(self.objectives)))
+        violations = np.empty((len(matrix), len(self.constraints)))
+        for first in range(0, len(matrix), size):
+            rows = slice(first, first + size)
+            chunk = {name: column[rows] for name, column in measured.items()}
+            found = worst_case([self.outcomes(physics, chunk) for physics in self._variants(matrix[rows])])
+            values[rows], violations[rows] = found.values, found.violations
+        return Outcomes(values, violations)
+
+    def _variants(self, matrix: Array) -> Iterator[Evaluation]:
+        """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
+        for rows in (matrix, *(moved(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
+            yield self.physics(rows)
+            for case in range(1, len(self.task.cases)):
+                yield self.physics_of_arms(stack_designs(self.space, rows), case)
+
+    @property
+    def _postures(self) -> int:
+        """Return the largest number of postures of one arm."""
+        task = self.task
+        along = sum(task.lines.steps(task.points)) + len(task.lines)
+        return len(task.points) + along + sum(region.points for region in task.workspace)
+
+    def _measure(self, designs: Sequence[Design]) -> tuple[Mapping[str, Array], Mapping[int, str]]:
+        """Return (N,) of each objective that the custom evaluator measures, and its failures by row."""
+        if self.evaluator is None:
+            return NO_MEASUREMENTS, {}
+        failures: dict[int, str] = {}
+        table = np.empty((len(designs), len(self.evaluator.objectives)))
+        for row, design in enumerate(designs):
+            try:
+                table[row] = self.evaluator(self.arm(design), self.task)
+            except EvaluatorError as fault:
+                if self.evaluator.worst is None:
+                    raise
+                table[row], failures[row] = self.evaluator.worst, str(fault)
+        return {o.name: column for o, column in zip(self.evaluator.objectives, table.T, strict=True)}, failures
+
+
+def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:
+    """Return (n, K) of K columns; SettingsError if one holds anything but finite numbers."""
+    table = np.column_stack(columns) if columns else np.empty((n, 0))
+    if not np.all(np.isfinite(table)):
+        row, column = np.argwhere(~np.isfinite(table))[0]
+        raise SettingsError(
+            f"{names[column]} of a design is {table[row, column]}; expected a finite number for every design, a large "
+            "one for a bad design"
+        )
+    return table

@@ -1,0 +1,1 @@
+"""Proposals for any Optuna study."""

@@ -1,0 +1,428 @@
+"""Figures of a comparison: those of the paper, and further ones that tell methods apart."""
+
+import math
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import moocore
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from armwright.experiments.compare_runs import Comparison, Run
+from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
+from armwright.pareto import front_numbers, hypervolume, solution_numbers
+from armwright.report.arm_figures import draw_arm, frame
+from armwright.report.drawing import one_panel, several_panels, write_drawn
+from armwright.report.figures import axis_label, draw_samples
+from armwright.report.style import FRONT, MISSED, TARGET, line, look
+from armwright.runs.config import RunConfig
+from armwright.runs.history import BBO, RANDOM, History
+from armwright.runs.results import FIGURES
+
+MOST_SHOWN = 12  # most tasks in the figure of targets
+COLUMNS = 3  # panels side by side
+MARKERS = 5  # markers on a curve
+LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
+STEPS = ("reasoning", "answer", "parameters")  # transcript steps that contain a model's reasons, the best first
+LONGEST_REASONING = 5_200  # characters; longer text loses its middle
+LINE_LENGTH = 104  # characters
+
+
+@dataclass(frozen=True)
+class Curves:
+    """A figure of hypervolume curves."""
+
+    name: str
+    title: str
+    methods: Sequence[str]
+
+
+def write_comparison_figures(
+    place: Path, comparison: Comparison, curves: Sequence[Curves] = (), samples: Sequence[str] = ()
+) -> list[Path]:
+    """Draw a comparison into `place`/figures and return the PNG files.
+
+    Args:
+        place: Folder of the experiment.
+        comparison: The runs to compare.
+        curves: Figures of hypervolume curves; by default one with all methods.
+        samples: Methods to show in detail: the first one with runs is drawn; by default the last of all methods.
+    """
+    return write_drawn(place / FIGURES, _drawn(comparison, curves, samples))
+
+
+def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
+    yield "targets", draw_targets(comparison)
+    plane = all(len(run.config.objectives) > 1 for run in comparison.runs)  # figures of the first two objectives
+    with_curves = [
+        method for method in comparison.methods if any(len(comparison.curves(method, t)) for t in comparison.tasks)
+    ]
+    if with_curves:
+        if plane:
+            yield "area", draw_area(comparison)
+        for figure in curves or (Curves("methods", "", with_curves),):
+            methods = [method for method in figure.methods if method in with_curves]
+            if methods:
+                yield f"hypervolume-{figure.name}", draw_curves(comparison, methods, figure.title)
+        yield "time-to", draw_times(comparison, with_curves)
+    for task in comparison.tasks[: MOST_SHOWN if plane else 0]:
+        yield f"attainment-{task}", draw_attainment(comparison, task)
+    if any(run.proposer for run in comparison.runs):
+        yield "credit", draw_credit_shares(comparison)
+    yield from _details(comparison, samples)
+
+
+def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:
+    """Yield figures of one run per task: its samples, Solutions 1 and 2, and the reasons for Solution 1."""
+    shown = next((method for method in samples if method in comparison.methods), comparison.methods[-1])
+    for task in comparison.tasks[:COLUMNS]:
+        runs = [run for run in comparison.of(shown, task) if len(run.curve)]
+        if not runs:
+            continue
+        history = runs[0].history()
+        if len(history.problem.objectives) > 1:
+            yield f"samples-{task}", draw_samples(history)
+        solutions = solution_numbers(history.masked_objectives, comparison.reference_point(task))
+        for i, number in enumerate(dict.fromkeys(solutions or ()), start=1):
+            title = f"{task}, {shown}, seed {runs[0].seed}: Solution {i}"
+            yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number))
+        reasons = _reasons(runs[0], history, solutions)
+        if reasons is not None:
+            yield f"reasoning-{task}", reasons
+
+
+def draw_targets(comparison: Comparison) -> Figure:
+    """Draw the targets of each task in space."""
+    shown = comparison.tasks[:MOST_SHOWN]
+    columns = min(len(shown), COLUMNS + 1)
+    rows = -(-len(shown) // columns)
+    figure = Figure(figsize=(3.2 * columns, 3.3 * rows))
+    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.06 / rows, top=1 - 0.1 / rows, wspace=0.1, hspace=0.16)
+    for place, task in enumerate(shown, start=1):
+        points = next(run for run in comparison.runs if run.task == task).config.task.points
+        axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
+        axes.scatter(*points.T, marker="*", s=90, color=TARGET, edgecolors=FRONT, linewidths=0.5, depthshade=False)
+        low, high = points.min(axis=0), points.max(axis=0)
+        half = float(max(0.1, 0.55 * (high - low).max()))
+        floor = (low + high)[2] / 2 - half
+        for x, y, z in points.tolist():
+            axes.plot([x, x], [y, y], [floor, z], color="#BBBBBB", linewidth=0.6)
+        frame(axes, ((low + high) / 2, half))
+        axes.set_title(f"{task}: {len(points)} targets", y=1.0)
+    if len(shown) < len(comparison.tasks):
+        figure.suptitle(f"{len(shown)} of {len(comparison.tasks)} tasks", fontsize=10)
+    return figure
+
+
+def draw_area(comparison: Comparison) -> Figure:
+    """Draw the area that E_hv measures, between the front of one run and the reference point."""
+    run = next(
+        r
+        for method in [comparison.baseline, *comparison.methods]
+        for r in comparison.runs
+        if r.method == method and len(r.curve)
+    )
+    config, history = run.config, run.history()
+    reference = run.reference_point
+    values = history.values[: config.study.n_trials, :2]
+    figure, axes = one_panel(4.4, 3.8)
+    kept = history.masked_objectives[: config.study.n_trials, :2]
+    inside = values[[n for n in front_numbers(kept) if np.all(values[n] < reference[:2])]]
+    axes.scatter(*values.T, s=12, color="#9A9A9A", label="designs")
+    if len(inside):
+        x = [inside[0, 0], *inside[:, 0], reference[0]]
+        y = [reference[1], *inside[:, 1], inside[-1, 1]]
+        axes.fill_between(
+            x,
+            y,
+            reference[1],
+            step="post",
+            facecolor="#F0E442",
+            alpha=0.5,
+            hatch="///",
+            edgecolor="#B8AE2C",
+            linewidth=0,
+            label="area measured",
+        )
+        axes.step(x, y, where="post", color=FRONT, linewidth=1.2)
+        axes.scatter(*inside.T, s=34, color=MISSED, edgecolors="white", linewidths=0.5, zorder=4, label="Pareto front")
+    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=12, clip_on=False)
+    axes.annotate("reference point", reference[:2], xytext=(-4, 5), textcoords="offset points", ha="right")
+    axes.set_xlim(0, 1.15 * reference[0])
+    axes.set_ylim(0, 1.15 * reference[1])
+    _name_axes(axes, config)
+    area = hypervolume(history.masked_objectives[: config.study.n_trials], reference)
+    axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
+    axes.legend(loc="lower left")
+    return figure
+
+
+def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> Figure:
+    """Draw the mean and standard deviation of the hypervolume over the seeds, with a panel for each task."""
+    figure, panels = _panels(comparison.tasks, 2.6)
+    for axes, task in zip(panels, comparison.tasks, strict=True):
+        for method in methods:
+            curves = comparison.curves(method, task)
+            if not len(curves):
+                continue
+            style = line(comparison.methods.index(method))
+            iterations = np.arange(1, len(curves[0]) + 1)
+            mean, deviation = curves.mean(axis=0), curves.std(axis=0)
+            axes.fill_between(
+                iterations, mean - deviation, mean + deviation, color=style.colour, alpha=0.15, linewidth=0
+            )
+            axes.plot(
+                iterations, mean, color=style.colour, linestyle=style.pattern, linewidth=1.5, marker=style.marker,
+                markevery=max(1, len(mean) // MARKERS), markersize=4,
+            )  # fmt: skip
+        known = comparison.best_known(task)
+        if known is not None:
+            axes.axhline(known, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)))
+        axes.set_title(task)
+        axes.set_xlabel("Iteration")
+        axes.margins(y=0.08)
+        axes.set_ylim(bottom=0)
+        axes.set_xlim(left=0)
+    for axes in panels[:: _columns(comparison.tasks)]:
+        axes.set_ylabel("Hypervolume")
+    handles = [_handle(comparison, method) for method in methods]
+    if any(comparison.best_known(task) is not None for task in comparison.tasks):
+        handles.append(Line2D([], [], color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label="best known"))
+    _legend(figure, handles)
+    seeds = {len(comparison.of(method, task)) for method in methods for task in comparison.tasks} - {0}
+    runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
+    caption = f"mean and standard deviation of {runs} runs"
+    figure.suptitle(f"{title}: {caption}" if title else caption.capitalize(), fontsize=10)
+    return figure
+
+
+def draw_attainment(comparison: Comparison, task: str) -> Figure:
+    """Draw empirical attainment surfaces: attained by half of a method's runs, by at least one and by all."""
+    figure, axes = one_panel(5.2, 4.2)
+    reference = comparison.reference_point(task)
+    handles: list[Any] = []
+    for method in comparison.methods:
+        runs = comparison.of(method, task)
+        if not runs:
+            continue
+        fronts = [_front(run) for run in runs]
+        sets = np.concatenate([np.full(len(front), i) for i, front in enumerate(fronts)])
+        points = np.vstack(fronts)
+        if not len(points):
+            continue
+        style = line(comparison.methods.index(method))
+        least, median, most = (
+            _stairs(moocore.eaf(points, sets=sets, percentiles=[share]), reference)
+            for share in (100 / len(fronts), 50, 100)
+        )
+        grid = np.unique(np.concatenate([least[0], median[0], most[0]]))
+        low, high = (_at(grid, *stairs) for stairs in (least, most))
+        axes.fill_between(grid, low, high, step="post", color=style.colour, alpha=0.13, linewidth=0)
+        axes.step(*median, where="post", color=style.colour, linestyle=style.pattern, linewidth=1.5)
+        handles.append(_handle(comparison, method, marked=False))
+    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
+    axes.set_xlim(0, 1.1 * reference[0])
+    axes.set_ylim(0, 1.1 * reference[1])
+    _name_axes(axes, next(run for run in comparison.runs if run.task == task).config)
+    axes.set_title(f"{task}: attained by half of the runs (lines), by one and by all (areas)")
+    _legend(figure, handles)
+    return figure
+
+
+def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
+    """Draw the share of runs that reached a level of the best known hypervolume, over the counted trials."""
+    levels = sorted({time.level for time in comparison.times})
+    figure = several_panels(10.4, 3.2)
+    panels: Any = np.atleast_1d(figure.subplots(1, len(levels), sharey=True))
+    for axes, level in zip(panels, levels, strict=True):
+        for method in methods:
+            there = np.sort(
+                [trials for task in comparison.tasks for trials in comparison.trials_to(method, task, level)]
+            )
+            longest = max(comparison.curves(method, task).shape[1] for task in comparison.tasks)
+            arrived = there[np.isfinite(there)]
+            trials = np.concatenate([[0], arrived, [longest]])
+            share = np.concatenate([[0], np.arange(1, len(arrived) + 1), [len(arrived)]]) / len(there)
+            style = line(comparison.methods.index(method))
+            axes.step(trials, share, where="post", color=style.colour, linestyle=style.pattern, linewidth=1.5)
+        axes.set_title(f"{level:.0%} of the best known")
+        axes.set_xlabel("Iteration")
+        axes.set_ylim(-0.02, 1.02)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    panels[0].set_ylabel("Runs that reached it")
+    _legend(figure, [_handle(comparison, method, marked=False) for method in methods])
+    return figure
+
+
+def draw_credit_shares(comparison: Comparison) -> Figure:
+    """Draw each source's share of the final hypervolume per method, averaged over the runs."""
+    pairs = [
+        (task, method)
+        for task in comparison.tasks
+        for method in comparison.methods
+        if any(run.proposer for run in comparison.of(method, task))
+    ]
+    figure, axes = one_panel(6.4, 1.3 + 0.32 * len(pairs))
+    sources: dict[str, None] = {}
+    for row, (task, method) in enumerate(pairs):
+        left = 0.0
+        for source, share in _gained_shares(comparison.of(method, task)).items():
+            style = look(source)
+            axes.barh(
+                row,
+                share,
+                left=left,
+                height=0.7,
+                facecolor=style.colour,
+                hatch=style.hatch,
+                edgecolor="white",
+                linewidth=0,
+            )
+            left += share
+            sources[source] = None
+    axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.marked(method)}" for task, method in pairs])
+    axes.set_ylim(len(pairs) - 0.4, -0.6)
+    axes.set_xlim(0, 1)
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.set_xlabel("Share of the final hypervolume by source")
+    axes.grid(axis="y", visible=False)
+    patches = [
+        Patch(facecolor=look(s).colour, hatch=look(s).hatch, edgecolor="white", label=look(s).label) for s in sources
+    ]
+    _legend(figure, patches)
+    return figure
+
+
+def _gained_shares(runs: Sequence[Run]) -> Mapping[str, float]:
+    gained: dict[str, list[float]] = {RANDOM: [], BBO: []}
+    for run in runs:
+        for source, share in run.gained.items():
+            gained.setdefault(source, []).append(share)
+    return {source: sum(shares) / len(runs) for source, shares in gained.items() if shares}
+
+
+def _reasons(run: Run, history: History, solutions: tuple[int, int] | None) -> Figure | None:
+    """Draw the reasons given for Solution 1, or for the proposal on the front that is nearest to it."""
+    if solutions is None or not run.proposer:
+        return None
+    proposed = [member.number for member in history.front if history.trials[member.number].proposal is not None]
+    within = [n for n in proposed if history.values[n, 0] >= history.values[solutions[0], 0]]
+    if not within:
+        return None
+    number = within[0]
+    trial = history.trials[number]
+    calls = Transcript(run.folder / TRANSCRIPTS, read_only=True).calls
+    call = _reasoned_call([call for call in calls if call.proposal == trial.proposal and call.fault is None])
+    text = call.answer if call is not None else trial.reason
+    if not text.strip():
+        return None
+    who = "the built-in rules" if call is None else f"{call.model} ({call.origin})"
+    which = "Solution 1" if number == solutions[0] else "the proposal on the front that is nearest to Solution 1"
+    head = f"{run.task}, {run.method}, seed {run.seed}: why #{number}, {which}, was proposed by {who}"
+    return _draw_text(head, _shortened(text))
+
+
+def _reasoned_call(calls: Sequence[Call]) -> Call | None:
+    return next((call for step in STEPS for call in calls if call.step == step), None)
+
+
+def _shortened(text: str) -> str:
+    if len(text) <= LONGEST_REASONING:
+        return text
+    half = LONGEST_REASONING // 2
+    return f"{text[:half].rstrip()}\n\n[… {len(text) - 2 * half:,} characters …]\n\n{text[-half:].lstrip()}"
+
+
+def _draw_text(head: str, text: str) -> Figure:
+    """Draw plain text as a figure; markup is not interpreted."""
+    plain = "".join(c for c in text if c.isprintable() or c == "\n")
+    lines = [part for whole in plain.splitlines() for part in textwrap.wrap(whole, LINE_LENGTH) or [""]]
+    height = 0.7 + 0.148 * len(lines)
+    figure = Figure(figsize=(8.0, height))
+    figure.text(
+        0.02, 1 - 0.15 / height, textwrap.fill(head, 110), va="top", fontsize=9, weight="bold", parse_math=False
+    )
+    figure.text(
+        0.02,
+        1 - 0.5 / height,
+        "\n".join(lines),
+        va="top",
+        fontsize=7.5,
+        family="monospace",
+        parse_math=False,
+        linespacing=1.2,
+    )
+    return figure
+
+
+def _name_axes(axes: Any, config: RunConfig) -> None:
+    axes.set_xlabel(axis_label(config.objectives[0], config.space))
+    axes.set_ylabel(axis_label(config.objectives[1], config.space))
+
+
+def _front(run: Run) -> np.ndarray:
+    """Return the front of a run in the first two objectives, (K, 2)."""
+    counted = run.history().masked_objectives
+    return counted[front_numbers(counted)][:, :2]
+
+
+def _stairs(surface: np.ndarray, reference: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return a surface of `moocore.eaf` as the x and y of a step line from the top to the right side of the box."""
+    points = surface[np.argsort(surface[:, 0])][:, :2]
+    points = points[np.all(points < np.asarray(reference[:2]), axis=1)]
+    if not len(points):
+        return np.array([reference[0]]), np.array([reference[1]])
+    x = np.concatenate([points[:1, 0], points[:, 0], [reference[0]]])
+    y = np.concatenate([[reference[1]], points[:, 1], points[-1:, 1]])
+    return x, y
+
+
+def _at(grid: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the heights of the steps at `grid`; left of the first step, the top of the box."""
+    place = np.searchsorted(x, grid, side="right") - 1
+    return np.where(place >= 0, y[np.maximum(place, 0)], y[0])
+
+
+def _columns(tasks: Sequence[str]) -> int:
+    return min(len(tasks), COLUMNS if len(tasks) <= 2 * COLUMNS else COLUMNS + 2)
+
+
+def _panels(tasks: Sequence[str], height: float) -> tuple[Figure, Sequence[Any]]:
+    columns = _columns(tasks)
+    rows = math.ceil(len(tasks) / columns)
+    figure = several_panels(max(5.2, min(3.5, 11.0 / columns) * columns), height * rows + 0.7)
+    panels: list[Any] = list(np.atleast_1d(figure.subplots(rows, columns)).flat)
+    for axes in panels[len(tasks) :]:
+        axes.set_visible(False)
+    for axes in panels:
+        axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
+    return figure, panels[: len(tasks)]
+
+
+def _handle(comparison: Comparison, method: str, marked: bool = True) -> Line2D:
+    style = line(comparison.methods.index(method))
+    marker = style.marker if marked else None
+    return Line2D(
+        [],
+        [],
+        color=style.colour,
+        linestyle=style.pattern,
+        linewidth=1.5,
+        marker=marker,
+        markersize=4,
+        label=comparison.marked(method),
+    )
+
+
+def _legend(figure: Figure, handles: Sequence[Any]) -> None:
+    """Add a legend below the panels, with as many columns as fit."""
+    if handles:
+        widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
+        columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
+        figure.legend(handles=handles, loc="outside lower center", ncols=columns)

@@ -1,0 +1,339 @@
+"""The content of the page: a run folder packed as bytes for the page's script.
+
+report.html embeds these bytes; the live server sends them, reduced to what is new.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.experiments.compare_arms import dominance_counts, read_existing_arms
+from armwright.experiments.compare_runs import method_words
+from armwright.llm.transcript import TRANSCRIPTS, Transcript
+from armwright.pareto import hypervolume
+from armwright.problem.objectives import TORQUE, TORQUE_SCALE
+from armwright.report.repeat_command import repeat_command
+from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
+from armwright.robot.arm import AXES, Arm, Joint, Link
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.best_known import known_front
+from armwright.runs.config import FrontMethod, Method, RunConfig
+from armwright.runs.folder import read_config
+from armwright.runs.history import POLISH, History
+from armwright.runs.results import read_summary
+from armwright.runs.selection import bounded_numbers, numbers_of
+from armwright.runs.trials_file import TrialsReader
+from armwright.spaces.parameters import FloatParameter
+from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.targets import TargetArrays
+
+KINDS = ("revolute", "prismatic", "fixed")
+NO_JOINT = Joint("fixed", "z")  # padding of shorter arms
+NO_LINK = Link((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 1.0)
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+class RunContent:
+    """A run folder as the page shows it; `refresh` reads only what is new."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.config: RunConfig = read_config(folder)
+        self._reader = TrialsReader(folder, self.config)
+        self._chunks: list[tuple[int, Arrays]] = []  # chunks of designs, by the number of the first
+        self._n = 0
+        self.history = self._nothing()
+        self.refresh()
+
+    def is_still(self, config: RunConfig) -> bool:
+        """Return whether a folder with these settings holds the same run, possibly extended."""
+        changing: dict[str, Any] = {"reference_point": None, "versions": {}, "earlier_versions": [], "method": None}
+        ours, theirs = (one.model_copy(update=changing) for one in (self.config, config))
+        return ours == theirs and type(self.config.method) is type(config.method)
+
+    def refresh(self) -> bool:
+        """Read what is new; return whether the trials file was replaced and had to be read from the start."""
+        self.config = read_config(self.folder)  # the reference point may have been chosen since
+        is_other = self._reader.read_on() or len(self._reader.trials) < self._n
+        if is_other:
+            self._chunks, self._n, self.history = [], 0, self._nothing()
+        summary = read_summary(self.folder)
+        # A summary of another kind of run does not belong to this one.
+        self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
+        self.calls = Transcript(self.folder / TRANSCRIPTS, read_only=True).calls
+        self.history = self.history.grown(self._reader.trials, self.config.reference_point)
+        if len(self.history) > self._n:
+            self._chunks.append((self._n, _designs(self.history, range(self._n, len(self.history)))))
+            self._n = len(self.history)
+        return is_other
+
+    def _nothing(self) -> History:
+        return History(self.config.problem, (), self.config.method.n_init, self.config.reference_point)
+
+    @property
+    def study(self) -> Method | None:
+        """The settings of its study; None for a direct search."""
+        return None if isinstance(self.config.method, FrontMethod) else self.config.method
+
+    def packed(self, designs_from: int = 0, calls_from: int = 0, with_files: bool = True) -> bytes:
+        """The whole run, or what is new from a design and a call on.
+
+        with_files: URDF and MJCF of the front's designs, too.
+        """
+        if designs_from not in {self._n, *(first for first, _ in self._chunks)}:
+            designs_from = 0  # the page holds a state that was never sent: send everything
+        arrays = _joined([arrays for first, arrays in self._chunks if first >= designs_from])
+        front = [member.number for member in self.history.front]
+        search = None if self.summary is None or self.study is not None else self.summary["search"]
+        spent = None if search is None else search["evaluations"]
+        head = {
+            **_about(self.config, self.folder, self.history, spent),
+            "n": self._n,
+            "designs_from": designs_from,
+            "front": front,
+            "arms": {number: _of_arm(self.history, number) for number in front},
+            "proposals": _proposals(self.history, designs_from),
+            "sources": list(dict.fromkeys(trial.source for trial in self.history)),
+            "looks": {trial.source: _look(trial.source) for trial in self.history},
+            "existing": {"label": EXISTING.label, "colour": EXISTING.colour},
+            "existing_arms": _existing_arms(self.folder, self.history),
+            "result": _result(self.config, self.history, self.summary),
+            "calls_from": calls_from,
+            "calls": [asdict(call) for call in self.calls[calls_from:]],
+            "files": {number: design_files(self.history, number) for number in front} if with_files else {},
+        }
+        return pack(head, {**arrays, "curve": self.history.hypervolumes})
+
+
+def _existing_arms(folder: Path, history: History) -> list[dict[str, Any]]:
+    """Return the existing arms of the last comparison and their relation to the present front."""
+    return [
+        {
+            "name": arm.name,
+            "values": list(arm.values),
+            "violated": list(arm.violated),
+            "standing": dominance_counts(arm.values, arm.violated, history),
+        }
+        for arm in read_existing_arms(folder, len(history.problem.objectives))
+    ]
+
+
+def design_files(history: History, number: int) -> dict[str, str]:
+    """Return a design as text for simulators, by format."""
+    name, arm = f"{history.problem.task.name}-{number}", history.member(number).arm
+    return {"urdf": to_urdf(arm, name), "mjcf": to_mjcf(arm, name)}
+
+
+def _of_arm(history: History, number: int) -> dict[str, float]:
+    """Return quantities of an arm that do not depend on the targets, named as in `armwright pick`."""
+    numbers = numbers_of(history, history.member(number))
+    return {name: numbers[name] for name in ("length", "mass", *bounded_numbers(history, number))}
+
+
+def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
+    """Pack a JSON head and arrays: the head's length (uint32, little-endian), the head, then the arrays.
+
+    The head's "arrays" says of each its type, where it begins after the head [bytes], and its shape. All begin at
+    multiples of 8, so that a script can look at them where they lie.
+    """
+    places: dict[str, Any] = {}
+    parts: list[bytes] = []
+    at = 0
+    for name, array in arrays.items():
+        data = np.ascontiguousarray(array.astype(array.dtype.newbyteorder("<"))).tobytes()
+        places[name] = [array.dtype.name, at, list(array.shape)]
+        parts.append(data + b"\0" * (-len(data) % 8))
+        at += len(parts[-1])
+    text = json.dumps({**head, "arrays": places}, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-(len(text) + 4) % 8)
+    return len(text).to_bytes(4, "little") + text + b"".join(parts)
+
+
+def _designs(history: History, numbers: range) -> Arrays:
+    """Return the page's arrays of these designs, one row each; `q`: (n, T, J) joint angles [rad] or strokes [m]."""
+    space = history.problem.space
+    trials = [history.trials[number] for number in numbers]
+    arms = [history.problem.arm(trial.design) for trial in trials]
+    evaluation = history.evaluation(numbers)
+    sources = list(dict.fromkeys(trial.source for trial in history))
+    return {
+        "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
+        "values": history.values[numbers.start : numbers.stop],
+        "params": space.matrix([trial.design for trial in trials]),
+        "broken": history.violations[numbers.start : numbers.stop],
+        "q": evaluation.q.astype(np.float32),
+        **_arm_arrays(arms, evaluation.arms.dof),
+    }
+
+
+def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
+    """Return the arms joint by joint, padded to J joints; `joints`: (n,) the number that an arm has."""
+    own = [arm.joints + (NO_JOINT,) * (room - len(arm.joints)) for arm in arms]
+    links = [arm.links + (NO_LINK,) * (room - len(arm.links)) for arm in arms]
+
+    def floats(rows: Any) -> NDArray[np.float32]:
+        return np.array(rows, dtype=np.float32)
+
+    return {
+        "base": floats([arm.base for arm in arms]),
+        "tool": floats([arm.tool for arm in arms]),
+        "tool_axis": floats([arm.tool_axis for arm in arms]),
+        "tool_side": floats([arm.tool_side for arm in arms]),
+        "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
+        "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
+        "axis": np.array([[AXES.index(j.axis) for j in row] for row in own], dtype=np.uint8),
+        "lower": floats([[j.lower for j in row] for row in own]),
+        "upper": floats([[j.upper for j in row] for row in own]),
+        "travel": floats([[j.travel for j in row] for row in own]),
+        "offset": floats([[link.offset for link in row] for row in links]),
+        "com": floats([[link.total_com for link in row] for row in links]),
+        "mass": floats([[link.total_mass for link in row] for row in links]),
+        "radius": floats([[link.radius for link in row] for row in links]),
+    }
+
+
+def _joined(chunks: Sequence[Arrays]) -> dict[str, NDArray[Any]]:
+    if not chunks:
+        return {}
+    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+
+
+def _about(config: RunConfig, folder: Path, history: History, spent: int | None) -> dict[str, Any]:
+    """Return the head's slowly changing part; `spent`: evaluations of a direct search."""
+    task, method, space = config.task, config.method, config.space
+    study = None if isinstance(method, FrontMethod) else method
+    known = known_front(config.problem)
+    reference = history.reference_point
+    return {
+        "folder": folder.resolve().name,
+        "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
+        "targets": [list(target) for target in task.targets],
+        "payloads": task.payloads.tolist(),
+        "cases": task.case_words,
+        "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
+        "goals": _goals(task.goals),
+        "workspace": [{"low": list(r.low), "high": list(r.high), "words": r.words()} for r in task.workspace],
+        "moves": [list(pair) for pair in task.lines.pairs],
+        "reference_point": None if reference is None else list(reference),
+        "objectives": [objective.model_dump() for objective in config.objectives],
+        "constraints": [
+            {
+                "words": constraint.words,
+                "name": constraint.quantity.name,
+                "unit": constraint.quantity.unit,
+                "bound": constraint.bound,
+                "sign": 1 if constraint.relation == "<=" else -1,
+                "scale": constraint.scale,
+            }
+            for constraint in config.problem.constraints
+        ],
+        "torque_scale": TORQUE_SCALE if any(o.name == TORQUE.name for o in config.objectives) else None,
+        "parameters": [
+            {"name": p.name, "needs": space.condition(p.name)}
+            | (
+                {"low": p.low, "high": p.high, "unit": p.unit}
+                if isinstance(p, FloatParameter)
+                else {"choices": list(p.choices)}
+            )
+            for p in space.parameters
+        ],
+        "masses": space.mass_note,
+        "is_toy": space.is_toy,
+        "seed": config.seed,
+        "method": method_words(config),
+        "study": None if study is None else study.model_dump(mode="json"),
+        "n_init": method.n_init,
+        "planned": None if study is None else study.n_trials,
+        "command": repeat_command(config, any(trial.source == POLISH for trial in history), spent),
+        "config": config.model_dump(mode="json"),
+        "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
+        "colours": {
+            "front": FRONT,
+            "missed": MISSED,
+            "target": TARGET,
+            "joint": JOINT,
+            "obstacle": OBSTACLE,
+            "infeasible": INFEASIBLE,
+        },
+        "joint_words": JOINT_LABEL,
+    }
+
+
+def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    solid = obstacle.solid
+    return {
+        "shape": solid.shape,
+        "centre": list(solid.centre),
+        "rotation": solid.rotation.tolist(),
+        "half": list(solid.half),
+        "words": obstacle.words(),
+    }
+
+
+def _goals(goals: TargetArrays) -> dict[str, Any]:
+    """Return the targets' orientation requirements; frames: tool axes as columns, stored row by row."""
+    return {
+        "oriented": goals.oriented,
+        "rows": goals.n_angular.tolist(),
+        "frames": goals.rotation.reshape(-1, 9).tolist() if goals.oriented else [],
+        "tolerance": goals.tolerance.tolist(),
+        "angle_tolerance": goals.angle_tolerance.tolist(),
+    }
+
+
+def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the results of the run so far."""
+    reference = history.reference_point
+    final = hypervolume(history.masked_objectives, reference) if reference is not None and len(history) else None
+    found: dict[str, Any] = {
+        "finished": summary is not None,
+        "hypervolume": final,
+        "by_source": dict(Counter(trial.source for trial in history)),
+        "seconds": sum(trial.seconds.get("total", 0.0) for trial in history),
+        "evaluations": sum(trial.evaluations for trial in history),
+        "infeasible": int((~history.feasible).sum()),
+        "solid": None,
+        "cost_usd": None,
+        "search": None,
+    }
+    if summary is None:
+        return found
+    verification = cast("Mapping[str, Any] | None", summary["verification"])
+    proposer = cast("Mapping[str, Any]", summary.get("proposer") or {})
+    found["hypervolume"] = summary["hypervolume"]["final"]
+    found["solid"] = None if verification is None else verification["solid_numbers"]
+    found["cost_usd"] = proposer.get("cost_usd")
+    if isinstance(config.method, FrontMethod):
+        search = summary["search"]
+        found |= {"seconds": search["seconds"], "evaluations": search["evaluations"]}
+        found["infeasible"] = search.get("infeasible", 0)
+        found["search"] = search["hypervolume_history"]
+    return found
+
+
+def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
+    """Return the proposals, refinements and failed proposals among the designs from `first` on."""
+    return {
+        trial.number: {
+            "id": trial.proposal,
+            "reason": trial.reason,
+            "expected": None if trial.expected is None else list(trial.expected),
+            "fault": trial.fault,
+            "refines": trial.refines,
+        }
+        for trial in history.trials[first:]
+        if trial.proposal is not None or trial.fault is not None or trial.refines is not None
+    }
+
+
+def _look(source: str) -> dict[str, str]:
+    style = look(source)
+    return {"label": style.label, "colour": style.colour, "marker": style.marker}

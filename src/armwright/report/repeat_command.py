@@ -1,0 +1,90 @@
+"""Reconstruct the command of a run from its settings."""
+
+import re
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from armwright.problem.objectives import OBJECTIVES
+from armwright.runs.config import FrontMethod, Method, RunConfig
+from armwright.spaces.design_space import builtin_spaces, load_space
+from armwright.spaces.tolerance import TOLERANCE
+from armwright.tasks.task import builtin_names, load_task
+
+OWN_TASK, OWN_SPACE = "TASK.yaml", "SPACE.yaml"  # placeholders for the user's own files
+PROPOSER_OPTIONS = (
+    "model", "base_url", "prompt", "memory", "answer", "proposals", "temperature", "model_seed", "output",
+)  # fmt: skip
+DEFAULTS = {
+    "sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200, "prompt": "plus", "memory": "none",
+    "answer": "two-step", "proposals": 1, "output": "auto",
+}  # fmt: skip
+TASK_FIELDS = (  # fields that distinguish one task from another
+    "entries", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step", "move_time",
+    "workspace", "constraints", "objectives", "reference_point",
+)  # fmt: skip
+
+
+def repeat_command(config: RunConfig, polished: bool = False, spent: int | None = None) -> str:
+    """Return the shell command that repeats a run, without options at their defaults.
+
+    The user's own task, space and initial designs appear as TASK.yaml, SPACE.yaml and START-1.json; their content is in
+    the run's config.yaml.
+
+    Args:
+        config: The settings of the run.
+        polished: Whether the run was refined afterwards.
+        spent: Evaluations of a direct search.
+
+    Returns:
+        The command; empty if objectives, sampler or proposer are the user's own code.
+    """
+    name, task = config.task.name, config.task
+    if any(record.name not in OBJECTIVES for record in config.objectives) or config.tolerance not in (0.0, TOLERANCE):
+        return ""
+    builtin = load_task(name) if name in builtin_names() or name.startswith("random-") else None
+    alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in TASK_FIELDS)
+    words = [name if alike else OWN_TASK]
+    settings: dict[str, Any] = {}
+    n_starts = 0
+    known = {name: load_space(name).model_dump(exclude={"name"}) for name in builtin_spaces()}
+    alike = [name for name, content in known.items() if content == config.space.model_dump(exclude={"name"})]
+    if "paper" not in alike:
+        settings["space"] = alike[0] if alike else OWN_SPACE
+    if isinstance(config.method, FrontMethod):
+        begun = config.method.begin_with or {}
+        settings |= {"budget": spent, "from": begun.get("run"), "proposer": begun.get("proposer", {}).get("name")}
+        command = "front"
+    else:
+        command = "optimize"
+        if not _is_known(config.method):
+            return ""
+        settings |= _study_options(config.method)
+        n_starts = len(config.method.start)
+    given = {key: value for key, value in settings.items() if value is not None and value != DEFAULTS.get(key)}
+    options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
+    options += [text for n in range(n_starts) for text in ("--start", f"START-{n + 1}.json")]
+    options += ["--robust"] * (config.tolerance > 0.0)
+    options += ["--overlap"] * ("in_flight" in given)
+    line = shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])
+    return f"{line} && armwright polish RUN" if polished else line
+
+
+def _study_options(method: Method) -> dict[str, Any]:
+    proposer: Mapping[str, Any] = method.proposer or {"name": "none"}
+    return {
+        "proposer": proposer["name"],
+        **{key: proposer.get(key) for key in PROPOSER_OPTIONS},
+        "sampler": method.sampler,
+        "n_init": method.n_init,
+        "n_step": method.n_step,
+        "n_total": method.n_total,
+        "in_flight": method.in_flight,
+        "polish_every": method.polish_every,
+    }
+
+
+def _is_known(method: Method) -> bool:
+    """Return whether the command line can name the proposer and the sampler."""
+    proposer = (method.proposer or {}).get("name", "none")
+    return proposer in ("none", "rules", "llm") and re.fullmatch("[a-z0-9-]+", method.sampler) is not None

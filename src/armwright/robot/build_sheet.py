@@ -1,0 +1,106 @@
+"""The build sheet of an arm: what to cut, and what each joint must turn and hold."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.robot.arm import Arm
+
+AXIS_WORDS = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
+
+
+@dataclass(frozen=True)
+class SheetRow:
+    """A joint and the link after it.
+
+    length: of the link, joint to joint [m]. mass: of the link [kg]. lower, upper: limits [rad] or [m].
+    used: the least and the largest value at the targets [rad] or [m]. torque: the largest absolute one that holds
+    it at any target [N m], or force [N] where it slides; target: at which one, counted from 1.
+    actuator: its name; use: the share of its torque that is needed; price: [USD].
+    """
+
+    number: int
+    kind: str
+    axis: str
+    length: float
+    mass: float
+    lower: float
+    upper: float
+    used: tuple[float, float]
+    torque: float
+    target: int
+    actuator: str
+    use: float | None
+    price: float | None
+
+
+def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
+    """One for each joint; q, torques: (T, J) at the targets."""
+    rows: list[SheetRow] = []
+    for j, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True)):
+        worst = int(np.argmax(np.abs(torques[:, j])))
+        torque, motor = float(np.abs(torques[worst, j])), joint.actuator
+        rows.append(
+            SheetRow(
+                number=j + 1,
+                kind=joint.kind,
+                axis=AXIS_WORDS[joint.axis],
+                length=link.length,
+                mass=link.mass,
+                lower=joint.lower,
+                upper=joint.upper,
+                used=(float(q[:, j].min()), float(q[:, j].max())),
+                torque=torque,
+                target=worst + 1,
+                actuator="" if motor is None else motor.name,
+                use=None if joint.effort is None else torque / joint.effort,
+                price=None if motor is None else motor.price,
+            )
+        )
+    return rows
+
+
+def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterable[str]) -> str:
+    """The sheet to read and to print."""
+    base = ", ".join(f"{1e3 * value:.1f}" for value in arm.base)
+    lines = [
+        f"# Build sheet: {title}",
+        "",
+        f"Base, the first joint's place: ({base}) mm. With all joints at 0 the links stand as listed, along their own "
+        "axes. Lengths are from joint to joint, the last one to the tip.",
+        "",
+        "| # | joint | actuator | limits | used at the targets | holds at most | at target | link | mass |",
+        "|--:|---|---|---|---|--:|--:|--:|--:|",
+    ]
+    for row in rows:
+        unit, force = ("m", "N") if row.kind == "prismatic" else ("rad", "N m")
+        fixed = row.kind == "fixed"
+        cells = [
+            str(row.number),
+            "fixed" if fixed else f"{row.kind}, {row.axis}",
+            row.actuator or "–",
+            "" if fixed else f"{row.lower:.3f} to {row.upper:.3f} {unit}",
+            "" if fixed else f"{row.used[0]:.3f} to {row.used[1]:.3f} {unit}",
+            "" if fixed else f"{row.torque:.4g} {force}" + ("" if row.use is None else f" ({row.use:.0%})"),
+            "" if fixed else str(row.target),
+            f"{1e3 * row.length:.1f} mm",
+            f"{1e3 * row.mass:.4g} g",
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    length, mass = sum(row.length for row in rows), sum(row.mass for row in rows)
+    lines += ["", f"Together {1e3 * length:.1f} mm of links, {1e3 * mass:.4g} g."]
+    if any(arm.tool):
+        shift = ", ".join(f"{1e3 * value:.1f}" for value in arm.tool)
+        lines += ["", f"The tool reaches ({shift}) mm from the end of the last link to the tip."]
+    if arm.tool_axis != (0.0, 0.0, 1.0):
+        up = ", ".join(f"{value:g}" for value in arm.tool_axis)
+        lines += ["", f"Axes are the world's, with all joints at 0; the mounted arm's own z then points along ({up})."]
+    motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
+    if motors:
+        prices = [motor.price for motor in motors]
+        price = "" if None in prices else f", {sum(price or 0.0 for price in prices):,.0f} USD"
+        lines += ["", f"{len(motors)} actuators of {1e3 * sum(motor.mass for motor in motors):.4g} g{price}."]
+    lines += [f"\n{note}" for note in notes]
+    return "\n".join(lines) + "\n"

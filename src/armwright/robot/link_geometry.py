@@ -1,0 +1,174 @@
+"""What the file formats share: bodies and limits of an arm, colours, and numbers as text."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.robot.arm import Arm, Joint, Link, Vector
+
+AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+COLOURS = {
+    "link": "0.75 0.75 0.78 1",
+    "joint_x": "0.84 0.37 0.00 1",
+    "joint_y": "0.00 0.45 0.70 1",
+    "joint_z": "0.00 0.62 0.45 1",
+}
+MARKER_SCALE = 1.4  # radius of a joint's sphere, relative to its link
+
+# MuJoCo refuses a moving body without mass and raises smaller values to these.
+MIN_INERTIA = {"boundmass": "1e-12", "boundinertia": "1e-14"}  # [kg], [kg m²]
+MUJOCO_COMPILER = {"fusestatic": "false", "discardvisual": "false", **MIN_INERTIA}
+
+# A moving joint must state both. Without an actuator they only have to be large enough.
+DEFAULT_EFFORT = 100.0  # [N m] or [N]
+DEFAULT_VELOCITY = 10.0  # [rad/s] or [m/s]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A joint and the link after it, as formats list them.
+
+    Attributes:
+        number: Counted from 1.
+        joint: The joint.
+        link: The link that it moves.
+        parent: The name of the link before.
+        position: The position of the joint in the frame of that link [m].
+    """
+
+    number: int
+    joint: Joint
+    link: Link
+    parent: str
+    position: Vector
+
+    @property
+    def name(self) -> str:
+        """The name of the link."""
+        return f"link_{self.number}"
+
+
+def segments(arm: Arm) -> Iterator[Segment]:
+    """Yield the joints and links of an arm, from the base to the tip."""
+    parent, position = "base", (0.0, 0.0, 0.0)
+    for number, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True), start=1):
+        segment = Segment(number, joint, link, parent, position)
+        yield segment
+        parent, position = segment.name, link.offset
+
+
+def moving_joints(arm: Arm) -> Iterator[tuple[int, Joint]]:
+    """Yield the number, counted from 1, and the joint for all joints that move."""
+    for number, joint in enumerate(arm.joints, start=1):
+        if joint.kind != "fixed":
+            yield number, joint
+
+
+def joint_limits(joint: Joint) -> dict[str, float]:
+    """Return lower and upper [rad] or [m], effort [N m] or [N] and velocity [rad/s] or [m/s] of a joint."""
+    effort = DEFAULT_EFFORT if joint.effort is None else joint.effort
+    velocity = DEFAULT_VELOCITY if joint.speed is None else joint.speed
+    return {"lower": joint.lower, "upper": joint.upper, "effort": effort, "velocity": velocity}
+
+
+def home_position(joint: Joint) -> float:
+    """Return 0, or the limit closest to it [rad] or [m]."""
+    return min(max(0.0, joint.lower), joint.upper)
+
+
+def cylinder_inertia(link: Link) -> tuple[str, str]:
+    """Return the moments of a solid cylinder across and around its axis, about its centre of mass [kg m²].
+
+    m (3 r² + l²) / 12 across the axis and m r² / 2 around it. A cylinder without length is a disc, for which
+    2 across = around holds; all digits are written, since MuJoCo refuses a value below it by rounding.
+    """
+    around = link.mass * link.radius**2 / 2.0
+    across = around / 2.0 + link.mass * link.length**2 / 12.0
+    return f"{across:.17g}", f"{around:.17g}"
+
+
+def inertia_tensor(link: Link) -> Array:
+    """Return (3, 3) of the cylinder and the mass at its end, about their common centre of mass, in the link frame."""
+    r2, l2 = link.radius**2, link.length**2
+    across = link.mass * (3.0 * r2 + l2) / 12.0
+    axis = np.array(link.offset) / link.length if link.length > 0.0 else np.array([0.0, 0.0, 1.0])
+    around = np.outer(axis, axis)
+    tensor = across * (np.eye(3) - around) + link.mass * r2 / 2.0 * around
+    centre = np.array(link.total_com)
+    for mass, place in ((link.mass, link.com), (link.end_mass, link.end_place)):
+        away = np.array(place) - centre
+        tensor += mass * (away @ away * np.eye(3) - np.outer(away, away))
+    return tensor
+
+
+def inertia_rpy(link: Link) -> Vector:
+    """Return roll, pitch and yaw [rad] of the frame of `inertia_moments`: along the link if it carries no end mass."""
+    return rpy_along(link.offset) if link.end_mass == 0.0 else (0.0, 0.0, 0.0)
+
+
+def inertia_moments(link: Link) -> dict[str, str]:
+    """Return the moments about the centre of mass in the frame of `inertia_rpy` [kg m²], by their URDF names."""
+    if link.end_mass == 0.0:
+        across, around = cylinder_inertia(link)
+        return {"ixx": across, "iyy": across, "izz": around, "ixy": "0", "ixz": "0", "iyz": "0"}
+    tensor = inertia_tensor(link)
+    return {name: f"{tensor[place]:.17g}" for name, place in TENSOR_PLACES.items()}
+
+
+TENSOR_PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+
+
+def rpy_along(offset: Vector) -> Vector:
+    """Return roll, pitch and yaw [rad] of a frame whose z axis points along `offset`."""
+    x, y, z = offset
+    return (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))
+
+
+def tip_position(arm: Arm) -> Vector:
+    """Return the position of the tip in the frame of the last link [m]."""
+    (x, y, z), (u, v, w) = arm.links[-1].offset, arm.tool
+    return (x + u, y + v, z + w)
+
+
+def tip_rpy(arm: Arm) -> Vector:
+    """Return roll, pitch and yaw [rad] of the tip frame in the last link: z is the tool's axis and x its side."""
+    z = np.array(arm.tool_axis) / np.linalg.norm(arm.tool_axis)
+    y = np.cross(z, arm.tool_side)
+    y = y / np.linalg.norm(y)
+    x = np.cross(y, z)
+    level = math.hypot(x[0], x[1])
+    pitch = math.atan2(-x[2], level)
+    # In gimbal lock (x straight up or down) roll and yaw rotate about the same line: all of it is yaw.
+    roll, yaw = (math.atan2(y[2], z[2]), math.atan2(x[1], x[0])) if level > 1e-9 else (0.0, math.atan2(-y[0], y[1]))
+    return (roll + 0.0, pitch + 0.0, yaw + 0.0)  # no -0.0
+
+
+def midpoint(link: Link) -> Vector:
+    """Return the point halfway to the next joint [m]."""
+    x, y, z = link.offset
+    return (x / 2, y / 2, z / 2)
+
+
+def marker_radius(link: Link) -> float:
+    """Return the radius of the sphere that marks a joint [m]."""
+    return MARKER_SCALE * link.radius
+
+
+def number(value: float) -> str:
+    """Format a number with ten digits."""
+    return f"{value:.10g}"
+
+
+def numbers(values: Vector) -> str:
+    """Format numbers with ten digits each, separated by spaces."""
+    return " ".join(number(value) for value in values)
+
+
+def to_xml(root: ElementTree.Element) -> str:
+    """Return the XML of the whole file, indented."""
+    ElementTree.indent(root)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,108 @@
+"""An arm as MJCF, MuJoCo's own format."""
+
+from xml.etree.ElementTree import Element, SubElement
+
+from armwright.robot.arm import GRAVITY, Arm, Joint, Link
+from armwright.robot.link_geometry import (
+    AXIS_VECTORS,
+    COLOURS,
+    MIN_INERTIA,
+    TENSOR_PLACES,
+    cylinder_inertia,
+    inertia_tensor,
+    marker_radius,
+    midpoint,
+    moving_joints,
+    number,
+    numbers,
+    rpy_along,
+    segments,
+    tip_position,
+    tip_rpy,
+    to_xml,
+)
+
+TYPES = {"revolute": "hinge", "prismatic": "slide"}  # a fixed joint is a body without a joint
+SKY = {"builtin": "gradient", "rgb1": "0.97 0.97 0.98", "rgb2": "0.84 0.86 0.90", "width": "64", "height": "384"}
+TIP_COLOUR = "0.07 0.07 0.07 1"
+
+
+def to_mjcf(arm: Arm, name: str = "arm") -> str:
+    """Return the MJCF of an arm: `base`, link_1 on joint_1, …, a site `tip`, and motor_1 on joint_1, ….
+
+    Names, frames, masses, inertias and colours are those of `to_urdf`: link frames are at their joints, and with all
+    joints at 0 they are parallel to the world frame. Each moving joint has a motor with gear 1, limited to the torque
+    of its actuator if it has one. `ctrl` is the torque [N m] or force [N] on that joint.
+
+    Geometry is for display only. It has no mass, since the mass of each link is stated, and no contacts: links overlap
+    at their joints, so contacts would push them apart.
+
+    `python -m mujoco.viewer --mjcf=arm.xml` shows the arm.
+    """
+    root = Element("mujoco", model=name)
+    # XYZ: roll, pitch and yaw about fixed axes, as in a URDF.
+    compiler = {"angle": "radian", "autolimits": "true", "eulerseq": "XYZ", "inertiafromgeom": "false", **MIN_INERTIA}
+    SubElement(root, "compiler", compiler)
+    SubElement(root, "option", gravity=numbers((0.0, 0.0, -GRAVITY)))
+    SubElement(SubElement(root, "default"), "geom", contype="0", conaffinity="0", mass="0")
+    body = SubElement(_add_scene(root, arm), "body", name="base", pos=numbers(arm.base))
+    for segment in segments(arm):
+        body = SubElement(body, "body", name=segment.name, pos=numbers(segment.position))
+        _add_joint(body, f"joint_{segment.number}", segment.joint)
+        _add_link(body, segment.joint, segment.link)
+    _add_tip(body, arm)
+    actuators = SubElement(root, "actuator")
+    for n, joint in moving_joints(arm):
+        motor = {"name": f"motor_{n}", "joint": f"joint_{n}", "gear": "1"}
+        if joint.effort is not None:
+            motor["ctrlrange"] = f"{number(-joint.effort)} {number(joint.effort)}"
+        SubElement(actuators, "motor", motor)
+    return to_xml(root)
+
+
+def _add_scene(root: Element, arm: Arm) -> Element:
+    """Add an empty world, lit from one side, with everything within reach in view; return its body."""
+    x, y, z = arm.base
+    size = arm.reach + arm.links[0].radius  # never 0
+    # The viewer's camera is 1.5 extents away and sees 22.5 degrees to each side: size = 1.5 extents * sin(22.5).
+    SubElement(root, "statistic", center=numbers(arm.base), extent=number(1.75 * size))
+    assets = SubElement(root, "asset")
+    SubElement(assets, "texture", {"type": "skybox", **SKY})
+    for material, rgba in COLOURS.items():
+        SubElement(assets, "material", name=material, rgba=rgba)
+    world = SubElement(root, "worldbody")
+    SubElement(world, "light", pos=numbers((x - size, y - size, z + 2.0 * size)), dir="1 1 -2")
+    return world
+
+
+def _add_joint(body: Element, name: str, joint: Joint) -> None:
+    if joint.kind == "fixed":
+        return
+    limits = f"{number(joint.lower)} {number(joint.upper)}"
+    attributes = {"name": name, "type": TYPES[joint.kind], "axis": AXIS_VECTORS[joint.axis], "range": limits}
+    SubElement(body, "joint", attributes)
+
+
+def _add_link(body: Element, joint: Joint, link: Link) -> None:
+    euler = numbers(rpy_along(link.offset))
+    inertial = {"pos": numbers(link.total_com), "mass": number(link.total_mass)}
+    if link.end_mass == 0.0:
+        across, around = cylinder_inertia(link)
+        inertial |= {"euler": euler, "diaginertia": f"{across} {across} {around}"}
+    else:
+        tensor = inertia_tensor(link)
+        inertial["fullinertia"] = " ".join(f"{tensor[place]:.17g}" for place in TENSOR_PLACES.values())
+    SubElement(body, "inertial", inertial)
+    if link.length > 0.0:
+        cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}
+        SubElement(body, "geom", {**cylinder, "pos": numbers(midpoint(link)), "euler": euler, "material": "link"})
+    marker = {"type": "sphere", "size": number(marker_radius(link)), "material": f"joint_{joint.axis}"}
+    SubElement(body, "geom", marker)
+
+
+def _add_tip(body: Element, arm: Arm) -> None:
+    rpy = tip_rpy(arm)
+    tip = {"name": "tip", "pos": numbers(tip_position(arm)), "size": number(arm.links[-1].radius), "rgba": TIP_COLOUR}
+    if any(rpy):
+        tip["euler"] = numbers(rpy)
+    SubElement(body, "site", tip)

@@ -1,0 +1,112 @@
+"""An arm as URDF, which MuJoCo, Pinocchio, ROS and most simulators load."""
+
+from xml.etree.ElementTree import Element, SubElement
+
+from armwright.robot.arm import Arm, Vector
+from armwright.robot.link_geometry import (
+    AXIS_VECTORS,
+    COLOURS,
+    MUJOCO_COMPILER,
+    Segment,
+    inertia_moments,
+    inertia_rpy,
+    joint_limits,
+    marker_radius,
+    midpoint,
+    number,
+    numbers,
+    rpy_along,
+    segments,
+    tip_position,
+    tip_rpy,
+    to_xml,
+)
+
+
+def to_urdf(arm: Arm, name: str = "arm") -> str:
+    """Return the URDF of an arm: `world`, a fixed joint to `base`, then joint_1, link_1, …, and a frame `tip`.
+
+    Link frames are at their joints; with all joints at 0 they are parallel to the world frame. The z axis of the tip
+    frame is the tool's axis, its x axis the tool's side. Links are solid cylinders of uniform density from joint to
+    joint, for inertia, collision and display.
+
+    Example:
+        >>> import armwright as aw
+        >>> space = aw.paper_space(joints=2)
+        >>> arm = space.arm(space.sample(1, seed=0)[0])
+        >>> print(aw.to_urdf(arm, "two"))
+        <?xml version="1.0"?>
+        <robot name="two">
+        ...
+        </robot>
+        <BLANKLINE>
+    """
+    return to_xml(urdf_tree(arm, name))
+
+
+def urdf_tree(arm: Arm, name: str) -> Element:
+    """Return the same as an XML tree."""
+    robot = Element("robot", name=name)
+    add_header(robot)
+    SubElement(robot, "link", name="base")
+    _add_joint(robot, "world_to_base", "fixed", "world", "base", arm.base)
+    for segment in segments(arm):
+        joint = segment.joint
+        _add_link(robot, segment)
+        element = _add_joint(
+            robot, f"joint_{segment.number}", joint.kind, segment.parent, segment.name, segment.position
+        )
+        if joint.kind != "fixed":
+            SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
+            SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
+    SubElement(robot, "link", name="tip")
+    _add_joint(robot, "tip_joint", "fixed", f"link_{len(arm.links)}", "tip", tip_position(arm), tip_rpy(arm))
+    return robot
+
+
+def add_header(robot: Element) -> None:
+    """Add compiler options, materials and the link `world`.
+
+    By default MuJoCo would merge `base` and `tip` into their neighbours, drop visuals and refuse massless links.
+    """
+    SubElement(SubElement(robot, "mujoco"), "compiler", MUJOCO_COMPILER)
+    for material, rgba in COLOURS.items():
+        SubElement(SubElement(robot, "material", name=material), "color", rgba=rgba)
+    SubElement(robot, "link", name="world")
+
+
+def _add_joint(
+    robot: Element, name: str, kind: str, parent: str, child: str, xyz: Vector, rpy: Vector = (0.0, 0.0, 0.0)
+) -> Element:
+    element = SubElement(robot, "joint", name=name, type=kind)
+    SubElement(element, "parent", link=parent)
+    SubElement(element, "child", link=child)
+    SubElement(element, "origin", xyz=numbers(xyz), rpy=numbers(rpy))
+    return element
+
+
+def _add_link(robot: Element, segment: Segment) -> None:
+    link = segment.link
+    element = SubElement(robot, "link", name=segment.name)
+    # Written for a mass of 0, too: otherwise MuJoCo assumes the density of water and scikit-robot 1 g.
+    inertial = SubElement(element, "inertial")
+    SubElement(inertial, "origin", xyz=numbers(link.total_com), rpy=numbers(inertia_rpy(link)))
+    SubElement(inertial, "mass", value=number(link.total_mass))
+    SubElement(inertial, "inertia", inertia_moments(link))
+    if link.length > 0.0:
+        for purpose in ("visual", "collision"):
+            body = SubElement(element, purpose)
+            SubElement(body, "origin", xyz=numbers(midpoint(link)), rpy=numbers(rpy_along(link.offset)))
+            shape = SubElement(body, "geometry")
+            SubElement(shape, "cylinder", radius=number(link.radius), length=number(link.length))
+            if purpose == "visual":
+                SubElement(body, "material", name="link")
+    add_marker(element, segment, number(marker_radius(link)))
+
+
+def add_marker(element: Element, segment: Segment, radius: str) -> None:
+    """Add the coloured sphere that shows a joint and its axis."""
+    marker = SubElement(element, "visual")
+    SubElement(marker, "origin", xyz="0 0 0", rpy="0 0 0")
+    SubElement(SubElement(marker, "geometry"), "sphere", radius=radius)
+    SubElement(marker, "material", name=f"joint_{segment.joint.axis}")

@@ -1,0 +1,85 @@
+"""Who found what: the hypervolume and the front of a history, by the source of the trials."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.pareto import front_mask
+from armwright.runs.history import History
+
+
+@dataclass(frozen=True)
+class Credit:
+    """What the trials of one source brought.
+
+    trials: how many there are. front: how many of them are on the final front.
+    hypervolume_gained: see `hypervolume_gains`, summed; None as long as there is no reference point.
+    """
+
+    trials: int
+    front: int
+    hypervolume_gained: float | None
+
+
+def credit_by_source(history: History) -> dict[str, Credit]:
+    """The credit of each source, in the order in which they first occur."""
+    gains, on_front = hypervolume_gains(history), front_mask(history.masked_objectives)
+    credit: dict[str, Credit] = {}
+    for source, mine in masks_by_source(history).items():
+        gained = None if gains is None else float(gains[mine].sum())
+        credit[source] = Credit(int(mine.sum()), int(on_front[mine].sum()), gained)
+    return credit
+
+
+def hypervolume_gains(history: History) -> Array | None:
+    """(N,) by how much each trial, the random ones included, enlarged the hypervolume when it entered.
+
+    The sum is the final hypervolume. What a trial would have brought later, or what it took away from one that came
+    after it, is not weighed. None as long as there is no reference point.
+    """
+    if history.reference_point is None:
+        return None
+    return np.diff(history.hypervolumes, prepend=0.0)
+
+
+def gained_by_source(history: History) -> dict[str, Array] | None:
+    """For each source (I + 1,): the hypervolume that its trials have gained after 0, 1, …, I counted iterations.
+
+    None as long as there is no reference point.
+    """
+    gains = hypervolume_gains(history)
+    if gains is None:
+        return None
+    last = _last_trials(history)
+    return {
+        source: np.concatenate([[0.0], np.cumsum(np.where(mine, gains, 0.0))])[last]
+        for source, mine in masks_by_source(history).items()
+    }
+
+
+def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
+    """For each source (I + 1,): how many of its trials are on the front after 0, 1, …, I counted iterations."""
+    first, *_ = last = _last_trials(history).tolist()
+    on_front = np.flatnonzero(front_mask(history.masked_objectives[:first]))
+    fronts = [on_front]
+    for number in range(first, last[-1]):  # one trial more; what has left a front never comes back
+        on_front = np.append(on_front, number)
+        on_front = on_front[front_mask(history.masked_objectives[on_front])]
+        fronts.append(on_front)
+    return {
+        source: np.array([np.count_nonzero(mine[front]) for front in fronts])
+        for source, mine in masks_by_source(history).items()
+    }
+
+
+def masks_by_source(history: History) -> dict[str, NDArray[np.bool_]]:
+    """For each source (N,): True at its trials; the sources in the order in which they first occur."""
+    sources = np.array([trial.source for trial in history], dtype=object)
+    return {source: sources == source for source in dict.fromkeys(sources.tolist())}
+
+
+def _last_trials(history: History) -> NDArray[np.int_]:
+    """(I + 1,) the number of trials after 0, 1, …, I counted iterations."""
+    return np.arange(min(history.n_init, len(history)), len(history) + 1)

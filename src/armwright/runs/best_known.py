@@ -1,0 +1,107 @@
+"""The best fronts known of the built-in tasks: how far from the true front a run ended.
+
+Shipped in fronts/, one CSV file a task, made by benchmarks/reference_fronts.py; the first lines say how.
+"""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.pareto import front_mask, hypervolume
+from armwright.problem.objectives import PAPER_OBJECTIVES
+from armwright.problem.problem import Problem
+from armwright.spaces.design_space import paper_space
+from armwright.spaces.parameters import Design, FloatParameter
+from armwright.tasks.task import Task, builtin_names, load_task
+
+BEYOND = 5e-4  # of the best known hypervolume: any other front fills the gaps of a finite one by less
+
+
+@dataclass(frozen=True)
+class KnownFront:
+    """A front: designs and their values (K, M), by rising first objective."""
+
+    designs: tuple[Design, ...]
+    values: Array
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A front beside the best known one, both bounded by the same reference point.
+
+    hypervolume: of the best known front.
+    share: of it, what the front has; above 1 where it is better.
+    beyond: how many of the front's designs the best known front does not dominate.
+    gain: what these add to the best known hypervolume, relative; where it is less than 0.05 %, both are 0.
+    """
+
+    hypervolume: float
+    share: float
+    beyond: int
+    gain: float
+
+
+def known_front(problem: Problem) -> KnownFront | None:
+    """The best known front of a problem: of a built-in task's targets in the paper's design space, else None."""
+    paper = paper_space()
+    same_space = problem.space.model_copy(update={"name": paper.name}) == paper
+    as_the_paper = (
+        problem.objectives == PAPER_OBJECTIVES
+        and not problem.task.payloads.any()
+        and not problem.constraints
+        and problem.task.is_plain
+    )
+    if not same_space or problem.tolerance or not as_the_paper:
+        return None
+    own = problem.task.name
+    for name in sorted(builtin_names(), key=lambda name: name != own):  # nearly always it is the first
+        if load_task(name).targets == problem.task.targets:
+            return _read(name)
+    return None
+
+
+def best_known_hypervolume(task: Task) -> float | None:
+    """Of a task in the paper's design space, within its own reference point; None where no front is known."""
+    known = known_front(Problem(task))
+    if known is None or task.reference_point is None:
+        return None
+    return hypervolume(known.values, task.reference_point)
+
+
+def standing(problem: Problem, values: Array, reference_point: Sequence[float]) -> Standing | None:
+    """Where the front of `values` (N, M) stands; None where no front is known, or none of it within the box."""
+    known = known_front(problem)
+    if known is None:
+        return None
+    best = hypervolume(known.values, reference_point)
+    if best == 0.0:
+        return None
+    inside = values[np.all(values < np.asarray(reference_point), axis=1)]
+    together = np.vstack([known.values, inside])
+    beyond = int(front_mask(together)[len(known.values) :].sum())
+    gain = hypervolume(together, reference_point) / best - 1.0
+    if gain < BEYOND:
+        beyond, gain = 0, 0.0
+    return Standing(best, hypervolume(inside, reference_point) / best, beyond, gain)
+
+
+@cache
+def _read(task: str) -> KnownFront | None:
+    file = resources.files("armwright.runs") / "best_known_fronts" / f"{task}.csv"
+    if not file.is_file():
+        return None
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    space = paper_space()
+    real = {parameter.name for parameter in space.parameters if isinstance(parameter, FloatParameter)}
+    designs = [
+        space.design({p.name: float(row[p.name]) if p.name in real else row[p.name] for p in space.parameters})
+        for row in rows
+    ]
+    values = [[float(row[objective.name]) for objective in PAPER_OBJECTIVES] for row in rows]
+    return KnownFront(tuple(designs), np.array(values))

@@ -1,0 +1,209 @@
+"""The settings of a run: everything needed to repeat it, as config.yaml holds it."""
+
+import platform
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from pydantic import BaseModel, Field, field_validator
+
+from armwright.arrays import Array
+from armwright.exceptions import RunConflictError, RunFolderError
+from armwright.kinematics.devices import Device, usable_device
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.evaluators import Evaluator
+from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, Objective
+from armwright.problem.problem import Problem
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+
+# Of a task; its words may change.
+IDENTITY = (
+    "name", "targets", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step",
+    "move_time", "workspace", "constraints", "reference_point",
+)  # fmt: skip
+PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
+
+
+class Method(BaseModel, frozen=True, extra="forbid"):
+    """How a study searches.
+
+    proposer: its name and settings; None for black-box trials only.
+    in_flight: how many questions go on while black-box trials run; None: the study waits for each.
+    polish_every: after so many counted trials the next free one refines a design of the front; None: never.
+    start: designs that the first of the n_init trials are, in place of random ones.
+    """
+
+    proposer: dict[str, Any] | None
+    sampler: str
+    n_init: int = Field(ge=1)
+    n_step: int = Field(ge=1)
+    n_total: int = Field(ge=1)
+    in_flight: int | None = Field(default=None, ge=1)
+    polish_every: int | None = Field(default=None, ge=1)
+    start: tuple[dict[str, float | str], ...] = ()
+
+    @field_validator("proposer")
+    @classmethod
+    def _check_proposer(cls, settings: dict[str, Any] | None) -> dict[str, Any] | None:
+        """That what is asked again can be asked as before."""
+        kinds = {"name": str} | ({"prompt": str} if settings and "prompt" in settings else {})
+        if "prompt" in kinds:
+            kinds |= {"memory": str, "answer": str, "proposals": int}
+        kinds |= {"template": str} if settings and "template" in settings else {}
+        for key, kind in kinds.items():
+            if settings is not None and not isinstance(settings.get(key), kind):
+                raise ValueError(f"{key} = {settings.get(key)!r} is no {kind.__name__}")
+        return settings
+
+    @property
+    def n_trials(self) -> int:
+        """Of the whole study, the random ones included."""
+        return self.n_init + self.n_total
+
+
+class FrontMethod(BaseModel, frozen=True, extra="forbid"):
+    """How a search for the whole front searches (front.py): there is nothing to choose but what it begins with."""
+
+    search: Literal["front"] = "front"
+    begin_with: dict[str, Any] | None = None
+
+    @property
+    def n_init(self) -> int:
+        """Its trials are the front alone."""
+        return 0
+
+
+class ObjectiveRecord(BaseModel, frozen=True, extra="forbid"):
+    """An objective as a run's settings tell of it; its formula is code."""
+
+    name: str
+    label: str
+    unit: str
+    symbol: str
+
+
+def record_objectives(objectives: Sequence[Objective]) -> tuple[ObjectiveRecord, ...]:
+    """What a run's settings tell of its objectives."""
+    return tuple(ObjectiveRecord(name=o.name, label=o.label, unit=o.unit, symbol=o.symbol) for o in objectives)
+
+
+class RunConfig(BaseModel, frozen=True, extra="forbid"):
+    """Everything needed to repeat a run.
+
+    tolerance, device: `Problem`'s.
+    objectives: what is minimised, in the order of the trials' values.
+    reference_point: as the task states it, or as frozen after the first n_init trials (None until then).
+    """
+
+    task: Task
+    space: DesignSpace
+    tolerance: float = Field(default=0.0, ge=0.0)
+    device: Device = "cpu"
+    objectives: tuple[ObjectiveRecord, ...] = record_objectives(PAPER_OBJECTIVES)
+    reference_point: tuple[float, ...] | None
+    method: Method | FrontMethod
+    seed: int
+    evaluator: str | None = None  # of one's own that measured designs in place of ours, by name; never loaded from here
+    versions: dict[str, str]
+    earlier_versions: list[dict[str, str]] = []  # of sessions that made earlier trials, where they were others
+
+    @property
+    def problem(self) -> Problem:
+        """The problem of the run; on the CPU, where its GPU is not here.
+
+        Objectives of one's own have their names and values here; to compute them again needs the problem itself.
+        """
+        return self.problem_with(None)
+
+    def problem_with(self, evaluator: Evaluator | None) -> Problem:
+        """The problem of the run with the evaluator that measures its designs."""
+        own = {} if evaluator is None else {objective.name: objective for objective in evaluator.objectives}
+        objectives = tuple(own.get(record.name) or _recorded(record) for record in self.objectives)
+        return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives, evaluator)
+
+    @property
+    def study(self) -> Method:
+        """How its study searches; RunFolderError where it is a search for the whole front."""
+        if isinstance(self.method, FrontMethod):
+            raise RunFolderError(
+                "this run is a search for the whole front, not a study: its front needs no polish, and "
+                "`armwright front` with a larger --budget goes on with it"
+            )
+        return self.method
+
+
+def _recorded(record: ObjectiveRecord) -> Objective:
+    """The objective of a record: ours by its name; of one that is none of ours, only what was written down."""
+    known = OBJECTIVES.get(record.name)
+    if known is not None and record_objectives((known,)) == (record,):
+        return known
+
+    def each(evaluation: Evaluation) -> Array:
+        raise RunFolderError(
+            f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
+        )
+
+    words = record.label.lower()
+    return Objective(record.name, record.label, record.unit, record.symbol, words=words, each=each, over="arm")
+
+
+def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
+    """The versions that the numbers of a run depend on; of an evaluator's file, a part of its sha256."""
+    found = {"python": platform.python_version()}
+    if evaluator is not None and evaluator.version:
+        found["evaluator"] = evaluator.version
+    for package in PACKAGES:
+        with suppress(metadata.PackageNotFoundError):  # an extra
+            found[package] = metadata.version(package)
+    return found
+
+
+def check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
+    """RunConflictError where `asked` is another run than the one that lies there; a larger n_total is the same."""
+    old, new = _identity(there), _identity(asked)
+    differences = [
+        f"{key}: {_brief(old.get(key))} there, {_brief(new.get(key))} asked"
+        for key in {**old, **new}
+        if old.get(key) != new.get(key)
+    ]
+    n_there, n_asked = (getattr(config.method, "n_total", 0) for config in (there, asked))
+    if n_asked < n_there:
+        differences.append(f"n_total: {n_there} there, {n_asked} asked (it can only grow)")
+    if differences:
+        raise RunConflictError(
+            f"{path} holds a run with other settings ({'; '.join(differences)}). "
+            "Give another --out DIR, or the same settings"
+        )
+
+
+def _brief(value: Any) -> str:
+    """A setting on one line; a prompt of the user's own is a whole page."""
+    text = " ".join(str(value).split())
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _identity(config: RunConfig) -> dict[str, Any]:
+    """What makes a run this run and no other, flat."""
+    content = config.model_dump(mode="json")
+    content["task"] = {key: content["task"][key] for key in IDENTITY}
+    content["objectives"] = [objective["name"] for objective in content["objectives"]]
+    method = content.pop("method")
+    method.pop("n_total", None)
+    if method.get("begin_with"):
+        method["begin_with"].pop("run", None)  # a path has many spellings; what lay there is known by its sha256
+    for key in ("versions", "earlier_versions", "reference_point"):
+        del content[key]
+    return _flat({**content, **method})
+
+
+def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in content.items():
+        if isinstance(value, dict):
+            flat.update(_flat(cast("dict[str, Any]", value), f"{prefix}{key}."))
+        else:
+            flat[prefix + key] = value
+    return flat

@@ -1,0 +1,86 @@
+"""A design of a run as a file for a simulator or a workshop."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from armwright.exceptions import SettingsError, did_you_mean
+from armwright.files import as_csv
+from armwright.problem.miss_reasons import why_missed
+from armwright.robot.build_sheet import SheetRow, sheet_markdown, sheet_rows
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.ros2_control import to_ros2_control
+from armwright.robot.sdf import to_sdf
+from armwright.robot.srdf import to_srdf
+from armwright.robot.urdf_writer import to_urdf
+from armwright.robot.xacro import to_xacro
+from armwright.runs.folder import read_run
+from armwright.runs.history import FrontMember, History
+from armwright.runs.selection import pick
+from armwright.spaces.design_space import DesignSpace
+
+OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
+
+
+def export_design(run: Path, number: int | None, kind: str) -> str:
+    """The design with this number of a run, in a format; without a number, the knee of its front."""
+    if kind not in FORMATS:
+        kinds = (*FORMATS, OPTUNA)
+        raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, kinds)} Formats: {", ".join(kinds)}')
+    _, history = read_run(run)
+    if number is not None and not 0 <= number < len(history):
+        raise SettingsError(f"--design {number}: {run} has the designs 0 to {len(history) - 1}")
+    member = pick(history)[0] if number is None else history.member(number)
+    return FORMATS[kind](history, member)
+
+
+def _name(history: History, member: FrontMember) -> str:
+    return f"{history.problem.task.name}-{member.number}"
+
+
+def _rows(history: History, member: FrontMember) -> list[SheetRow]:
+    evaluation = history.evaluation([member.number])
+    return sheet_rows(member.arm, evaluation.q[0], evaluation.joint_torques[0])
+
+
+def _sheet(history: History, member: FrontMember) -> str:
+    task, space = history.problem.task, history.problem.space
+    notes = [f"Masses: {space.mass_note}."]
+    if task.payloads.any():
+        notes.append(f"Torques with the payload of {task.payloads.max():g} kg at most; of the arm alone they are less.")
+    evaluation = history.evaluation([member.number])
+    angle = f" and {np.degrees(evaluation.angle_error.max()):.2f}°" if evaluation.goals.oriented else ""
+    notes.append(f"Targets are missed by {1e3 * evaluation.position_error.max():.2f} mm{angle} at most.")
+    for target in np.flatnonzero(evaluation.missed[0]):
+        notes.append(f"Target {target + 1} is missed by {why_missed(member.arm, evaluation, 0, int(target))}.")
+    return sheet_markdown(_name(history, member), member.arm, _rows(history, member), notes)
+
+
+def _sheet_csv(history: History, member: FrontMember) -> str:
+    rows = [asdict(row) for row in _rows(history, member)]
+    for row in rows:
+        row["used_low"], row["used_high"] = row.pop("used")
+    return as_csv(rows)
+
+
+def mass_per_metre(space: DesignSpace) -> float:
+    """By how much a link gets heavier with its length [kg/m]; every mass model is a straight line over it."""
+    return space.mass.mass(1.0) - space.mass.mass(0.0)
+
+
+def _xacro(history: History, member: FrontMember) -> str:
+    return to_xacro(member.arm, _name(history, member), mass_per_metre(history.problem.space))
+
+
+FORMATS: dict[str, Callable[[History, FrontMember], str]] = {
+    "urdf": lambda history, member: to_urdf(member.arm, _name(history, member)),
+    "mjcf": lambda history, member: to_mjcf(member.arm, _name(history, member)),
+    "sdf": lambda history, member: to_sdf(member.arm, _name(history, member)),
+    "xacro": _xacro,
+    "srdf": lambda history, member: to_srdf(member.arm, _name(history, member)),
+    "ros2_control": lambda history, member: to_ros2_control(member.arm, _name(history, member)),
+    "sheet": _sheet,
+    "sheet-csv": _sheet_csv,
+}

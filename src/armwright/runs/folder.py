@@ -1,0 +1,261 @@
+"""The run folder: a run's settings and finished trials on disk, written, read and checked here.
+
+    config.yaml        everything needed to repeat the run
+    trials.jsonl       one line a finished trial, written before the next begins: the truth
+    transcripts.jsonl  every call to a language model (llm/transcript.py)
+    control.json, status.json  between a running study and whoever watches it (control.py)
+    search.npz, proposals/  where a search for the whole front stands, and what it began with (front.py)
+    trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), and figures/ (report/figures.py)
+
+What stands in the last lines is made from the finished trials, and can be made again.
+"""
+
+import errno
+import os
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self, cast
+
+import yaml
+from filelock import FileLock, Timeout
+
+from armwright.exceptions import RunConflictError, RunFolderError
+from armwright.files import replace_file
+from armwright.problem.evaluators import Evaluator
+from armwright.problem.objectives import PAPER_OBJECTIVES
+from armwright.runs.config import RunConfig, check_same_run, versions
+from armwright.runs.control import CHANNEL_FILES
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial, trial_line
+from armwright.runs.trials_file import TRIALS, read_trials
+from armwright.spaces.design_space import DesignSpace
+from armwright.yaml_documents import parse_document
+
+LOCK = ".lock"  # held by whoever writes; the system lets go of a dead process's, and the file stays
+LOCK_SECONDS = 2.0  # that a command waits for it: the workers of a killed experiment take a moment to end
+CONFIG = "config.yaml"
+PROPOSALS = "proposals"
+SEARCH = "search.npz"
+BEFORE_TRIALS = {
+    LOCK, CONFIG, f"{CONFIG}.part", TRIALS, "transcripts.jsonl", *CHANNEL_FILES, f"{SEARCH}.part", PROPOSALS,
+}  # fmt: skip
+
+
+class RunFolder:
+    """A run folder held for writing by this process alone; a context manager."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = FileLock(path / LOCK)
+        self._place: os.stat_result | None = None
+        self._trials: BinaryIO | None = None
+
+    def __enter__(self) -> Self:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock.acquire(timeout=LOCK_SECONDS)
+            self._place = self.path.stat()
+        except Timeout as fault:
+            raise RunFolderError(
+                f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
+            ) from fault
+        except OSError as fault:
+            raise _write_error(Path(fault.filename or self.path), fault) from fault
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._trials is not None:
+            self._trials.close()
+            self._trials = None
+        self._lock.release()
+
+    def adopt(self, config: RunConfig) -> RunConfig:
+        """The folder's configuration: `config` for a folder without trials, or for one whose run it extends.
+
+        RunConflictError with the differences where the folder holds a run with other settings.
+        """
+        if not self._holds_run():
+            self._check_free()
+            self.write_config(config)
+            return config
+        there = read_config(self.path)
+        check_same_run(self.path, there, config)
+        if config.method != there.method:  # a larger n_total
+            if self._n_trials() > there.study.n_trials:
+                raise RunConflictError(
+                    f"{self.path} was polished, so its study cannot go on; give another --out DIR, or polish it again"
+                )
+            there = there.model_copy(update={"method": config.method})
+            self.write_config(there)
+        return there
+
+    def note_versions(self, config: RunConfig, evaluator: Evaluator | None = None) -> RunConfig:
+        """The configuration of a run that goes on: where the versions are others now, those before are noted."""
+        now = versions(evaluator)
+        if config.versions != now:
+            earlier = [*config.earlier_versions, config.versions]
+            config = config.model_copy(update={"versions": now, "earlier_versions": earlier})
+            self.write_config(config)
+        return config
+
+    def _holds_run(self) -> bool:
+        """Whether a run lies here that came to a trial, or a first state of its search."""
+        return (self.path / SEARCH).exists() or self._n_trials() > 0
+
+    def _n_trials(self) -> int:
+        trials = self.path / TRIALS
+        return trials.read_bytes().count(b"\n") if trials.is_file() else 0
+
+    def _check_free(self) -> None:
+        """RunConflictError where the folder holds anything but what a run without trials leaves."""
+        others = sorted({entry.name for entry in self.path.iterdir()} - BEFORE_TRIALS)
+        if (self.path / CONFIG).exists():
+            read_config(self.path)
+            if others:
+                raise RunConflictError(
+                    f"{self.path} holds results of a run ({others[0]}, …), but no trial in {TRIALS}; "
+                    "put that file back, or give another --out DIR"
+                )
+        elif others:
+            raise RunConflictError(
+                f"{self.path} holds no run, but other files ({others[0]}, …); give another --out DIR"
+            )
+
+    def write_config(self, config: RunConfig) -> None:
+        """Replaces config.yaml in one step."""
+        content = config.model_dump(mode="json")
+        self.write_text(CONFIG, yaml.dump(content, Dumper=_ConfigDumper, sort_keys=False, allow_unicode=True))
+
+    def open_trials(
+        self, space: DesignSpace, n_objectives: int = len(PAPER_OBJECTIVES), n_constraints: int = 0
+    ) -> list[FinishedTrial]:
+        """The finished trials; a last line that a crash cut short is dropped. Opens the file for `append`."""
+        path = self.path / TRIALS
+        trials, intact = read_trials(path, space, n_objectives, n_constraints)
+        try:
+            self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
+            if intact < self._trials.tell():  # else the file keeps its time
+                self._trials.truncate(intact)
+        except OSError as fault:
+            raise _write_error(path, fault) from fault
+        return trials
+
+    def append(self, trial: FinishedTrial) -> None:
+        """Writes one finished trial: a single write, so that a crash leaves a whole line or a cut last one."""
+        assert self._trials is not None, "open_trials comes first"
+        self._check_here()
+        line = trial_line(trial)
+        try:
+            if os.fstat(self._trials.fileno()).st_nlink == 0:
+                raise OSError(errno.ENOENT, "the file was deleted while the run went on")
+            written = self._trials.write(line)
+            if written != len(line):
+                raise OSError(errno.ENOSPC, "No space left on device")
+        except OSError as fault:
+            raise _write_error(self.path / TRIALS, fault) from fault
+
+    def _check_here(self) -> None:
+        """RunFolderError where the folder is another than the one that is held: nothing is written beside its run."""
+        try:
+            is_here = self._place is not None and os.path.samestat(self._place, self.path.stat())
+        except FileNotFoundError:
+            is_here = False
+        except OSError as fault:
+            raise _write_error(self.path, fault) from fault
+        if not is_here:
+            raise RunFolderError(
+                f"{self.path} was moved or deleted while the run went on; move it back, and the same command goes on "
+                "from its last finished trial"
+            )
+
+    def replace_trials(self, trials: Iterable[FinishedTrial]) -> None:
+        """Writes all trials anew."""
+        self.write_bytes(TRIALS, b"".join(map(trial_line, trials)))
+
+    def write_text(self, name: str, text: str) -> None:
+        """Replaces a file in one step, so that a crash leaves the old or the new one."""
+        self.write_bytes(name, text.encode())
+
+    def write_bytes(self, name: str, content: bytes) -> None:
+        """The same for a file that is no text."""
+        target = self.path / name
+        self._check_here()
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(target, content)
+        except OSError as fault:
+            raise _write_error(target, fault) from fault
+
+
+def is_held(folder: Path) -> bool:
+    """Whether a process holds a run folder for writing, here or, where the file system knows, on another machine."""
+    if sys.platform == "win32":  # no looking without holding it oneself
+        return True
+    import fcntl
+
+    try:
+        lock = os.open(folder / LOCK, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(lock)  # and with it what was taken
+    return False
+
+
+class _ConfigDumper(yaml.SafeDumper):
+    """YAML without aliases, points on one line."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+    def represent_sequence(self, tag: str, sequence: Any, flow_style: bool | None = None) -> yaml.SequenceNode:
+        plain = all(not isinstance(item, (dict, list)) for item in sequence)
+        return super().represent_sequence(tag, sequence, flow_style=plain)
+
+
+_ConfigDumper.add_representer(list, _ConfigDumper.represent_list)
+
+
+def read_config(path: Path) -> RunConfig:
+    """The configuration of a run folder."""
+    file = path / CONFIG
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as fault:
+        raise RunFolderError(
+            f"{path} is not a run folder: cannot read {CONFIG} ({fault}); restore it, or give another folder"
+        ) from fault
+    try:
+        return parse_document(text, RunConfig, RunFolderError, str(file))
+    except RunFolderError as fault:
+        raise RunFolderError(f"{fault}{_writer(text)}; restore the file, or give another --out DIR") from fault
+
+
+def _writer(config: str) -> str:
+    """Which armwright wrote a config.yaml that cannot be read, where it was another."""
+    said, ours = re.search(r"^  armwright: '?([^'\s]+)", config, re.MULTILINE), versions().get("armwright")
+    return f" (written by armwright {said[1]}; this is {ours})" if said and said[1] != ours else ""
+
+
+def read_run(path: str | Path) -> tuple[RunConfig, History]:
+    """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
+    path = Path(path)
+    config = read_config(path)
+    trials, _ = read_trials(path / TRIALS, config.space, len(config.objectives), len(config.task.constraints))
+    return config, History(config.problem, trials, config.method.n_init, config.reference_point)
+
+
+def _write_error(path: Path, fault: OSError) -> RunFolderError:
+    return RunFolderError(
+        f"cannot write {path}: {fault.strerror or fault}. What was written before is safe; "
+        "free room or give another --out DIR, and run the same command again"
+    )

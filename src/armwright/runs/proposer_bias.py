@@ -1,0 +1,132 @@
+"""What a proposer's designs have in common, beside the black box's: round numbers, symmetry, repeats."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.runs.attribution import front_by_source, masks_by_source
+from armwright.runs.history import BBO, History
+from armwright.spaces.parameters import FloatParameter
+from armwright.tasks.symmetry import TOLERANCE, distance_to_planes, symmetry_planes
+
+EXACT = 1e-9  # [m]; a length this near to a round one is round
+NEAR = 1e-3  # [m]; designs whose numbers differ by no more are near-repeats
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Habits:
+    """Shares of the designs of one source, 0 to 1.
+
+    designs: how many there are.
+    lengths_5_cm, lengths_1_cm: all link lengths are multiples of 0.05 m, of 0.01 m, within 1e-9 m. A link at the end
+    of its range counts by its number, as any other.
+    base_on_symmetry_plane: the base is within 1e-6 m of a symmetry plane of the targets (`symmetry_planes`); None
+    where they have none.
+    repeats: an earlier trial, of whatever source, has the very same parameters.
+    near_repeats: an earlier trial has the same joints, and no number that differs by more than 1 mm; repeats included.
+    """
+
+    designs: int
+    lengths_5_cm: float
+    lengths_1_cm: float
+    base_on_symmetry_plane: float | None
+    repeats: float
+    near_repeats: float
+
+
+@dataclass(frozen=True)
+class FrontShare:
+    """Which share of the front is the proposer's, after half of the counted iterations and at the end.
+
+    grows: whether it is larger at the end.
+    """
+
+    half: float
+    end: float
+    grows: bool
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """A proposer's designs beside the black box's; None where there are none of them.
+
+    symmetry_planes: the number of the targets' symmetry planes.
+    """
+
+    symmetry_planes: int
+    proposer: Habits | None
+    black_box: Habits | None
+    front_share: FrontShare | None
+
+
+def diagnose(history: History, proposer: str) -> Diagnostics:
+    """The habits of the trials whose source is `proposer`, and of the black box's."""
+    planes = symmetry_planes(history.problem.task.points)
+    return Diagnostics(
+        symmetry_planes=len(planes),
+        proposer=habits(history, proposer, planes),
+        black_box=habits(history, BBO, planes),
+        front_share=front_share(history, proposer),
+    )
+
+
+def habits(history: History, source: str, planes: Array) -> Habits | None:
+    """Of the source's designs; None where there are none.
+
+    planes: (P, 3) the normals of the targets' symmetry planes.
+    """
+    mine = masks_by_source(history).get(source)
+    if mine is None:
+        return None
+    points = history.problem.task.points
+    designs = [trial.design for trial in history if trial.source == source]
+    on_plane = [distance_to_planes(np.array(design.origin), points, planes) <= TOLERANCE for design in designs]
+    repeats, near_repeats = repeated(history)
+    return Habits(
+        designs=len(designs),
+        lengths_5_cm=_share([are_round(design.links, 0.05) for design in designs]),
+        lengths_1_cm=_share([are_round(design.links, 0.01) for design in designs]),
+        base_on_symmetry_plane=_share(on_plane) if len(planes) else None,
+        repeats=_share(repeats[mine]),
+        near_repeats=_share(near_repeats[mine]),
+    )
+
+
+def front_share(history: History, source: str) -> FrontShare | None:
+    """Of one source; None before the first counted iteration, and where the source has no trials."""
+    fronts = front_by_source(history)
+    if source not in fronts or len(history) <= history.n_init:
+        return None
+    share = fronts[source] / np.maximum(1, np.sum(list(fronts.values()), axis=0))  # (I + 1,)
+    half, end = float(share[(len(share) - 1) // 2]), float(share[-1])
+    return FrontShare(half, end, grows=end > half)
+
+
+def are_round(lengths: Sequence[float], step: float) -> bool:
+    """Whether all `lengths` are multiples of `step` [m], within 1e-9 m."""
+    values = np.array(lengths)
+    return bool(np.all(np.abs(values - step * np.round(values / step)) <= EXACT))
+
+
+def repeated(history: History) -> tuple[Mask, Mask]:
+    """(N,) and (N,): whether an earlier trial has the same design, and whether one has nearly the same."""
+    designs = [trial.design for trial in history]
+    space = history.problem.space
+    rows = space.matrix(designs)
+    real = np.array([isinstance(parameter, FloatParameter) for parameter in space.parameters])
+    numbers, choices = rows[:, real], rows[:, ~real]  # [m]; places among the choices
+    repeats, near_repeats = np.zeros((2, len(designs)), dtype=bool)
+    for i in range(1, len(designs)):
+        apart = np.abs(numbers[:i] - numbers[i]).max(axis=1)
+        apart[np.any(choices[:i] != choices[i], axis=1)] = np.inf
+        repeats[i], near_repeats[i] = apart.min() == 0.0, apart.min() <= NEAR + EXACT
+    return repeats, near_repeats
+
+
+def _share(found: Sequence[bool] | Mask) -> float:
+    return float(np.mean(found))

@@ -1,0 +1,166 @@
+"""Choosing among the designs of a front: by conditions, by one number, by weights, or the knee."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from armwright.exceptions import FailureError, SettingsError, did_you_mean
+from armwright.pareto import knee_number
+from armwright.runs.folder import read_run
+from armwright.runs.history import FrontMember, History
+from armwright.runs.results import read_summary, unmet
+from armwright.spaces.parameters import FloatParameter
+
+_CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
+_WEIGHT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
+_HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.greater}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A bound for a number of a design: its name, how it is bounded, and by what."""
+
+    name: str
+    relation: str
+    bound: float
+
+    def holds(self, numbers: Mapping[str, float]) -> bool:
+        """Whether a design with these numbers meets it."""
+        return bool(_HOLDS[self.relation](numbers[self.name], self.bound))
+
+
+def read_condition(words: str) -> Condition:
+    """`position_error<=0.05` as a condition; SettingsError where it is none. Nothing in it is evaluated."""
+    found = _CONDITION.fullmatch(words)
+    if found is None:
+        raise SettingsError(f'--where "{words}": a name, one of <= < >= >, and a number are needed, such as mass<=2.5')
+    return Condition(found[1], found[2], float(found[3]))
+
+
+def read_weights(words: str) -> dict[str, float]:
+    """`position_error=2,torque=1` as weights by name."""
+    weights: dict[str, float] = {}
+    for part in words.split(","):
+        found = _WEIGHT.fullmatch(part)
+        if found is None:
+            raise SettingsError(
+                f'--weights "{words}": names with numbers are needed, such as position_error=2,torque=1'
+            )
+        weights[found[1]] = float(found[2])
+    if not any(weights.values()):
+        raise SettingsError(f'--weights "{words}": at least one must be above 0')
+    return weights
+
+
+def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
+    """What a design can be chosen by: its objectives, its real parameters, the length and mass of its arm.
+
+    And what the constraints bound.
+    """
+    space = history.problem.space
+    reals = {
+        p.name: float(member.design.params.get(p.name, 0.0)) for p in space.parameters if isinstance(p, FloatParameter)
+    }
+    arm = {"length": member.arm.length, "mass": member.arm.mass}
+    objectives = {o.name: value for o, value in zip(history.problem.objectives, member.values, strict=True)}
+    return {**reals, **arm, **bounded_numbers(history, member.number), **objectives}
+
+
+def bounded_numbers(history: History, number: int) -> dict[str, float]:
+    """The quantities of a design that the constraints bound, by name."""
+    pairs = zip(history.problem.constraints, history.trials[number].constraints, strict=True)
+    return {constraint.quantity.name: constraint.measured(broken) for constraint, broken in pairs}
+
+
+def pick(
+    history: History,
+    where: Sequence[Condition] = (),
+    by: str | None = None,
+    weights: Mapping[str, float] | None = None,
+    numbers: Sequence[int] | None = None,
+) -> list[FrontMember]:
+    """The designs of the front that meet all conditions, the best first.
+
+    by: the number that should be small. weights: of the objectives, each divided by its reference point, whose sum
+    should be small. Without either, the knee of the front comes first, then what lies nearest to its corner.
+    numbers: only these trials, such as the solid ones.
+    FailureError where none meets the conditions; SettingsError for a name that does not exist.
+
+    Examples:
+        >>> import armwright as aw
+        >>> run = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="rules", n_total=20)
+        >>> lightest = pick(run.history, [read_condition("length<=1.2")], by="torque")[0]
+        >>> lightest.values[1] == min(member.values[1] for member in run.front if member.arm.length <= 1.2)
+        True
+    """
+    if by is not None and weights is not None:
+        raise SettingsError("choose by one number or by weights, not by both")
+    if len(history) and not history.front:
+        raise FailureError(unmet(history))
+    told = {member.number: numbers_of(history, member) for member in history.front}
+    names = list(told[history.front[0].number]) if history.front else []
+    objectives = [objective.name for objective in history.problem.objectives]
+    for name in [*(condition.name for condition in where), *([] if by is None else [by])]:
+        _check_name(name, names)
+    for name in weights or {}:
+        _check_name(name, objectives)
+    left = [
+        member
+        for member in history.front
+        if all(condition.holds(told[member.number]) for condition in where)
+        and (numbers is None or member.number in numbers)
+    ]
+    if not left:
+        raise FailureError(_nearest_miss(where, list(told.values())))
+    if by is not None:
+        return sorted(left, key=lambda member: told[member.number][by])
+    scale = np.array(history.reference_point or np.ones(len(objectives)))
+    if weights is not None:
+        heavy = np.array([weights.get(name, 0.0) for name in objectives]) / scale
+        return sorted(left, key=lambda member: float(heavy @ np.array(member.values)))
+    knee = knee_number(
+        np.array([member.values for member in left]), history.reference_point or (math.inf,) * len(scale)
+    )
+    first = [] if knee is None else [left[knee]]
+    others = [member for member in left if member not in first]
+    return first + sorted(others, key=lambda member: float(np.linalg.norm(np.array(member.values) / scale)))
+
+
+def pick_from(
+    run: Path,
+    where: Sequence[Condition] = (),
+    by: str | None = None,
+    weights: Mapping[str, float] | None = None,
+    solid: bool = False,
+) -> tuple[History, list[FrontMember]]:
+    """The same of a run folder; solid: only designs that hold when they are built a little off."""
+    _, history = read_run(run)
+    numbers = None
+    if solid and history.front:
+        verification = (read_summary(run) or {}).get("verification")
+        if verification is None:
+            raise FailureError(f"{run} is not verified; armwright verify {run} does it")
+        numbers = verification["solid_numbers"]
+    return history, pick(history, where, by, weights, numbers)
+
+
+def _check_name(name: str, names: Sequence[str]) -> None:
+    if name not in names:
+        raise SettingsError(
+            f'a design has no number "{name}".{did_you_mean(name, names)} There are: {", ".join(names)}'
+        )
+
+
+def _nearest_miss(where: Sequence[Condition], told: Sequence[Mapping[str, float]]) -> str:
+    """Why no design is left: the first condition that none meets, and how near the front comes to it."""
+    for condition in where:
+        if not any(condition.holds(numbers) for numbers in told):
+            values = [numbers[condition.name] for numbers in told]
+            nearest = min(values) if condition.relation in ("<", "<=") else max(values)
+            bound = f"{condition.name} {condition.relation} {condition.bound:g}"
+            return f"no design of the front has {bound}; the nearest has {nearest:.4g}"
+    return "no design of the front meets all of these conditions at once" if where else "no design is left to choose"

@@ -1,0 +1,104 @@
+"""A finished trial: one evaluated design, and one line of trials.jsonl.
+
+`FinishedTrial` is the only place that lists the fields. Reading and writing lines is derived from it.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar
+
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
+
+from armwright.files import writable
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.parameters import Design, ParameterValue
+
+_PARAMS: TypeAdapter[dict[str, ParameterValue]] = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True))
+
+_Params = Annotated[  # a design is written as its parameters
+    Design,
+    Field(alias="params"),
+    PlainValidator(lambda params: Design(_PARAMS.validate_python(params))),
+    PlainSerializer(lambda design: dict(design.params)),
+]
+_Text = Annotated[str, PlainSerializer(writable)]
+
+
+@dataclass(frozen=True)
+class FinishedTrial:
+    """Hold one evaluated design.
+
+    Attributes:
+        number: of the trial in its run, from 0.
+        source: `random`, `start`, `bbo`, `polish`, `front`, or the name of the proposer.
+        design: what was evaluated.
+        values: the objectives.
+        proposal: the proposal's id, if a proposer made the design.
+        reason: why the proposer suggested it.
+        expected: objectives that the proposer expected.
+        fault: why a trial that was a proposer's became a black-box one.
+        asked: the trial that the proposal was asked for, if another one.
+        feedback: how many finished trials the proposer knew, if not all before this one.
+        refines: the trial whose design was refined for this one.
+        evaluations: designs that were evaluated to find it: many for a refined one, none for a duplicate.
+        same_as: the earlier trial with an equal design, whose values it has.
+        seconds: wall time by part (total, proposing, sampling, evaluation).
+        sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
+        constraints: violation of each constraint; satisfied at <= 0.
+        failure: why the custom evaluator gave no values, so that the design has its `worst`.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    number: int
+    source: str
+    design: _Params
+    values: tuple[float, ...]
+    proposal: str | None = None
+    reason: _Text = ""
+    expected: tuple[float, ...] | None = None
+    fault: str | None = None
+    asked: int | None = None
+    feedback: int | None = None
+    refines: int | None = None
+    evaluations: Annotated[int, Field(ge=0)] = 1
+    same_as: int | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict[str, float])
+    sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    constraints: tuple[float, ...] = ()
+    failure: _Text = ""
+
+    @property
+    def is_feasible(self) -> bool:
+        """Return whether it satisfies all constraints."""
+        return all(violation <= 0.0 for violation in self.constraints)
+
+
+_LINE: TypeAdapter[FinishedTrial] = TypeAdapter(FinishedTrial)
+
+
+def trial_line(trial: FinishedTrial) -> bytes:
+    """Return the line of a trial: fields that have their default are left out, but for `proposal`."""
+    fields = _LINE.dump_python(trial, mode="json", by_alias=True, exclude_defaults=True)
+    return (
+        json.dumps({"number": trial.number, "source": trial.source, "proposal": trial.proposal} | fields).encode()
+        + b"\n"
+    )
+
+
+def parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int, n_constraints: int) -> FinishedTrial:
+    """Return the trial of a line.
+
+    Raises:
+        ValueError: the line is no trial, or not trial `number` of such a problem.
+        DesignError: its design is not in the space.
+    """
+    trial = _LINE.validate_json(line)
+    if len(trial.values) != n_objectives:
+        raise ValueError(f"expected {n_objectives} values, found {len(trial.values)}")
+    if len(trial.constraints) != n_constraints:
+        raise ValueError(f"expected {n_constraints} violations, found {len(trial.constraints)}")
+    if trial.number != number:
+        raise ValueError(f"expected trial number {number}, found {trial.number}")
+    return replace(trial, design=space.design(trial.design.params))

@@ -1,0 +1,73 @@
+"""Refining: designs of a front, their lengths and base tuned by a local search on the kernels.
+
+The paper finds that a language model writes rounded numbers and cannot tune them. Joint types stay as they are; each
+refined design is better in every objective than the one that it comes from.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moocore
+import numpy as np
+
+from armwright.pareto import hypervolume
+from armwright.runs.history import POLISH, FrontMember, History
+from armwright.search.cma_es import Refined, refine
+from armwright.seeding import REFINING, derived_seed
+from armwright.spaces.parameters import Design
+
+EVALUATIONS = 1000  # for each design
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Of one trial's design: the better one, or None where none was found; evaluations: spent on it."""
+
+    refines: int
+    design: Design | None
+    evaluations: int
+
+
+def refine_one(history: History, seed: int) -> Refinement:
+    """The design of the front that is worth it most, refined; seed: the run's."""
+    member = next_to_refine(history)
+    refined = refine_members(history, [member], derived_seed(seed, REFINING, len(history)), EVALUATIONS)
+    (design,) = history.problem.space.designs(refined.rows)
+    return Refinement(member.number, design if refined.improved[0] else None, refined.evaluations)
+
+
+def worth_refining(history: History) -> list[FrontMember]:
+    """The front within the reference box, or the whole one where it lies outside; none as long as none is feasible."""
+    inside = [member for member in history.front if np.all(np.array(member.values) < history.reference_point)]
+    return inside or history.front
+
+
+def next_to_refine(history: History) -> FrontMember:
+    """The design that adds most hypervolume, of those that were neither refined yet nor are refined ones."""
+    members = worth_refining(history)
+    tried = {trial.refines for trial in history}
+    fresh = [m for m in members if m.source != POLISH and m.number not in tried] or members
+    values = np.array([member.values for member in members])
+    reference = history.reference_point
+    assert reference is not None  # what is refined comes after the first random trials
+    if values.shape[1] == 1 or hypervolume(values, reference) == 0.0:
+        return fresh[0]
+    contributions = moocore.hv_contributions(values, ref=list(reference))
+    adds = {member.number: float(c) for member, c in zip(members, contributions, strict=True)}
+    return max(fresh, key=lambda member: adds[member.number])
+
+
+def refine_members(history: History, members: Sequence[FrontMember], seed: int, evaluations: int) -> Refined:
+    """The designs of `members`, refined side by side."""
+    problem = history.problem
+    values = np.array([member.values for member in members])
+    assert history.reference_point is not None
+    return refine(
+        problem.space.parameters,
+        lambda matrix: problem.evaluate_matrix(matrix).penalised,
+        problem.space.matrix([member.design for member in members]),
+        values,
+        history.reference_point,
+        evaluations,
+        seed,
+    )

@@ -1,0 +1,1 @@
+"""What may be varied, and how a design becomes an arm."""

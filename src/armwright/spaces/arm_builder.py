@@ -1,0 +1,120 @@
+"""The arm that a design builds."""
+
+from dataclasses import replace
+from typing import cast
+
+from armwright.robot.arm import Actuator, Arm, Joint, Link, Vector, uniform_link
+from armwright.spaces.design_parameters import checked_design
+from armwright.spaces.joint_modules import (
+    DIRECTIONS,
+    MODULES,
+    Direction,
+    JointType,
+    Module,
+    Mount,
+    mounted,
+    mounted_vector,
+)
+from armwright.spaces.parameters import Design
+from armwright.spaces.space_schema import SpaceSchema
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+
+def build_arm(space: SpaceSchema, design: Design) -> Arm:
+    """Return the physical chain of a design.
+
+    Raises:
+        DesignError: If the design is not in the space.
+    """
+    if not space.min_joints <= len(design.joints) == len(design.links) <= space.max_joints:
+        checked_design(space, design.params)  # raises the reason
+    return _ArmBuilder(space, design).arm()
+
+
+def design_modules(design: Design) -> tuple[Module, ...]:
+    """Return the joint modules of a design, in order."""
+    return tuple(MODULES[letter] for letter in cast("list[JointType]", list(design.joints)))
+
+
+class _ArmBuilder:
+    """Joints and links of one design; modules are counted from 0."""
+
+    def __init__(self, space: SpaceSchema, design: Design) -> None:
+        self._space, self._design, self._params = space, design, design.params
+        self._modules = design_modules(design)
+        self._lengths = design.links
+        self._mount: Mount = cast("Mount", design.mount or space.mount[0])
+        self._actuators = {actuator.name: actuator for actuator in space.arm_actuators}
+
+    def arm(self) -> Arm:
+        """Return the arm."""
+        every = range(len(self._modules))
+        return Arm(
+            base=self._design.origin,
+            joints=tuple(self._joint(i, place) for i in every for place in range(len(self._modules[i].joints))),
+            links=tuple(link for i in every for link in self._links(i)),
+            tool=mounted_vector(self._space.tool, self._mount),
+            tool_axis=mounted_vector(DIRECTIONS["+z"], self._mount),
+            tool_side=mounted_vector(DIRECTIONS["+x"], self._mount),
+            base_mass=self._carried_mass(0),
+        )
+
+    def _joint(self, i: int, place: int) -> Joint:
+        kind, local_axis = self._modules[i].joints[place]
+        axis, sign = mounted(local_axis, self._mount)
+        if kind == "fixed":
+            return Joint(kind, axis)
+        lower, upper = self._limits(i)
+        if sign < 0.0:
+            lower, upper = 0.0 - upper, 0.0 - lower  # no -0.0
+        return Joint(kind, axis, lower, upper, self._actuator(i), self._space.travel if kind == "prismatic" else 1.0)
+
+    def _limits(self, i: int) -> tuple[float, float]:
+        """Return the joint limits of a module along its local axis [rad] or [m]."""
+        if self._modules[i].is_prismatic:
+            return 0.0, self._stroke(i)
+        if self._space.limit is None:
+            return self._space.joint_range
+        limit = float(self._params.get(f"limit_{i + 1}", self._space.limit[0]))
+        return -limit, limit
+
+    def _links(self, i: int) -> list[Link]:
+        """Return the links of a module: massless ones between its joints, then its own."""
+        x, y, z = mounted_vector(DIRECTIONS[self._direction(i)], self._mount)
+        length, radius = self._lengths[i], self._space.link_radius
+        link = uniform_link((x * length, y * length, z * length), self._space.mass.mass(length), radius)
+        if i + 1 < len(self._modules):
+            link = replace(link, end_mass=self._carried_mass(i + 1), end_shift=self._carried_shift(i + 1))
+        return [uniform_link(ORIGIN, 0.0, radius)] * (len(self._modules[i].joints) - 1) + [link]
+
+    def _direction(self, i: int) -> Direction:
+        return cast("Direction", self._params.get(f"direction_{i + 1}", self._space.link_directions[0]))
+
+    def _stroke(self, i: int) -> float:
+        return float(self._params.get(f"stroke_{i + 1}", self._space.min_stroke))
+
+    def _actuator(self, i: int) -> Actuator | None:
+        """Return the actuator of each joint of a module."""
+        if not self._actuators:
+            return None
+        return self._actuators[str(self._params.get(f"motor_{i + 1}", self._space.arm_actuators[0].name))]
+
+    def _carried_mass(self, i: int) -> float:
+        """Return the mass at the start of a module: its actuators and its rail [kg]."""
+        module = self._modules[i]
+        actuator = self._actuator(i) if module.is_actuated else None
+        return self._rail_mass(i) + len(module.joints) * (0.0 if actuator is None else actuator.mass)
+
+    def _rail_mass(self, i: int) -> float:
+        return self._space.mass.mass(self._stroke(i)) if self._modules[i].is_prismatic else 0.0
+
+    def _carried_shift(self, i: int) -> Vector:
+        """Return the vector from the start of a module to the centre of the mass there: a rail's is at its middle."""
+        rail = self._rail_mass(i)
+        if not rail:
+            return ORIGIN
+        ((_, axis),) = self._modules[i].joints
+        distance = rail / self._carried_mass(i) * (self._stroke(i) / 2)
+        x, y, z = mounted_vector(DIRECTIONS[cast("Direction", f"+{axis}")], self._mount)
+        return (distance * x, distance * y, distance * z)

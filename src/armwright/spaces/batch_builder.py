@@ -1,0 +1,291 @@
+"""Batches of designs, built into stacked arms without building the arms one by one.
+
+N designs of up to M modules. A module has up to K joints at one place, K = 2 where the space has a module of two, else
+1; its link follows the last of them. The D = M K places of an arm are compacted, so that its joints come first.
+"""
+
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Actuation, ArmArrays, Bodies, Precision, round_down
+from armwright.robot.arm import AXES
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS
+from armwright.spaces.parameters import CategoricalParameter
+
+Bools = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+_ABSENT = -1  # no joint at this place of a module
+_PLANS = np.full((len(MODULES), 2), _ABSENT)  # local motions of each module's joints; a single joint stands last
+for _row, _module in zip(_PLANS, MODULES.values(), strict=True):
+    for _place, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
+        _row[_place] = {"revolute": 0, "prismatic": PRISMATIC, "fixed": FIXED}[_kind]
+        _row[_place] += 0 if _kind == "fixed" else AXES.index(_axis)
+# (mounts, 3) the world axis that each local axis lies along, and 1 if it points the same way, else -1
+_WORLD_AXES = np.array([[AXES.index(world[1]) for world in row] for row in MOUNTS.values()])  # pyright: ignore[reportArgumentType]
+_SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in MOUNTS.values()])
+_VECTORS = np.array(list(DIRECTIONS.values()))  # (directions, 3)
+
+
+def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "float32") -> ArmArrays:
+    """Build the arms of a matrix of designs.
+
+    Equal to the bit to `stack_arms` of the arms built one by one.
+
+    Args:
+        space: the design space.
+        matrix: (N, P) designs, as of `DesignSpace.matrix`; values beyond the space's ranges are built, too.
+        precision: of the arrays that the kernels read.
+    """
+    columns = _Columns(space, matrix)
+    joints, present = _joints(space, columns)
+    places = joints.plan.shape[2]
+    carried, actuation = _carried(space, columns, joints)
+    bodies, com = _bodies(space, columns, joints, carried)
+    per_joint = {
+        "motion": joints.motion,
+        "lower": joints.lower,
+        "upper": joints.upper,
+        "travel": np.where(joints.slides, space.travel, 1.0),
+        "offset": _at_last(bodies.offset, places),
+        "com": _at_last(com, places),
+        "mass": _at_last(bodies.total_mass, places),
+        "radius": _at_last(np.where(columns.links > 0.0, space.link_radius, 0.0), places),
+    }
+    if actuation is not None:
+        per_joint |= {"effort": actuation.effort, "speed": actuation.speed}
+    present = _flatten(present)
+    flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
+    n_joints = present.sum(axis=1).astype(np.int32)
+    tool = _rotate_one(np.array(space.tool), columns)
+    flat["offset"][np.arange(columns.n), n_joints - 1] += tool
+    return ArmArrays(
+        base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
+        motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
+        lower=-round_down(-flat["lower"], precision),
+        upper=round_down(flat["upper"], precision),
+        offset=flat["offset"].astype(precision),
+        com=flat["com"].astype(precision),
+        mass=flat["mass"].astype(precision),
+        radius=flat["radius"].astype(precision),
+        tool=tool,
+        tool_axis=_rotate_one(_VECTORS[4], columns).astype(precision),
+        tool_side=_rotate_one(_VECTORS[0], columns).astype(precision),
+        n_joints=n_joints,
+        travel=flat["travel"],
+        length=np.cumsum(columns.links, axis=1)[:, -1],
+        base_mass=carried.mass[:, 0],
+        bodies=_spread(bodies, present, places),
+        actuation=None if actuation is None else Actuation(flat["effort"], flat["speed"], actuation.price),
+    )
+
+
+class _Columns:
+    """Read a matrix of designs module by module.
+
+    Attributes:
+        present: (N, M) True for the modules that a design has.
+        mount: (N,) index of its mount.
+        links: (N, M) link lengths, 0 where there is no module [m].
+    """
+
+    def __init__(self, space: DesignSpace, matrix: Array) -> None:
+        self._space, self._matrix = space, matrix
+        self._column = {parameter.name: i for i, parameter in enumerate(space.parameters)}
+        self.n, self.modules = len(matrix), space.max_joints
+        self.present = np.ones((self.n, self.modules), dtype=bool)
+        if "n_joints" in self._column:
+            counts = self._indices("n_joints", int)
+            self.present = np.arange(self.modules) < counts[:, None]
+        names = tuple(MOUNTS)
+        self.mount = np.full(self.n, names.index(space.mount[0]))
+        if "mount" in self._column:
+            self.mount = self._indices("mount", names.index)
+        self.links = np.where(self.present, self.reals("link"), 0.0)
+
+    def _indices(self, name: str, index: Any) -> Any:
+        """(N,) `index` of each design's choice."""
+        choices = cast("CategoricalParameter", self._space.parameters[self._column[name]]).choices
+        return np.array([index(choice) for choice in choices])[self._matrix[:, self._column[name]].astype(np.intp)]
+
+    def choices(self, kind: str, index: Any, default: str) -> Indices:
+        """(N, M) indices of the choices kind_1, kind_2, …; of `default` if the space has no such parameters."""
+        names = [f"{kind}_{j}" for j in range(1, self.modules + 1)]
+        columns = [
+            self._indices(name, index) if name in self._column else np.full(self.n, index(default)) for name in names
+        ]
+        return np.stack(columns, axis=1)
+
+    def reals(self, kind: str, default: float = 0.0) -> Array:
+        """(N, M) values of kind_1, kind_2, …; `default` if the space has no such parameters."""
+        names = [f"{kind}_{j}" for j in range(1, self.modules + 1)]
+        if all(name in self._column for name in names):
+            first = self._column[names[0]]
+            return self._matrix[:, first : first + self.modules]
+        return np.full((self.n, self.modules), default)
+
+
+@dataclass(frozen=True)
+class _Joints:
+    """What the joints of N designs do, (N, M, K) each."""
+
+    plan: Indices  # motion in the base's own axes
+    motion: Indices  # motion in the world's axes
+    lower: Array  # [rad] or [m]
+    upper: Array  # [rad] or [m]
+    slides: Bools  # True for prismatic joints
+
+
+@dataclass(frozen=True)
+class _Carried:
+    """What modules put at the end of the link before, (N, M) each [kg]; the first module's stands with the base."""
+
+    mass: Array  # rail and actuators
+    rails: Array  # rails alone
+
+
+def _joints(space: DesignSpace, columns: _Columns) -> tuple[_Joints, Bools]:
+    """Return the joints, and (N, M, K) which of them a design has."""
+    plan = _PLANS[columns.choices("joint", tuple(MODULES).index, space.joint_types[0])]  # (N, M, 2)
+    if all(len(MODULES[kind].joints) == 1 for kind in space.joint_types):
+        plan = plan[..., 1:]
+    present = np.broadcast_to(columns.present[..., None], plan.shape) & (plan != _ABSENT)
+    plan = np.where(present, plan, FIXED)
+    axis, sign = _world_axes(columns, plan)
+    lower, upper = _limits(space, columns, plan)
+    lower, upper = np.where(sign < 0.0, 0.0 - upper, lower), np.where(sign < 0.0, 0.0 - lower, upper)
+    motion = np.where(plan < FIXED, plan // PRISMATIC * PRISMATIC + axis, FIXED)
+    return _Joints(plan, motion, lower, upper, (plan >= PRISMATIC) & (plan < FIXED)), present
+
+
+def _limits(space: DesignSpace, columns: _Columns, plan: Indices) -> tuple[Array, Array]:
+    """(N, M, K) lower and upper limits in the base's own axes [rad] or [m]."""
+    low, high = space.joint_range
+    if space.limit is not None:
+        upper = columns.reals("limit", space.limit[0])[..., None]
+        lower = -upper
+    else:
+        lower, upper = np.full((1, 1, 1), low), np.full((1, 1, 1), high)
+    stroke = columns.reals("stroke", space.min_stroke)[..., None]
+    lower = np.where(plan < PRISMATIC, lower, np.where(plan < FIXED, 0.0, -1.0))
+    upper = np.where(plan < PRISMATIC, upper, np.where(plan < FIXED, stroke, 1.0))
+    return lower, upper
+
+
+def _carried(space: DesignSpace, columns: _Columns, joints: _Joints) -> tuple[_Carried, Actuation | None]:
+    """Return the masses of rails and actuators, and (N, M, K) what the actuators can do."""
+    stroke = columns.reals("stroke", space.min_stroke)
+    rails = np.where(joints.slides[..., -1], space.mass.mass(stroke), 0.0)
+    if not space.actuators:
+        return _Carried(rails, rails), None
+    moving = (joints.plan < FIXED).sum(axis=2)  # (N, M) joints that need an actuator
+    motor = columns.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
+    efforts, speeds, masses, prices = _catalogue(space)
+    price = np.where(moving > 0, moving * prices[motor], 0.0).sum(axis=1)
+    effort, speed = (np.where(joints.plan < FIXED, each[motor][..., None], np.inf) for each in (efforts, speeds))
+    return _Carried(rails + moving * masses[motor], rails), Actuation(effort, speed, price)
+
+
+@cache
+def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array, Array]:
+    """Return effort [N m], speed [rad/s], mass [kg] and price [USD] of each actuator of a space."""
+    actuators = space.arm_actuators
+    return (
+        np.array([actuator.effort for actuator in actuators]),
+        np.array([np.nan if actuator.speed is None else actuator.speed for actuator in actuators]),
+        np.array([actuator.mass for actuator in actuators]),
+        np.array([np.nan if actuator.price is None else actuator.price for actuator in actuators]),
+    )
+
+
+def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Carried) -> tuple[Bodies, Array]:
+    """Return the links as bodies, (N, M, ...) each, and (N, M, 3) their centres of mass from the joint [m]."""
+    links = columns.links
+    mass = np.where(columns.present, space.mass.mass(links), 0.0)
+    end_mass = np.concatenate([carried.mass[:, 1:], np.zeros((columns.n, 1))], axis=1)
+    directions = columns.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
+    direction = _rotate(_VECTORS[directions], columns.mount)  # (N, M, 3)
+    middle = direction * (links / 2)[..., None]
+    offset = direction * links[..., None]
+    end_place = offset + _end_shift(space, columns, joints.plan, carried)
+    total = mass + end_mass
+    both = (mass[..., None] * middle + end_mass[..., None] * end_place) / np.where(total > 0.0, total, 1.0)[..., None]
+    radius = np.where(columns.present, space.link_radius, 0.0)
+    com = np.where(end_mass[..., None] > 0.0, both, middle)
+    return Bodies(mass, middle, offset, radius, end_mass, end_place), com
+
+
+def _end_shift(space: DesignSpace, columns: _Columns, plan: Indices, carried: _Carried) -> Array | float:
+    """(N, M, 3) from the end of each link to the centre of what it carries there [m]."""
+    rails = carried.rails
+    if not rails.any():
+        return 0.0
+    share = np.where(rails > 0.0, rails / np.where(carried.mass > 0.0, carried.mass, 1.0), 0.0)
+    shift = share * (columns.reals("stroke", space.min_stroke) / 2)
+    local = np.eye(3)[plan[..., -1] % PRISMATIC] * shift[..., None]
+    shifts = np.zeros_like(local)
+    shifts[:, :-1] = _rotate(local, columns.mount)[:, 1:]
+    return shifts
+
+
+def _world_axes(columns: _Columns, plan: Indices) -> tuple[Indices, Array]:
+    """(N, M, K) the world axis of each joint, and 1 if it points the same way as the base's own axis, else -1."""
+    own = plan % PRISMATIC
+    if not columns.mount.any():
+        return own, np.ones(own.shape)
+    mount = columns.mount[:, None, None]
+    return _WORLD_AXES[mount, own], _SIGNS[mount, own]
+
+
+def _rotate(vectors: Array, mount: Indices) -> Array:
+    """(N, M, 3) vectors in the base's own axes, rotated into the world's."""
+    if not mount.any():  # all stand on a floor
+        return np.array(vectors)
+    rotated = np.zeros(vectors.shape)
+    for axis in range(3):
+        world, sign = _WORLD_AXES[mount, axis], _SIGNS[mount, axis]
+        np.put_along_axis(rotated, np.broadcast_to(world[:, None, None], (*vectors.shape[:2], 1)),
+                          (sign[:, None] * vectors[..., axis])[..., None], axis=2)  # fmt: skip
+    return rotated
+
+
+def _rotate_one(vector: Array, columns: _Columns) -> Array:
+    """(N, 3) the same vector (3,) of every base, rotated into the world's axes."""
+    return _rotate(np.broadcast_to(vector, (columns.n, 1, 3)), columns.mount)[:, 0]
+
+
+def _at_last(values: Array, places: int) -> Array:
+    """(N, M, K, ...) values of modules (N, M, ...) at the last of K places of each; 0 elsewhere."""
+    n, modules, *size = values.shape
+    placed = np.zeros((n, modules, places, *size))
+    placed[:, :, -1] = values
+    return placed
+
+
+def _flatten(values: Any) -> Any:
+    """(N, M K, ...) from (N, M, K, ...)."""
+    n, modules, places, *size = values.shape
+    return values.reshape(n, modules * places, *size)
+
+
+def _compact(arrays: dict[str, Any], present: Bools) -> dict[str, Any]:
+    """Move the joints (N, D, ...) that a design has to the front, in their order."""
+    if present.all():
+        return arrays
+    order = np.argsort(~present, axis=1, kind="stable")
+    rows = np.arange(len(present))[:, None]
+    return {name: values[rows, order] for name, values in arrays.items()}
+
+
+def _spread(bodies: Bodies, present: Bools, places: int) -> Bodies:
+    """Return the bodies of joints (N, D, ...), from those of modules (N, M, ...)."""
+    spread = {field.name: getattr(bodies, field.name) for field in fields(Bodies)}
+    if places > 1:
+        spread = {name: _flatten(_at_last(values, places)) for name, values in spread.items()}
+    return Bodies(**_compact(spread, present))

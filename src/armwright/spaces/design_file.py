@@ -1,0 +1,38 @@
+"""Design files: an existing arm or a design of another run, to start a search with."""
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from armwright.exceptions import DesignError
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.parameters import Design
+from armwright.yaml_documents import read_document
+
+
+class DesignFile(BaseModel, frozen=True, extra="forbid"):
+    """A design as a run writes it into designs/NNNN/design.json; a file written by hand only needs `params`."""
+
+    params: dict[str, float | str]  # a value for each parameter of the space, by its name
+    number: Any = None
+    source: Any = None
+    reason: Any = None
+    objectives: Any = None
+    constraints: Any = None
+    masses: Any = None
+    targets: Any = None
+    verification: Any = None
+
+
+def read_design(path: str | Path, space: DesignSpace) -> Design:
+    """Read a design from a YAML or JSON file.
+
+    Raises:
+        DesignError: If it is not in the space.
+    """
+    content = read_document(Path(path), DesignFile, DesignError)
+    try:
+        return space.design(content.params)
+    except DesignError as refusal:
+        raise DesignError(f"{path}: {refusal}") from refusal

@@ -1,0 +1,248 @@
+"""The parameters of a design space, and the conditions under which they are active.
+
+A parameter of module j is inactive if the arm has fewer modules, or if the module is of a type that has no use for it:
+a roll joint has no stroke.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, cast
+
+from armwright.exceptions import DesignError, did_you_mean
+from armwright.spaces.joint_modules import MODULES
+from armwright.spaces.parameters import (
+    GRID_DIGITS,
+    GRID_ERROR,
+    CategoricalParameter,
+    Design,
+    FloatParameter,
+    Parameter,
+    ParameterValue,
+    Range,
+)
+from armwright.spaces.space_schema import MAX_LENGTH, Restriction, SpaceSchema
+
+CACHED_SPACES = 64  # whose parameters are kept
+GRID_KINDS = ("origin", "link", "stroke", "limit")
+
+
+@dataclass(frozen=True)
+class ConditionalParameter:
+    """A parameter and the condition under which it is active.
+
+    Attributes:
+        parameter: The parameter.
+        module: The module, counted from 1, that the arm must have; None if the parameter is always active.
+        types: The types that this module may have; None for any.
+    """
+
+    parameter: Parameter
+    module: int | None = None
+    types: frozenset[str] | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of the parameter."""
+        return self.parameter.name
+
+    def is_active(self, params: Mapping[str, ParameterValue], max_joints: int) -> bool:
+        """Return whether the parameter is active, given the values of the parameters before it."""
+        if self.module is None:
+            return True
+        if self.module > int(params.get("n_joints", max_joints)):
+            return False
+        return self.types is None or params.get(f"joint_{self.module}") in self.types
+
+
+# The caches are outside the model: a copy of a space with other ranges would inherit a cached property.
+@lru_cache(maxsize=CACHED_SPACES)
+def conditional_parameters(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
+    """Return all parameters of a space in their fixed order, restrictions and grids applied."""
+    steps, restrictions = dict(space.grid), dict(space.restrict)
+    found: list[ConditionalParameter] = []
+    for entry in _unrestricted(space):
+        parameter = entry.parameter
+        if parameter.name in restrictions:
+            parameter = _restrict(parameter, restrictions[parameter.name])
+        step = steps.get(parameter.name, steps.get(parameter.name.partition("_")[0], 0.0))
+        if step > 0.0 and isinstance(parameter, FloatParameter):
+            parameter = _on_grid(parameter, step)
+        found.append(replace(entry, parameter=parameter))
+    return tuple(found)
+
+
+@lru_cache(maxsize=CACHED_SPACES)
+def parameters_by_name(space: SpaceSchema) -> dict[str, ConditionalParameter]:
+    """Return the same by name."""
+    return {entry.name: entry for entry in conditional_parameters(space)}
+
+
+@lru_cache(maxsize=CACHED_SPACES)
+def parameters_of(space: SpaceSchema) -> tuple[Parameter, ...]:
+    """Return the parameters without their conditions."""
+    return tuple(entry.parameter for entry in conditional_parameters(space))
+
+
+@lru_cache(maxsize=CACHED_SPACES)
+def _unrestricted(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
+    """Return the parameters without restrictions and grids."""
+    revolute = tuple(letter for letter, module in MODULES.items() if module.is_revolute)
+    prismatic = tuple(letter for letter, module in MODULES.items() if module.is_prismatic)
+    found = [*_of_arm(space), *_per_module(space, "joint", space.joint_types)]
+    found += _per_module(space, "link", space.link, "m")
+    if len(space.link_directions) > 1:
+        found += _per_module(space, "direction", space.link_directions)
+    if len(space.actuators) > 1:
+        names = tuple(record.name for record in space.actuators)
+        found += _per_module(space, "motor", names, types=revolute + prismatic)
+    if not isinstance(space.stroke, (int, float)):
+        found += _per_module(space, "stroke", space.stroke, "m", prismatic)
+    if space.limit is not None:
+        found += _per_module(space, "limit", space.limit, "rad", revolute)
+    return tuple(found)
+
+
+def _of_arm(space: SpaceSchema) -> Iterator[ConditionalParameter]:
+    """Yield the parameters of the whole arm: base position, mount and number of modules."""
+    for axis, (low, high) in zip("xyz", (space.origin_x, space.origin_y, space.origin_z), strict=True):
+        yield ConditionalParameter(FloatParameter(f"origin_{axis}", low, high, "m"))
+    if len(space.mount) > 1:
+        yield ConditionalParameter(CategoricalParameter("mount", space.mount))
+    if space.min_joints < space.max_joints:
+        counts = tuple(str(n) for n in range(space.min_joints, space.max_joints + 1))
+        yield ConditionalParameter(CategoricalParameter("n_joints", counts))
+
+
+def _per_module(
+    space: SpaceSchema,
+    kind: str,
+    values: tuple[str, ...] | Range,
+    unit: str = "",
+    types: tuple[str, ...] = (),
+) -> Iterator[ConditionalParameter]:
+    """Yield one parameter for each module.
+
+    Args:
+        space: The design space.
+        kind: The name of the parameters, without the number of the module.
+        values: The range, or the choices if there is no unit.
+        unit: The unit of a real parameter.
+        types: The module types for which the parameters are active; empty for all.
+    """
+    used = frozenset(letter for letter in space.joint_types if letter in types) if types else None
+    if used is not None and not used:
+        return
+    for j in range(1, space.max_joints + 1):
+        always = j <= space.min_joints and (used is None or len(used) == len(space.joint_types))
+        parameter = (
+            FloatParameter(f"{kind}_{j}", float(values[0]), float(values[1]), unit)
+            if unit
+            else CategoricalParameter(f"{kind}_{j}", cast("tuple[str, ...]", values))
+        )
+        yield ConditionalParameter(parameter, None if always else j, used)
+
+
+def _restrict(parameter: Parameter, to: Restriction) -> Parameter:
+    """Return the parameter with fewer choices or a narrower range.
+
+    Raises:
+        ValueError: If the restriction is not a part of the parameter.
+    """
+    wanted: tuple[float | str, ...] = (to,) if isinstance(to, (str, float, int)) else to
+    if isinstance(parameter, CategoricalParameter):
+        for choice in wanted:
+            if choice not in parameter.choices:
+                raise ValueError(
+                    f"restrict: {parameter.name} = {choice!r} is not one of {', '.join(parameter.choices)}"
+                )
+        if not wanted:
+            raise ValueError(f"restrict: {parameter.name} has no choice left")
+        return CategoricalParameter(parameter.name, tuple(c for c in parameter.choices if c in wanted))
+    numbers = [value for value in wanted if not isinstance(value, str)]
+    if not 1 <= len(numbers) == len(wanted) <= 2:
+        raise ValueError(f"restrict: {parameter.name} = {to!r} is neither a number nor a range [{parameter.unit}]")
+    low, high = numbers[0], numbers[-1]
+    if not parameter.low <= low <= high <= parameter.high:
+        raise ValueError(
+            f"restrict: {parameter.name} = [{low:g}, {high:g}] {parameter.unit} is outside "
+            f"[{parameter.low:g}, {parameter.high:g}]"
+        )
+    return FloatParameter(parameter.name, low, high, parameter.unit)
+
+
+def _on_grid(parameter: FloatParameter, step: float) -> FloatParameter:
+    """Return the parameter on a grid that starts at its lower bound; its upper bound is the last grid point."""
+    steps = math.floor((parameter.high - parameter.low) / step + GRID_ERROR)
+    return replace(parameter, high=round(parameter.low + steps * step, GRID_DIGITS), step=step)
+
+
+def check_parameters(space: SpaceSchema) -> None:
+    """Raise ValueError for restrictions, grids and ties that do not fit the parameters."""
+    _check_restrictions(space)
+    _check_grid(space)
+    _check_ties(space)
+
+
+def _check_restrictions(space: SpaceSchema) -> None:
+    parameters = {entry.name: entry.parameter for entry in _unrestricted(space)}
+    for name, to in space.restrict:
+        if name not in parameters:
+            raise ValueError(f'restrict: unknown parameter "{name}".{did_you_mean(name, parameters)}')
+        _restrict(parameters[name], to)
+
+
+def _check_grid(space: SpaceSchema) -> None:
+    real = [entry.name for entry in _unrestricted(space) if isinstance(entry.parameter, FloatParameter)]
+    known = [*GRID_KINDS, *real]
+    for name, step in space.grid:
+        if name not in known:
+            raise ValueError(f'grid: unknown real parameter "{name}".{did_you_mean(name, known)}')
+        if not GRID_ERROR < step <= MAX_LENGTH:
+            raise ValueError(f"grid: {name} = {step:g}: expected a step above 0")
+
+
+def _check_ties(space: SpaceSchema) -> None:
+    known, ties = parameters_by_name(space), dict(space.tie)
+    for name, other in ties.items():
+        for used in (name, other):
+            if used not in known:
+                raise ValueError(f'tie: unknown parameter "{used}".{did_you_mean(used, known)}')
+        if other in ties:
+            raise ValueError(f"tie: {name} is tied to {other}, which is tied itself; tie both to a free parameter")
+        tied, free = known[name], known[other]
+        if tied.parameter != replace(free.parameter, name=name):
+            raise ValueError(f"tie: {name} and {other} have different ranges or choices")
+        if free.types is not None or (free.module or 0) > (tied.module or 0):
+            raise ValueError(f"tie: {other} may be inactive while {name} is active; reverse the tie")
+
+
+def checked_design(space: SpaceSchema, params: Mapping[str, Any]) -> Design:
+    """Return the design with these values, in the order of the space.
+
+    Tied values may be missing. Values of inactive parameters are left out.
+
+    Raises:
+        DesignError: If a value is unknown, missing or outside its range.
+    """
+    known = parameters_by_name(space)
+    for name in params:
+        if name not in known:
+            raise DesignError(f'unknown parameter "{name}". Parameters: {", ".join(known)}.{did_you_mean(name, known)}')
+    given = {**{name: params[other] for name, other in space.tie if other in params}, **params}
+    checked: dict[str, ParameterValue] = {}
+    missing: list[str] = []
+    for entry in conditional_parameters(space):
+        if not entry.is_active(checked, space.max_joints):
+            continue
+        if entry.name in given:
+            checked[entry.name] = entry.parameter.check(given[entry.name])
+        else:
+            missing.append(entry.name)
+    if missing:
+        raise DesignError(f"missing: {', '.join(missing)}")
+    for name, other in space.tie:
+        if name in checked and other in checked and checked[name] != checked[other]:
+            raise DesignError(f"{name} = {checked[name]} is tied to {other} = {checked[other]}")
+    return Design(checked)

@@ -1,0 +1,106 @@
+"""The joint modules that a design is assembled from, and the ways to mount an arm.
+
+A design states its joints as a word with one letter per module: `YPRP`. Letters R, P, Y, O, S and F are those of
+Kawaharazuka et al. (arXiv:2409.20038).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from armwright.robot.arm import AXES, Axis, JointKind, Vector
+
+JointType = Literal["R", "P", "Y", "O", "X", "T", "S", "F"]
+Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Mount = Literal["floor", "ceiling", "wall+x", "wall-x", "wall+y", "wall-y"]
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """Joints at one place, followed by a link.
+
+    Attributes:
+        joints: Kind and local axis of each joint. The link follows the last one.
+        description: What the module is, for a reader who does not know this program.
+    """
+
+    joints: tuple[tuple[JointKind, Axis], ...]
+    description: str
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether its joints rotate."""
+        return self.joints[0][0] == "revolute"
+
+    @property
+    def is_prismatic(self) -> bool:
+        """Whether its joint translates."""
+        return self.joints[0][0] == "prismatic"
+
+    @property
+    def is_actuated(self) -> bool:
+        """Whether it has an actuator for each of its joints."""
+        return self.is_revolute or self.is_prismatic
+
+
+MODULES: Mapping[JointType, Module] = MappingProxyType(
+    {
+        "R": Module((("revolute", "x"),), "roll, about local x"),
+        "P": Module((("revolute", "y"),), "pitch, about local y"),
+        "Y": Module((("revolute", "z"),), "yaw, about local z, along the link"),
+        "O": Module((("revolute", "x"), ("revolute", "y")), "orthogonal, roll and then pitch at one place"),
+        "X": Module((("prismatic", "x"),), "slide along local x"),
+        "T": Module((("prismatic", "y"),), "transverse slide, along local y"),
+        "S": Module((("prismatic", "z"),), "slide along local z"),
+        "F": Module((("fixed", "z"),), "fixed, no joint: its link is a part of the one before"),
+    }
+)
+JOINT_DESCRIPTIONS: Mapping[JointType, str] = {letter: module.description for letter, module in MODULES.items()}
+
+DIRECTIONS: Mapping[Direction, Vector] = MappingProxyType(
+    {
+        "+x": (1.0, 0.0, 0.0),
+        "-x": (-1.0, 0.0, 0.0),
+        "+y": (0.0, 1.0, 0.0),
+        "-y": (0.0, -1.0, 0.0),
+        "+z": (0.0, 0.0, 1.0),
+        "-z": (0.0, 0.0, -1.0),
+    }
+)
+
+# World directions of the base's x, y and z axes. All frames of the arm stay parallel to the world frame: if the base
+# turns an axis around, the joint rotates about the world axis with the opposite sign.
+MOUNTS: Mapping[Mount, tuple[Direction, Direction, Direction]] = MappingProxyType(
+    {
+        "floor": ("+x", "+y", "+z"),
+        "ceiling": ("+x", "-y", "-z"),
+        "wall+x": ("-z", "+y", "+x"),
+        "wall-x": ("+z", "+y", "-x"),
+        "wall+y": ("+x", "-z", "+y"),
+        "wall-y": ("+x", "+z", "-y"),
+    }
+)
+MOUNT_DESCRIPTIONS: Mapping[Mount, str] = {
+    "floor": "stands on a floor, local z up",
+    "ceiling": "hangs from a ceiling, local z down",
+    "wall+x": "on a wall, local z along world +x",
+    "wall-x": "on a wall, local z along world -x",
+    "wall+y": "on a wall, local z along world +y",
+    "wall-y": "on a wall, local z along world -y",
+}
+
+
+def mounted(axis: Axis, mount: Mount) -> tuple[Axis, float]:
+    """Return the world axis parallel to an axis of the base, and their relative sign (1 or -1)."""
+    sign, world = MOUNTS[mount][AXES.index(axis)]
+    return AXES[AXES.index(world)], 1.0 if sign == "+" else -1.0  # pyright: ignore[reportArgumentType]
+
+
+def mounted_vector(vector: Vector, mount: Mount) -> Vector:
+    """Return a vector of the base frame in world axes."""
+    found = [0.0, 0.0, 0.0]
+    for axis, value in zip(AXES, vector, strict=True):
+        world, sign = mounted(axis, mount)
+        found[AXES.index(world)] = sign * value
+    return found[0], found[1], found[2]

@@ -1,0 +1,37 @@
+"""A design space as Optuna's distributions."""
+
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+
+import optuna
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution
+
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.parameters import FloatParameter, Parameter
+
+_verbosity = threading.Lock()  # of the process; else two threads would put back each other's
+
+
+def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:
+    """Return the space as Optuna's distributions, without tied parameters."""
+    free = [p for p in space.parameters if p.name not in dict(space.tie)]
+    return {p.name: _distribution(p) for p in free}
+
+
+def _distribution(parameter: Parameter) -> BaseDistribution:
+    if isinstance(parameter, FloatParameter):
+        return FloatDistribution(parameter.low, parameter.high, step=parameter.step or None)
+    return CategoricalDistribution(parameter.choices)
+
+
+@contextmanager
+def quietly() -> Generator[None, None, None]:
+    """Silence Optuna's messages about each study; restores the user's verbosity afterwards."""
+    with _verbosity:
+        verbosity = optuna.logging.get_verbosity()
+        optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
+        try:
+            yield
+        finally:
+            optuna.logging.set_verbosity(verbosity)

@@ -1,0 +1,193 @@
+"""The keys of a space file: what may be varied, and within which ranges."""
+
+import math
+from functools import lru_cache
+from typing import Any, Self, cast
+
+from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
+
+from armwright.robot.actuators import ActuatorRecord, TorqueKind, resolved
+from armwright.robot.arm import Actuator, Vector
+from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
+from armwright.spaces.link_mass import MassModel, MassPerMetre
+from armwright.spaces.parameters import Range
+
+Restriction = float | str | Range | tuple[str, ...]
+
+MAX_MODULES = 8
+MAX_ACTUATORS = 50
+MAX_LENGTH = 1000.0  # [m]; beyond it float32 kernels lose the millimetre
+MAX_ANGLE = 2 * math.pi  # [rad]
+MIN_JOINT_RANGE = math.radians(3.0)  # [rad]
+MIN_STROKE = 3e-3  # [m]
+
+
+class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True):
+    """The keys of a space file, with the values of the paper as defaults."""
+
+    name: str = Field(default="paper", min_length=1, max_length=100)
+    """Label for tables."""
+    joints: int | tuple[int, int] = 4
+    """Number of joint modules, or the smallest and the largest number. A pair adds the parameter n_joints."""
+    joint_types: tuple[JointType, ...] = Field(default=("R", "P", "Y"), min_length=1)
+    """Joint modules to choose from, by letter."""
+    joint_range: Range = (-2.4, 2.4)
+    """Range of every revolute joint [rad]."""
+    limit: Range | None = None
+    """Range of the parameters limit_j [rad]: revolute joint j then moves within ±limit_j."""
+    stroke: float | Range = 0.3
+    """Stroke of every prismatic joint [m]; a range adds the parameters stroke_j. A rail weighs as much as a link."""
+    travel: float = Field(default=0.01, gt=0.0, le=10.0)
+    """Travel of a prismatic joint per radian of its actuator [m/rad]."""
+    origin_x: Range = (-1.0, 1.0)
+    """Range of the base position along x [m]."""
+    origin_y: Range = (-1.0, 1.0)
+    """Range of the base position along y [m]."""
+    origin_z: Range = (-1.0, 1.0)
+    """Range of the base position along z [m]."""
+    mount: tuple[Mount, ...] = Field(default=("floor",), min_length=1)
+    """What the arm is mounted on; several choices add the parameter mount."""
+    link: Range = (0.03, 0.30)
+    """Range of the length of each link [m]."""
+    link_directions: tuple[Direction, ...] = Field(default=("+z",), min_length=1)
+    """Direction of a link in the frame of its joint; several choices add the parameters direction_j."""
+    link_radius: float = Field(default=0.015, gt=0.0, le=1.0)
+    """Radius of all links [m]."""
+    tool: Vector = (0.0, 0.0, 0.0)
+    """Offset from the end of the last link to the tip, in the frame of that link [m]."""
+    mass: MassModel = MassPerMetre()
+    """Mass of the links."""
+    actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MAX_ACTUATORS)
+    """Names from the catalogue, or records; several add the parameters motor_j. Empty: joints without mass."""
+    actuator_torque: TorqueKind = "stall"
+    """The torque of the actuators that counts."""
+    safety_factor: float = Field(default=1.0, gt=0.0, le=100.0)
+    """Divisor of that torque."""
+    restrict: tuple[tuple[str, Restriction], ...] = Field(default=(), max_length=100)
+    """Single parameters, fixed (joint_1: Y) or narrowed (joint_2: [P, R], link_1: [0.1, 0.2])."""
+    grid: tuple[tuple[str, float], ...] = Field(default=(), max_length=100)
+    """Step size of a real parameter (link_1: 0.01) or of all of a kind (link: 0.005)."""
+    tie: tuple[tuple[str, str], ...] = Field(default=(), max_length=100)
+    """Parameters that always equal another one (link_3: link_2)."""
+
+    @field_validator("restrict", "grid", "tie", mode="before")
+    @classmethod
+    def _mapping_to_pairs(cls, value: Any) -> Any:
+        return tuple(cast("dict[str, Any]", value).items()) if isinstance(value, dict) else value
+
+    @field_serializer("restrict", "grid", "tie")
+    def _pairs_to_mapping(self, value: tuple[tuple[str, Any], ...]) -> dict[str, Any]:
+        return dict(value)
+
+    @field_validator("joint_types", "mount", "link_directions", mode="before")
+    @classmethod
+    def _one_to_list(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+    @field_validator("actuators", mode="before")
+    @classmethod
+    def _look_up_actuators(cls, value: Any) -> Any:
+        if not isinstance(value, (list, tuple)):
+            raise ValueError("expected a list of names, or of records with name, mass and stall_torque")
+        return [resolved(entry) for entry in cast("list[Any]", value)]
+
+    @field_validator("mass", mode="before")
+    @classmethod
+    def _require_kind(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "kind" not in cast("dict[str, Any]", value):
+            raise ValueError("kind is missing: expected per_metre, per_link or tube")
+        return cast("Any", value)
+
+    @model_validator(mode="after")
+    def _check_values(self) -> Self:
+        _check_modules(self)
+        _check_ranges(self)
+        _check_joint_ranges(self)
+        _check_duplicates(self)
+        for record in self.actuators:
+            record.actuator(self.actuator_torque, self.safety_factor)
+        return self
+
+    @property
+    def min_joints(self) -> int:
+        """The number of joint modules that every arm has."""
+        return self.joints if isinstance(self.joints, int) else self.joints[0]
+
+    @property
+    def max_joints(self) -> int:
+        """The number D of joint modules of the longest arm."""
+        return self.joints if isinstance(self.joints, int) else self.joints[1]
+
+    @property
+    def min_stroke(self) -> float:
+        """The stroke of prismatic joints, the shortest if it is a parameter [m]."""
+        return self.stroke if isinstance(self.stroke, (int, float)) else self.stroke[0]
+
+    @property
+    def arm_actuators(self) -> tuple[Actuator, ...]:
+        """The actuators as an arm has them, in the order of the file."""
+        return _arm_actuators(self)
+
+    @property
+    def max_reach(self) -> float:
+        """The longest possible arm, with all slides extended [m]."""
+        has_slides = any(MODULES[letter].is_prismatic for letter in self.joint_types)
+        stroke = self.stroke if isinstance(self.stroke, (int, float)) else self.stroke[1]
+        return self.max_joints * (self.link[1] + (stroke if has_slides else 0.0)) + math.hypot(*self.tool)
+
+
+@lru_cache(maxsize=64)
+def _arm_actuators(space: SpaceSchema) -> tuple[Actuator, ...]:
+    return tuple(record.actuator(space.actuator_torque, space.safety_factor) for record in space.actuators)
+
+
+def _check_modules(space: SpaceSchema) -> None:
+    low, high = space.min_joints, space.max_joints
+    if not 1 <= low <= high <= MAX_MODULES:
+        raise ValueError(
+            f"joints = {space.joints}: expected a number from 1 to {MAX_MODULES}, or the smallest and the largest one"
+        )
+    if not any(MODULES[letter].is_actuated for letter in space.joint_types):
+        raise ValueError(f"joint_types = {', '.join(space.joint_types)}: at least one type must move")
+
+
+def _check_ranges(space: SpaceSchema) -> None:
+    units = {"origin_x": "m", "origin_y": "m", "origin_z": "m", "link": "m", "joint_range": "rad"}
+    units |= {} if isinstance(space.stroke, (int, float)) else {"stroke": "m"}
+    units |= {} if space.limit is None else {"limit": "rad"}
+    for name, unit in units.items():
+        low, high = getattr(space, name)
+        if low > high:
+            raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} is reversed: give the smaller number first")
+        if max(abs(low), abs(high)) > MAX_LENGTH:
+            raise ValueError(f"{name} = [{low:g}, {high:g}] {unit} exceeds ±{MAX_LENGTH:g}")
+    if space.link[0] <= 0.0:
+        raise ValueError(f"link = [{space.link[0]:g}, {space.link[1]:g}] m: a link must be longer than 0 m")
+    if not MIN_STROKE <= space.min_stroke <= MAX_LENGTH:
+        raise ValueError(f"stroke = {space.min_stroke:g} m is outside {MIN_STROKE:g} <= stroke <= {MAX_LENGTH:g} m")
+    if max(abs(value) for value in space.tool) > MAX_LENGTH:
+        raise ValueError(f"tool = {list(space.tool)} m exceeds ±{MAX_LENGTH:g}")
+
+
+def _check_joint_ranges(space: SpaceSchema) -> None:
+    low, high = space.joint_range
+    if high - low < MIN_JOINT_RANGE:
+        raise ValueError(f"joint_range = [{low:g}, {high:g}] rad is narrower than 3 degrees")
+    if max(-low, high) > MAX_ANGLE:
+        raise ValueError(f"joint_range = [{low:g}, {high:g}] rad exceeds ±2π")
+    if not low <= 0.0 <= high:
+        raise ValueError(f"joint_range = [{low:g}, {high:g}] rad must contain 0, where the inverse kinematics starts")
+    if space.limit is not None and not MIN_JOINT_RANGE / 2 <= space.limit[0] <= space.limit[1] <= MAX_ANGLE:
+        raise ValueError(f"limit = {list(space.limit)} rad: expected values from 1.5 degrees to 2π")
+
+
+def _check_duplicates(space: SpaceSchema) -> None:
+    choices: dict[str, tuple[str, ...]] = {
+        "joint_types": space.joint_types,
+        "mount": space.mount,
+        "link_directions": space.link_directions,
+        "actuators": tuple(record.name for record in space.actuators),
+    }
+    for key, names in choices.items():
+        if len(set(names)) != len(names):
+            raise ValueError(f"{key} has duplicates: {', '.join(names)}")

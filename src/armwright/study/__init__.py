@@ -1,0 +1,1 @@
+"""The search loop: schedule, evaluation backends and resumption."""

@@ -1,0 +1,311 @@
+"""A Dask cluster that runs functions: processes of this machine, or an existing cluster.
+
+It is the one engine for work in other processes: single designs (`dask_backend.py`) and whole runs of an experiment
+(`experiment/running.py`). A task whose worker is lost runs again on another worker.
+"""
+
+import json
+import logging
+import os
+import queue
+import signal
+import subprocess
+import sys
+import traceback
+from collections import Counter
+from collections.abc import Callable, Generator, Hashable, Iterable
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from tempfile import TemporaryDirectory
+from typing import Any, cast
+from uuid import uuid4
+
+from armwright.exceptions import ArmwrightError, ClusterError, FailureError, SettingsError
+from armwright.extras import check_extra
+
+MOST_WORKERS = 10_000
+MOST_LOSSES = 3  # workers lost over the same task before it is given up
+CONNECT_SECONDS = 20.0
+CLOSE_SECONDS = 5.0
+# Versions that the numbers depend on: equal in this process and in every worker.
+PACKAGES = ("armwright", "numpy", "warp-lang")
+# Read by numpy's libraries and by our kernels.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Worker processes that evaluate designs; needs the extra `distributed`.
+
+    Attributes:
+        n_workers: local processes to start, with one thread each. With a scheduler: tasks in flight, by default as
+            many as its workers have threads.
+        scheduler: address of the scheduler of an existing Dask cluster, such as tcp://192.168.0.7:8786.
+
+    Raises:
+        SettingsError: neither is given, or the number is out of range.
+        MissingExtraError: the extra is not installed.
+    """
+
+    n_workers: int | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.n_workers is None and not self.scheduler:
+            raise SettingsError("expected a number of workers or the address of a Dask scheduler, got neither")
+        if self.n_workers is not None and not 1 <= self.n_workers <= MOST_WORKERS:
+            raise SettingsError(f"expected 1 to {MOST_WORKERS:,} workers, got {self.n_workers}")
+        check_extra("distributed", "evaluation by workers")
+
+    @property
+    def description(self) -> str:
+        """What they are, for messages."""
+        return f"the Dask cluster at {self.scheduler}" if self.scheduler else f"{self.n_workers} local workers"
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A task that ended with a value, with an error, or because the workers that ran it were lost."""
+
+    key: Hashable
+    value: Any = None
+    error: ArmwrightError | None = None
+    is_lost: bool = False
+
+
+@dataclass(frozen=True)
+class _Task:
+    key: Hashable
+    name: str
+    future: Any
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """What a task raised, returned as a value: anything else may not survive pickling."""
+
+    error: ArmwrightError
+
+
+class Cluster:
+    """Runs functions on workers; local ones begin and end with it.
+
+    Args:
+        workers: which workers.
+        notify: called with news for the user.
+
+    Raises:
+        ClusterError: the workers did not start, or the scheduler does not answer.
+    """
+
+    def __init__(self, workers: Workers, notify: Callable[[str], None]) -> None:
+        self._workers = workers
+        self._notify = notify
+        self._tasks: dict[str, _Task] = {}  # by the future's key
+        self._losses: Counter[str] = Counter()
+        # Futures that ended, and the keys that a lost worker had; filled by Dask's threads.
+        self._events: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._versions = _versions_of(PACKAGES)
+        with ExitStack() as stack:
+            self._client = stack.enter_context(_client_of(workers))
+            self._client.subscribe_topic("all", self._hear)
+            waiting = "" if self._n_threads() else ", which has no worker yet"
+            notify(f"evaluating on {workers.description}{waiting}")
+            self.close = stack.pop_all().close
+
+    @property
+    def capacity(self) -> int:
+        """Tasks that may be in flight."""
+        return self._workers.n_workers or max(1, self._n_threads())
+
+    @property
+    def n_in_flight(self) -> int:
+        """Tasks that were submitted and have not ended."""
+        return len(self._tasks)
+
+    def submit(self, key: Hashable, name: str, function: Callable[..., Any], *arguments: Any) -> None:
+        """Run `function(*arguments)` on a worker.
+
+        Args:
+            key: what `wait` returns with the value.
+            name: what the user is told that runs again, if a worker is lost.
+            function: a function of this package.
+            arguments: anything that can be pickled.
+        """
+        import cloudpickle
+
+        name_there = f"armwright-{uuid4().hex}"
+        call = cloudpickle.dumps(partial(_run, function, *arguments))
+        future = self._client.submit(_run_pickled, self._versions, call, key=name_there, pure=False)
+        self._tasks[name_there] = _Task(key, name, future)
+        future.add_done_callback(self._events.put)
+
+    def wait(self, timeout: float) -> Finished | None:
+        """Return a task that ended, or None if none does within `timeout` [s].
+
+        Raises:
+            ClusterError: the scheduler was lost, or a worker has other versions than this process.
+        """
+        try:
+            event = self._events.get(timeout=timeout)
+        except queue.Empty:
+            if self._client.status != "running":
+                raise self._lost() from None
+            return None
+        return self._count_losses(cast("frozenset[str]", event)) if isinstance(event, frozenset) else self._end(event)
+
+    def _n_threads(self) -> int:
+        try:
+            return sum(self._client.nthreads().values())
+        except (OSError, TimeoutError) as fault:
+            raise self._lost() from fault
+
+    def _hear(self, event: tuple[float, Any]) -> None:
+        """Take an event of the scheduler; called by Dask's thread."""
+        content = cast("dict[str, Any]", event[1]) if isinstance(event[1], dict) else {}
+        if content.get("action") == "remove-worker" and not content.get("expected"):
+            self._events.put(frozenset(content["processing-tasks"]))
+
+    def _count_losses(self, keys: frozenset[str]) -> Finished | None:
+        for key in keys & self._tasks.keys():
+            self._losses[key] += 1
+            if self._losses[key] >= MOST_LOSSES:
+                return self._give_up(key)
+            self._notify(f"a worker was lost; {self._tasks[key].name} runs again on another one")
+        return None
+
+    def _give_up(self, key: str) -> Finished:
+        task = self._tasks.pop(key)
+        task.future.cancel()
+        return Finished(task.key, is_lost=True)
+
+    def _end(self, future: Any) -> Finished | None:
+        from distributed import CancelledError, KilledWorker
+
+        if future.key not in self._tasks:  # given up
+            return None
+        try:
+            value, versions = future.result()
+        except KilledWorker:  # the scheduler's own limit is lower than ours
+            return self._give_up(future.key)
+        except (CancelledError, OSError, TimeoutError) as fault:
+            raise self._lost() from fault
+        if versions:
+            raise self._refused(versions)
+        key = self._tasks.pop(future.key).key
+        return Finished(key, error=value.error) if isinstance(value, _Failure) else Finished(key, value)
+
+    def _refused(self, there: dict[str, str]) -> ClusterError:
+        others = [
+            f"{name} {there[name]} instead of {here}" for name, here in self._versions.items() if there[name] != here
+        ]
+        return ClusterError(f"a worker has {', '.join(others)}; install the same versions for every worker")
+
+    def _lost(self) -> ClusterError:
+        what = "the Dask scheduler" if self._workers.scheduler else "the local workers"
+        where = f" at {self._workers.scheduler}" if self._workers.scheduler else ""
+        return ClusterError(f"lost the connection to {what}{where}; rerun the same command to resume")
+
+
+def _sent_by_value() -> tuple[Callable[..., dict[str, str]], Callable[..., Any]]:
+    """Return what runs where armwright may be another version, or missing.
+
+    Functions within a function are pickled with their code. So they must not use anything of this module.
+    """
+
+    def versions_of(packages: Iterable[str]) -> dict[str, str]:
+        import platform
+        from importlib import metadata
+
+        there = {"Python": ".".join(platform.python_version_tuple()[:2])}
+        for name in packages:
+            try:
+                there[name] = metadata.version(name)
+            except metadata.PackageNotFoundError:
+                there[name] = "missing"
+        return there
+
+    def run_pickled(versions: dict[str, str], call: bytes) -> tuple[Any, dict[str, str]]:
+        import pickle
+
+        here = versions_of(versions.keys() - {"Python"})
+        return (None, here) if here != versions else (pickle.loads(call)(), {})
+
+    return versions_of, run_pickled
+
+
+_versions_of, _run_pickled = _sent_by_value()
+
+
+def _run(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Run a task; called on the worker."""
+    try:
+        return function(*arguments)
+    except ArmwrightError as error:
+        error.__cause__ = error.__context__ = None
+        return _Failure(error.with_traceback(None))
+    except Exception as fault:  # noqa: BLE001 (raised again by whoever waits)
+        error = FailureError(f"{type(fault).__name__}: {fault}")
+        error.add_note(traceback.format_exc())
+        return _Failure(error)
+
+
+@contextmanager
+def _client_of(workers: Workers) -> Generator[Any]:
+    """Connect to the scheduler of local workers, or to an existing one."""
+    from distributed import Client, Security
+    from distributed.utils import silence_logging_cmgr
+
+    with ExitStack() as stack:
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL + 1))
+        address, security = workers.scheduler, None
+        if address is None:
+            assert workers.n_workers is not None
+            address, credentials = stack.enter_context(_local_cluster(workers.n_workers))
+            security = Security(require_encryption=True, **credentials)
+        try:
+            client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False, security=security)
+        except (OSError, ValueError, TimeoutError) as fault:
+            raise ClusterError(f"no Dask scheduler answers at {address} ({' '.join(str(fault).split())})") from fault
+        stack.callback(_close, client)
+        yield client
+
+
+def _close(client: Any) -> None:
+    with suppress(OSError, TimeoutError):  # the scheduler may be gone
+        client.close(timeout=CLOSE_SECONDS)
+
+
+@contextmanager
+def _local_cluster(n_workers: int) -> Generator[tuple[str, dict[str, str]]]:
+    """Start a scheduler and workers (`local_cluster.py`), and kill them all in the end.
+
+    Yields:
+        The scheduler's address and the credentials to connect, which no other user of the machine knows.
+    """
+    environment = {
+        **os.environ,
+        **dict.fromkeys(THREADS, "1"),
+        "DASK_LOGGING__DISTRIBUTED": "critical",
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+    }
+    with (
+        TemporaryDirectory(prefix="armwright-workers-") as folder,
+        subprocess.Popen(
+            [sys.executable, "-m", "armwright.study.local_cluster", str(n_workers), folder],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+            start_new_session=True,
+        ) as process,
+    ):
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            if not line:
+                raise ClusterError(f"{n_workers} local workers could not be started; try fewer")
+            connection = json.loads(line)
+            yield connection["address"], connection["credentials"]
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)

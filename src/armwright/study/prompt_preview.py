@@ -1,0 +1,116 @@
+"""What would be sent to a model, without sending it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from armwright.exceptions import SettingsError
+from armwright.llm.prompt import estimated_tokens, load_prompt
+from armwright.llm.recording import ReplayBackend
+from armwright.problem.problem import Problem
+from armwright.proposers.prompted import Asking, PromptedProposer
+from armwright.proposers.replay import recorded_asking
+from armwright.runs.config import RunConfig
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from armwright.spaces.design_space import DesignSpace
+from armwright.study.schedule import Asker, Schedule, asking_turns
+from armwright.study.study import optimize
+from armwright.tasks.task import Task
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A prompt for trial `number`, its length in tokens (estimated), and the JSON schema of the answer.
+
+    note: what else will be in the prompt when it is really sent; empty where nothing will.
+    """
+
+    number: int
+    prompt: str
+    tokens: int
+    schema: dict[str, Any]
+    note: str = ""
+
+
+def preview(problem: Problem, asking: Asking, *, n_init: int = 10, seed: int = 0) -> Preview:
+    """The first prompt of a new run."""
+    history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
+    proposer = PromptedProposer(ReplayBackend((), Path()), asking, "llm")
+    return _preview(proposer, problem, n_init, proposer.prompt_for(history, Asker(proposer, seed).seed(n_init)))
+
+
+def preview_after(
+    run: Path,
+    wishes: Mapping[str, Any],
+    *,
+    task: Task | None = None,
+    space: DesignSpace | None = None,
+    number: int | None = None,
+) -> Preview:
+    """The prompt for the next proposal of a run, asked for as the run asks.
+
+    wishes: fields of Asking that shall be others.
+    task, space: where given, the run must be one of these.
+    number: the prompt for this trial instead, as it was then.
+    """
+    config, history = read_run(run)
+    if task is not None and task.entries != config.task.entries:
+        raise SettingsError(f"{run} is a run of another task: {config.task.name}")
+    if space is not None and space != config.space:
+        raise SettingsError(f"{run} is a run of another space: {config.space.name}")
+    own, asking = recorded_asking(config)
+    asking = replace(asking, **wishes)
+    prompt = load_prompt(asking.prompt) if own is None or "prompt" in wishes else own
+    settings = config.study.proposer or {}
+    proposer = PromptedProposer(
+        ReplayBackend((), run), asking, settings["name"] if "prompt" in settings else "llm", prompt=prompt
+    )
+    proposer.look(run)
+    asker = Asker(proposer, config.seed)
+    if number is not None:
+        then = _then(run, config, history, proposer.asked(), number)
+        text = proposer.prompt_for(then, asker.seed(number), proposer.past_hints(number))
+        return _preview(proposer, history.problem, number, text)
+    turns = asking_turns(asker, _schedule(config), lambda: history, config.study.in_flight)
+    number, finished = turns.upcoming(len(history))
+    # What is to be otherwise than in the run is to be seen, even where the run's own answer waits for its second call.
+    if wishes:
+        text = proposer.prompt_for(history, asker.seed(number), proposer.next_hints(number))
+    else:
+        text = proposer.question(history, asker.seed(number), number).prompt
+    note = _note(finished - len(history), len(proposer.unused(history)))
+    return replace(_preview(proposer, history.problem, number, text), note=note)
+
+
+def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: str) -> Preview:
+    return Preview(number, text, estimated_tokens(text), proposer.schema(problem))
+
+
+def _then(run: Path, config: RunConfig, history: History, asked: Mapping[int, int], number: int) -> History:
+    """What was known when a past proposal was asked for."""
+    schedule = _schedule(config)
+    if asked:
+        if number in asked:
+            return history.before(asked[number])
+        numbers = ", ".join(map(str, sorted(asked)))
+    else:  # a run without a model: as a model would have been asked
+        if schedule.begins_block(number) and number <= len(history):
+            return history.before(number)
+        there = [n for n in range(len(history) + 1) if schedule.begins_block(n)]
+        numbers = ", ".join(map(str, there[:6])) + (f", … {there[-1]}" if len(there) > 6 else "")
+    raise SettingsError(f"--number {number}: the proposals of {run} were asked for trials {numbers}")
+
+
+def _note(before: int, unused: int) -> str:
+    """What comes before the next question."""
+    if not before:
+        return ""
+    trials = "1 trial comes" if before == 1 else f"{before} trials come"
+    designs = f", {unused} of them of the calls so far" if unused else ""
+    return f"{trials} before it{designs}, and will be in it"
+
+
+def _schedule(config: RunConfig) -> Schedule:
+    return Schedule(config.study.n_init, config.study.n_step, config.study.n_total)

@@ -1,0 +1,103 @@
+"""Polish: the designs of a finished run's front, refined, and added to the run."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armwright.exceptions import RunFolderError, SettingsError
+from armwright.runs.folder import RunFolder, read_run
+from armwright.runs.history import POLISH, FrontMember, History
+from armwright.runs.results import discard_results, read_summary, resummarize, unmet, write_results
+from armwright.runs.trial import FinishedTrial
+from armwright.runs.verification import verify_front
+from armwright.search.cma_es import POPULATION, Refined
+from armwright.search.refine import EVALUATIONS, refine_members, worth_refining
+from armwright.seeding import REFINING, derived_seed
+
+MOST_EVALUATIONS = 10**9
+
+
+@dataclass(frozen=True)
+class Polished:
+    """What polishing a run came to.
+
+    before, history: without and with the new trials.  tried: how many designs were refined.
+    evaluations: spent in all.
+    """
+
+    before: History
+    history: History
+    summary: dict[str, Any]
+    tried: int
+    evaluations: int
+
+    @property
+    def added(self) -> int:
+        """How many designs became better."""
+        return len(self.history) - len(self.before)
+
+
+def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
+    """Refines each design of a finished run's front; what became better is added as trials of source `polish`.
+
+    evaluations: for each design.  The same call again goes on from the front as it is then.
+    """
+    if not POPULATION <= evaluations <= MOST_EVALUATIONS:
+        raise SettingsError(
+            f"evaluations = {evaluations} for each design: from {POPULATION} to {MOST_EVALUATIONS} can be spent"
+        )
+    path = Path(path)
+    config, _ = read_run(path)
+    method = config.study
+    with RunFolder(path) as folder:
+        trials = folder.open_trials(config.space, len(config.objectives), len(config.task.constraints))
+        summary = read_summary(path)
+        if len(trials) < method.n_trials or summary is None:
+            raise RunFolderError(
+                f"{path} is not finished ({len(trials)} of {method.n_trials} trials are there): give the command that "
+                "began it once more, then polish it"
+            )
+        before = History(config.problem, tuple(trials), method.n_init, config.reference_point)
+        members = worth_refining(before)
+        if not members:
+            raise RunFolderError(f"{path} has no front to polish: {unmet(before)}")
+        earlier = summary.get("polish") or {"rounds": 0, "in_vain": 0}
+        seed = derived_seed(config.seed, REFINING, len(before), earlier["rounds"])
+        refined = refine_members(before, members, seed, evaluations)
+        found = _trials(before, members, refined)
+        in_vain = earlier["in_vain"] + (0 if found else refined.evaluations)
+        summary = {**summary, "polish": {"rounds": earlier["rounds"] + 1, "in_vain": in_vain}}
+        discard_results(path)
+        for trial in found:
+            folder.append(trial)
+        after = History(config.problem, (*trials, *found), method.n_init, config.reference_point)
+        verification = verify_front(after)
+        summary = resummarize(summary, after, config, verification)
+        write_results(folder, after, summary, verification)
+    return Polished(before, after, summary, len(members), refined.evaluations)
+
+
+def _trials(history: History, members: Sequence[FrontMember], refined: Refined) -> list[FinishedTrial]:
+    """A trial for each design that became better; all evaluations are shared out among these.
+
+    Where none did, the summary tells of the evaluations: under `polish`, and in its sum.
+    """
+    better = np.flatnonzero(refined.improved).tolist()
+    designs = history.problem.space.designs(refined.rows[better])
+    violations = history.problem.evaluate_matrix(refined.rows[better]).violations
+    return [
+        FinishedTrial(
+            len(history) + k,
+            POLISH,
+            design,
+            tuple(refined.values[i].tolist()),
+            constraints=tuple(violations[k].tolist()),
+            reason=f"refines trial {members[i].number}",
+            refines=members[i].number,
+            evaluations=refined.evaluations * (k + 1) // len(better) - refined.evaluations * k // len(better),
+        )
+        for k, (i, design) in enumerate(zip(better, designs, strict=True))
+    ]

@@ -1,0 +1,75 @@
+"""Points from CSV files."""
+
+import csv
+import math
+from pathlib import Path
+
+from armwright.exceptions import TaskError
+from armwright.tasks.targets import Point
+
+UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
+
+
+def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) -> tuple[Point, ...]:
+    """Read points from a CSV file with x, y and z in its first three columns.
+
+    A first line without numbers is a header. Empty lines and lines that start with # are skipped. Columns may be
+    separated by commas, semicolons, tabs or spaces.
+
+    Args:
+        path: The CSV file.
+        unit: The unit of its numbers, `m` or `mm`.
+        offset: What is added to every point [m].
+
+    Returns:
+        The points [m].
+
+    Raises:
+        TaskError: If a line is not three finite numbers, or there is none.
+    """
+    if unit not in UNITS:
+        raise TaskError(f'unit "{unit}" is not one of {", ".join(UNITS)}')
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as fault:
+        raise TaskError(f"cannot read {path}: {fault.strerror or fault}") from fault
+    except UnicodeDecodeError as fault:
+        raise TaskError(f"{path} is not a text file in UTF-8") from fault
+    points: list[Point] = []
+    rows = [(number, _split_row(line)) for number, line in enumerate(lines, start=1) if _holds_data(line)]
+    if rows and not any(map(_is_number, rows[0][1][:3])):
+        rows = rows[1:]  # column names
+    for number, row in rows:
+        try:
+            x, y, z = (float(cell) * UNITS[unit] for cell in row[:3])
+        except ValueError as fault:
+            raise TaskError(f"{path}, line {number}: {row[:3]} is not three numbers x, y, z") from fault
+        if not all(math.isfinite(c) for c in (x, y, z)):
+            raise TaskError(f"{path}, line {number}: coordinates must be finite, not {row[:3]}")
+        points.append((_tidy(x + offset[0]), _tidy(y + offset[1]), _tidy(z + offset[2])))
+    if not points:
+        raise TaskError(f"{path} has no points: expected three numbers x, y, z per line")
+    return tuple(points)
+
+
+def _holds_data(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _split_row(line: str) -> list[str]:
+    for delimiter in (",", ";", "\t"):
+        if delimiter in line:
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+    return line.split()
+
+
+def _tidy(value: float) -> float:
+    return round(value, 9)

@@ -1,1 +1,0 @@
-"""Arms that exist already, read from URDF."""

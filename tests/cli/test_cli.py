@@ -1,0 +1,397 @@
+"""The command line as a user meets it."""
+
+import io
+import json
+import shutil
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+import yaml
+from rich.console import Console
+
+from armwright.cli.console import show_result, watching
+from armwright.llm import client as chat
+from armwright.problem.problem import Problem
+from armwright.study.study import optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import Answer, ChatServer, Request, designer
+from tests.support.command_line import PATIENCE, armwright, press_ctrl_c, refused
+
+
+@pytest.fixture(autouse=True)
+def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
+
+
+DRAWN = ("--n-init", "4", "--n-step", "3", "--n-total", "6")
+SHORT = ("--no-figures", *DRAWN)
+INTERRUPTING = '''
+import os, signal
+from itertools import count
+from pathlib import Path
+
+import armwright as aw
+
+calls = count()
+
+@aw.evaluator("size", "span [m]")
+def measure(arm, task):
+    """the size of an arm"""
+    if next(calls) == 14 and not Path("interrupted").exists():
+        Path("interrupted").touch()
+        os.kill(os.getpid(), signal.SIGINT)
+    return float(len(arm.joints)), sum(link.length for link in arm.links)
+'''
+
+
+def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> None:
+    done = armwright("optimize", "target-1", *SHORT)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout.splitlines()[0] == "proposer: rules (no language model is configured; --model names one)"
+    assert "iteration 6/6" in done.stdout
+    assert "a toy" in done.stdout  # wherever N m are shown for the paper's masses
+    run = in_folder / "runs" / "target-1-seed0"
+    assert f"results: runs/{run.name}/" in done.stdout
+    assert list((run / "designs").glob("*/arm.urdf"))
+
+    again = armwright("optimize", "target-1", *SHORT)
+    assert "is finished" in again.stdout
+    assert (
+        done.stdout[done.stdout.index("Pareto front") :].splitlines()[:4]
+        == (again.stdout[again.stdout.index("Pareto front") :].splitlines()[:4])
+    )
+    longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
+    assert "resumed at trial 10 of 13" in longer.stdout
+    message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
+    assert "proposer.name: rules there, None asked" in message
+
+
+def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer() -> None:
+    def shown(proposer: str) -> str:
+        console = Console(file=io.StringIO(), width=80, markup=False, highlight=False)
+        show_result(console, optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_total=6), [])
+        return console.file.getvalue()  # type: ignore[attr-defined]
+
+    table = shown("rules").split("Who found what")[1].splitlines()[1:5]
+    assert table[0].split("  ")[0] == "source"
+    assert [row.split()[:2] for row in table[1:]] == [["random", "4"], ["rules", "1"], ["bbo", "5"]]
+    assert max(map(len, table)) < 60
+    assert "Who found what" not in shown("none")
+
+
+@pytest.mark.slow
+def test_missing_results_of_a_finished_run_are_made_again(in_folder: Path) -> None:
+    armwright("optimize", "target-1", *DRAWN, "--out", "run")
+    run = in_folder / "run"
+    before = {path.relative_to(run) for path in run.rglob("*")}
+    for name in ("hypervolume", "samples", "credit", "front", "arms"):
+        assert {Path("figures", f"{name}.png"), Path("figures", f"{name}.pdf")} <= before
+    shutil.rmtree(run / "figures")
+    shutil.rmtree(run / "designs")
+    (run / "front.csv").unlink()
+    assert "is finished" in armwright("optimize", "target-1", *DRAWN, "--out", "run").stdout
+    assert {path.relative_to(run) for path in run.rglob("*")} == before
+
+
+def test_json_is_alone_on_stdout(in_folder: Path) -> None:
+    done = armwright("optimize", "target-2", *SHORT, "--proposer", "none", "--json", "--out", "here")
+    summary = json.loads(done.stdout)
+    assert (summary["task"], summary["n_trials"], summary["folder"]) == ("target-2", 10, "here")
+    assert "proposer: none" in done.stderr
+
+
+def test_own_task_and_space(in_folder: Path) -> None:
+    (in_folder / "points.csv").write_text("x;y;z\n450;0;100\n450;200;300\n")
+    made = armwright("init", "shelf.yaml", "--from", "points.csv", "--unit", "mm", "--offset", "0", "0", "0.5")
+    assert made.returncode == 0, made.stderr
+    assert yaml.safe_load((in_folder / "shelf.yaml").read_text())["targets"] == [[0.45, 0.0, 0.6], [0.45, 0.2, 0.8]]
+    (in_folder / "space.yaml").write_text("joints: 3\nmass: {kind: per_link, kg: 0.002}\n")
+    done = armwright("optimize", "shelf.yaml", "--space", "space.yaml", "--sampler", "random", *SHORT)
+    assert done.returncode == 0, done.stderr
+    config = yaml.safe_load((in_folder / "runs/shelf-seed0/config.yaml").read_text())
+    assert config["space"]["joints"] == 3
+    assert config["reference_point"] is not None
+
+
+def test_a_model_by_option_environment_and_file(chat_server: ChatServer, in_folder: Path) -> None:
+    def first_line(*args: str, **environment: str) -> str:
+        done = armwright("optimize", "target-1", *SHORT, *args, **environment)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.splitlines()[0]
+
+    by_option = first_line("--model", "m", "--base-url", chat_server.url, "--out", "a", "--prompt", "minus")
+    assert by_option == f"proposer: llm (m at {chat_server.url}, named by --model; prompt minus)"
+    by_environment = first_line("--out", "b", ARMWRIGHT_MODEL="m", ARMWRIGHT_BASE_URL=chat_server.url)
+    assert "named by ARMWRIGHT_MODEL" in by_environment
+    config = in_folder / "config" / "armwright" / "config.yaml"
+    config.parent.mkdir(parents=True)
+    config.write_text(f"model: m\nbase_url: {chat_server.url}\n")
+    by_file = first_line("--out", "c", XDG_CONFIG_HOME=str(in_folder / "config"))
+    assert f"named by {config}" in by_file
+    assert "proposer: rules" in first_line("--out", "d", OPENAI_API_KEY="sk-lying-about")  # a key alone spends nothing
+    assert len((in_folder / "a" / "transcripts.jsonl").read_text().splitlines()) == 5
+
+
+def test_init_writes_a_file_to_edit_and_overwrites_none(in_folder: Path) -> None:
+    assert "3 targets" in armwright("init", "my-task.yaml").stdout
+    text = (in_folder / "my-task.yaml").read_text()
+    assert "# " in text
+    assert "exists already" in refused(2, "init", "my-task.yaml")
+    assert (in_folder / "my-task.yaml").read_text() == text
+    assert "ends in .yaml" in refused(2, "init", "my-task.txt")
+    assert "cannot read" in refused(2, "init", "other.yaml", "--from", "nothing.csv")
+
+
+def test_tasks_are_listed_and_told() -> None:
+    listed = armwright("tasks").stdout
+    for word in ("target-1", "slideopt-wide", "shelf", "armwright tasks NAME"):
+        assert word in listed
+    told = armwright("tasks", "target-1", "slideopt-wide", "random-7").stdout
+    for word in ("(-0.45, -0.45, -0.45)", "reconstruction", "arXiv 2409.20038", "random_task(7)"):
+        assert word in told
+    assert json.loads(armwright("tasks", "--json").stdout)[0]["name"] == "target-1"
+    assert 'Did you mean "shelf"' in refused(2, "tasks", "shelv")
+
+
+def test_version_and_help() -> None:
+    assert armwright("--version").stdout.strip() == "0.1.0"
+    assert "optimize" in armwright("--help").stdout
+    assert "--n-step" in armwright("optimize", "--help").stdout
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("targt-1",), 'unknown task "targt-1". Did you mean "target-1"?'),
+        (("nothing.yaml",), "there is no file nothing.yaml"),
+        (("a" * 300,), "unknown task"),
+        (("target-1", "--space", "turns.yaml"), "beyond ±2π"),
+        (("target-1", "--proposer", "none", "--base-url", "http://x"), "uses no language model"),
+        (("target-1", "--proposer", "none", "--prompt", "x"), 'unknown prompt "x"'),
+        (("bad.yaml",), 'unknown key "target".'),
+        (("nan.yaml",), "finite number (got nan)"),
+        (("empty.yaml",), "targets is empty"),
+        (("target-1", "--space", "upside.yaml"), "is reversed"),
+        (("target-1", "--space", "nothing.yaml"), "cannot read nothing.yaml"),
+        (("target-1", "--n-step", "0"), "n_step = 0: a whole number from 1 to"),
+        (("target-1", "--n-total", "-5"), "n_total = -5"),
+        (("target-1", "--seed", "-1"), "seed = -1"),
+        (("target-1", "--sampler", "tpee"), 'Did you mean "tpe"?'),
+        (("target-1", "--proposer", "rule"), 'Did you mean "rules"?'),
+        (("target-1", "--proposer", "llm"), "needs a language model"),
+        (("target-1", "--model", "openai-chat:gpt-4o"), "OPENAI_API_KEY"),
+        (("target-1", "--model", "gpt-4o"), "openai-chat:gpt-4o"),
+        (("target-1", "--model", "m", "--base-url", "localhost"), "http://"),
+        (("target-1", "--base-url", "http://127.0.0.1:9"), "needs --model"),
+        (("target-1", "--model", "m", "--proposer", "none"), "uses no language model"),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--prompt", "x"), 'unknown prompt "x"'),
+        (("target-1", "--memory", "owm"), 'Did you mean "own"?'),
+        (("target-1", "--answer", "onestep"), 'Did you mean "one-step"?'),
+        (("target-1", "--answer", "text", "--model", "m", "--base-url", "http://127.0.0.1:9"), "is for people"),
+        (("target-1", "--proposals", "0"), "proposals = 0: a whole number from 1"),
+        (("target-1", "--max-cost", "1"), "--max-cost 1.0 goes with a language model, and none is configured"),
+        (("target-1", "--memory", "none"), "--memory none goes with a language model, and none is configured"),
+        (("target-1", "--proposer", "rules", "--max-calls", "0"), "rules does not use --max-calls 0"),
+        (("target-1", "--proposer", "none", "--temperature", "0"), "none does not use --temperature 0.0; leave it out"),
+        (("target-1", "--proposer", "replay:x", "--temperature", "0"), "replay:x does not use --temperature 0.0"),
+        (("target-1", "--proposer", "manual:x", "--origin", "model"), "manual:x does not use --origin model"),
+        (("target-1", "--proposer", "manual:x", "--answer", "text"), "manual:x does not use --answer text"),
+        (("target-1", "--in-flight", "2"), "goes with --overlap"),
+        (("target-1", "--overlap", "--in-flight", "0"), "in_flight = 0"),
+        (("target-1", "--once"), "--once goes with --proposer manual:PATH"),
+        (("target-1", "--proposer", "manual"), "needs a folder: manual:PATH"),
+        (("target-1", "--proposer", "rules:x"), 'unknown proposer "rules:x"'),
+        (("target-1", "--proposer", "manual:x", "--model", "m"), "uses no language model"),
+        (("target-1", "--on-model-failure", "ignore"), "on_model_failure"),
+        (("target-1", "--model", "m", "--base-url", "http://x/v1?key=secret"), "ARMWRIGHT_API_KEY"),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--output", "toool"), 'Did you mean "tool"?'),
+        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--origin", "x"), 'unknown origin "x"'),
+    ],
+)
+def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
+    (in_folder / "bad.yaml").write_text("name: a\ntarget: [[0, 0, 0]]")
+    (in_folder / "nan.yaml").write_text("name: a\ntargets: [[0, 0, .nan]]")
+    (in_folder / "empty.yaml").write_text("name: a\ntargets: []")
+    (in_folder / "turns.yaml").write_text("joint_range: [-10, 10]")
+    (in_folder / "upside.yaml").write_text("link: [0.3, 0.03]")
+    assert words in refused(2, "optimize", *args)
+    assert not (in_folder / "runs").exists()
+
+
+def test_a_server_that_does_not_answer_is_code_1(in_folder: Path) -> None:
+    message = refused(1, "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1")
+    assert "--proposer rules needs none" in message
+
+
+def test_a_server_that_does_not_answer_may_be_passed_over(in_folder: Path) -> None:
+    where = ("--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--on-model-failure", "continue")
+    done = armwright("optimize", "target-1", *SHORT, *where)
+    assert done.returncode == 0, done.stderr
+    assert "m: Connection error" in done.stdout
+    assert "2 proposals failed and became black-box trials (2 connection)" in done.stdout
+    assert "FLAGGED: 100%" in done.stdout
+
+
+def test_a_record_that_is_not_there_is_code_1(in_folder: Path) -> None:
+    assert "there is no nothing to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:nothing")
+
+
+def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer, in_folder: Path) -> None:
+    done = armwright("doctor", OPENAI_API_KEY="sk-planted-in-the-environment")
+    assert done.returncode == 0, done.stderr
+    assert "ok openai-chat: OPENAI_API_KEY set" in done.stdout
+    assert "-- anthropic: ANTHROPIC_API_KEY not set" in done.stdout
+    assert "-- google: GOOGLE_API_KEY or GEMINI_API_KEY not set" in done.stdout
+    assert "ok google: GEMINI_API_KEY set" in armwright("doctor", GEMINI_API_KEY="planted").stdout
+    assert "-- model: none is configured" in done.stdout
+    assert "planted" not in done.stdout + done.stderr
+    assert not chat_server.requests
+    where = ("--model", "m", "--base-url", chat_server.url)
+    assert not armwright("doctor", *where).stderr
+    assert not chat_server.requests  # nothing is sent unless it is asked for
+    assert "ok call: m answered" in armwright("doctor", *where, "--call").stdout
+    assert len(chat_server.requests) == 1
+    assert "Connection error" in refused(1, "doctor", "--model", "m", "--base-url", "http://127.0.0.1:9", "--call")
+    wrong = armwright("doctor", "--model", "openai-chat:gpt-4o")
+    assert wrong.returncode == 1
+    assert (
+        "!! model: openai-chat:gpt-4o, named by --model: model openai-chat:gpt-4o needs OPENAI_API_KEY" in wrong.stdout
+    )
+
+
+def test_a_damaged_folder_is_code_1(in_folder: Path) -> None:
+    armwright("optimize", "target-1", *SHORT, "--out", "run")
+    (in_folder / "run" / "trials.jsonl").write_text("garbage\n")
+    assert "line 1 is damaged" in refused(1, "optimize", "target-1", *SHORT, "--out", "run")
+
+
+@pytest.mark.parametrize("place", ["file/run", "/proc/armwright"])
+def test_an_output_folder_that_cannot_be_written_is_code_1(in_folder: Path, place: str) -> None:
+    """Also as root, whom a read-only mode does not stop."""
+    (in_folder / "file").write_text("")
+    assert f"cannot write {place}" in refused(1, "optimize", "target-1", *SHORT, "--out", place)
+
+
+def test_a_terminal_without_the_characters_shows_the_rest(in_folder: Path) -> None:
+    (in_folder / "space.yaml").write_text("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}")
+    done = armwright("optimize", "target-1", "--space", "space.yaml", *SHORT, encoding="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "kg/m?" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [("tasks",), ("optimize", "target-1", *SHORT)])
+def test_output_that_cannot_be_written_is_one_line(in_folder: Path, command: tuple[str, ...]) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "armwright", *command], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines() == ["armwright: No space left on device: the output"]
+
+
+def test_names_of_files_and_folders_mean_nothing_but_themselves(in_folder: Path) -> None:
+    """No markup, no emoji, and a task file of any name."""
+    made = armwright("init", "мой [b] файл.yaml")
+    assert made.returncode == 0, made.stderr
+    done = armwright("optimize", "мой [b] файл.yaml", *SHORT, "--out", "o/[red]a:smile:[/b]")
+    assert done.returncode == 0, done.stderr
+    assert "results: o/[red]a:smile:[/b]/" in done.stdout
+    assert (in_folder / "o/[red]a:smile:[/b]/summary.json").exists()
+
+
+def test_an_unknown_option_is_code_2() -> None:
+    done = armwright("optimize", "target-1", "--nstep", "5")
+    assert done.returncode == 2
+    assert "--n-step" in done.stderr
+
+
+def test_ctrl_c_leaves_a_folder_that_can_be_resumed(in_folder: Path) -> None:
+    (in_folder / "mine.py").write_text(INTERRUPTING)
+    settings = ["optimize", "target-1", "--proposer", "none", "--sampler", "random", "--n-total", "20"]
+    settings += ["--no-figures", "--evaluator", "mine.py:measure", "--out", "run"]
+    stopped = armwright(*settings)
+    assert (stopped.returncode, stopped.stderr) == (130, "")
+    assert f"Go on with:\n  python -m armwright {' '.join(settings)}" in stopped.stdout
+    kept = (in_folder / "run" / "trials.jsonl").read_text()
+    assert len(kept.splitlines()) == 14
+    done = armwright(*settings)
+    assert "resumed at trial 14 of 30" in done.stdout
+    assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
+
+
+@pytest.mark.parametrize("overlap", [[], ["--overlap"]], ids=["waiting", "overlap"])
+@pytest.mark.parametrize("refused", [0, 1])
+def test_ctrl_c_ends_the_calls_under_way(
+    chat_server: ChatServer, in_folder: Path, overlap: list[str], refused: int
+) -> None:
+    """While the server holds its answers back, the command ends, keeps what was paid for, and says how to go on."""
+    released = threading.Event()
+
+    def answer(request: Request) -> Answer:
+        n = len(chat_server.requests)  # a check, the thoughts, and perhaps a design that is refused
+        if n == 3 and refused:
+            return "no design"
+        if n > 2:
+            press_ctrl_c()
+            released.wait(PATIENCE)
+        return designer(request)
+
+    chat_server.answer = answer
+    done = armwright("optimize", "target-1", "--model", "m", "--base-url", chat_server.url, *overlap)
+    released.set()
+    assert (done.returncode, done.stderr) == (130, "")
+    assert "Go on with:" in done.stdout
+    transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
+    kept = [(call["step"], call["requests"], call["fault"]) for call in map(json.loads, transcript)]
+    assert kept == [("check", 1, None), ("reasoning", 1, None), ("parameters", 1, "cancelled")][: 2 + refused]
+
+
+DROPPED = """
+import os, signal, threading
+import armwright.cli.app as cli
+
+class Finalised:
+    def __del__(self):
+        os.kill(os.getpid(), signal.{name})
+        threading.Event().wait(30)  # here the signal is heeded, and what it raises is dropped
+
+def app():
+    Finalised()
+    threading.Event().wait(30)
+    print("not heeded")
+
+cli.app = app
+cli.main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_wish_to_end_that_python_drops_is_heeded(name: str) -> None:
+    """As in finalisers and in callbacks of libraries, where no exception leads out."""
+    done = subprocess.run([sys.executable, "-c", DROPPED.format(name=name)], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+@pytest.mark.parametrize("width", [60, 120])
+def test_progress_in_a_terminal(width: int) -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, width=width, markup=False, highlight=False)
+    with watching(console) as watch:
+        optimize(Problem(load_task("target-1")), proposer="rules", n_init=3, n_step=5, n_total=7, watch=watch)
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "iteration 7/7" in shown
+    assert "hypervolume" in shown
+    assert "None" not in shown
+
+
+@pytest.mark.slow
+def test_help_needs_no_heavy_import() -> None:
+    heavy = {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}
+    code = f"import sys; import armwright.cli.app; sys.exit(', '.join({heavy!r} & set(sys.modules)) or 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,129 @@
+"""The examples, run as a user runs them."""
+
+import json
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import armwright as aw
+from armwright.cli.app import app
+from armwright.problem.problem import Problem
+from armwright.study.study import optimize
+from armwright.tasks.task import load_task
+from tests import ROOT
+from tests.support.chat_server import Answer, ChatServer, Request
+
+EXAMPLES = ROOT / "examples"
+
+
+def run(example: str, *options: str) -> str:
+    command = [sys.executable, "-W", "error", EXAMPLES / example, *options]
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def told(server: ChatServer) -> tuple[str, ...]:
+    return ("--model", "test-model", "--base-url", server.url, "--origin", "scripted")
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        "1-paper-target",
+        "2-assembly",
+        "3-long-shelf",
+        "4-wall-painting",
+        "5-obstacle-reach",
+        "6-price",
+        "7-buy-or-build",
+    ],
+)
+def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
+    task = next(EXAMPLES.glob(f"{number}*task.yaml"), EXAMPLES / f"{number}.yaml")
+    space = EXAMPLES / f"{number}-space.yaml"
+    spaces = ["--space", str(space)] if space.is_file() else []
+    options = ["--n-init", "5", "--n-total", "10", "--no-figures", "--json", "--out", str(tmp_path / "run")]
+    result = CliRunner().invoke(app, ["optimize", str(task), *spaces, *options])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["n_trials"] == 15
+    # What the first lines of a file say can be typed.
+    for line in task.read_text().splitlines():
+        if (said := re.search(r"armwright optimize (\S+)(?: --space (\S+))?", line)) and line.startswith("#"):
+            assert all((EXAMPLES.parent / file).is_file() for file in said.groups() if file)
+
+
+@pytest.mark.slow
+def test_the_scikit_learn_example(chat_server: ChatServer) -> None:
+    def answer(request: Request) -> Answer:
+        if "response_format" not in request:
+            return "A linear machine, I should say."
+        parameters = {"classifier": "svc", "svc_kernel": "linear", "svc_C": 0.1}
+        return json.dumps({"parameters": parameters, "reason": "few samples"})
+
+    chat_server.answer = answer
+    text = run("optuna_scikit_learn.py", "--n-trials", "10", *told(chat_server))
+    assert re.search(r"Optuna alone: +accuracy 0\.\d{4} with \{'classifier'", text)
+    assert re.search(r"  trial 9: accuracy 0\.97\d\d; few samples", text)
+    assert "1 proposals by test-model, faults: none" in text
+    prompt = chat_server.prompts()[0]
+    assert "- forest_trees: whole number, 10 to 100 in steps of 10; conditional: " in prompt
+    assert "always with classifier = forest" in prompt
+
+
+@pytest.mark.slow
+def test_the_zdt1_example(chat_server: ChatServer) -> None:
+    def answer(request: Request) -> Answer:
+        if "response_format" not in request:
+            return "All but the first at 0."
+        parameters = {f"x{i:02d}": 0.0 for i in range(1, 31)} | {"x01": 0.25}
+        return json.dumps({"parameters": parameters, "reason": "g = 1", "expected": {"value_1": 0.25, "value_2": 0.5}})
+
+    chat_server.answer = answer
+    text = run("optuna_zdt1.py", "--n-trials", "40", *told(chat_server))
+    alone, proposed = (float(volume) for volume in re.findall(r"hypervolume ([\d.]+)", text))
+    assert proposed > alone
+    assert "4 proposals by test-model, 4 of them on the front, faults: none" in text
+    assert (
+        "EXPECTED: value_1 = 0.25, value_2 = 0.5  CAME OUT: value_1 = 0.25, value_2 = 0.5" in chat_server.prompts()[-2]
+    )
+
+
+@pytest.mark.slow
+def test_without_a_model_an_example_says_so() -> None:
+    """And that rules propose in its place."""
+    said = run("optuna_zdt1.py", "--n-trials", "20")
+    assert "No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead." in said
+    assert "2 proposals by rules" in said
+
+
+def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out="runs/target-1-seed0")
+    page = (EXAMPLES.parent / "docs" / "optuna.md").read_text()
+    asking, *others = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    compile(asking, "optuna.md", "exec")  # needs a model
+    assert len(others) == 5
+    (in_folder / "optunahub").symlink_to(EXAMPLES.parent / "optunahub")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "PedAnova")  # what Optuna says of its importances
+        for code in others:
+            exec(code, {})
+    arm, shown, counts = capsys.readouterr().out.splitlines()
+    assert "link_4" in arm
+    assert shown == f"{len(made.front)} {made.hypervolume[-1]}"
+    assert counts == "3 Counter()"
+
+
+def test_the_mujoco_example_follows_our_postures() -> None:
+    """Motors strong enough bring the tip to where the inverse kinematics has it, within what gravity bends."""
+    follow = aw.load_evaluator(f"{EXAMPLES}/mujoco_simulation.py:follow")
+    problem = aw.Problem(aw.load_task("target-1"))
+    designs = problem.space.sample(3, 0)
+    errors = problem.evaluate(designs).values[:, 0]
+    for design, error in zip(designs, errors, strict=True):
+        distance, work = follow(problem.arm(design), problem.task)
+        assert distance == pytest.approx(error, abs=0.02)  # m, of six to nine targets together
+        assert work > 0.0

@@ -1,0 +1,292 @@
+"""Everything that the documentation shows is tried: commands are run, files are loaded, programs are executed.
+
+What cannot be run here stands in NOT_RUN, by name and with the reason; its options are checked all the same.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+import yaml
+
+import armwright as aw
+from armwright.cli.app import app
+from armwright.experiments.plan import ExperimentPlan, cells_of, load_experiment
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+from tests import ROOT
+from tests.support.documentation import PAGES, Block, Command, blocks, code_spans, commands
+from tests.support.robots import robot
+
+# Commands that are not run, by what they match as a whole; the first that matches counts.
+NOT_RUN = {
+    r"make .*": "installs from a network, and some take half an hour; that Makefile has the target is checked",
+    r"python3 -m venv .*|\. \.venv/bin/activate": "the tests run in an environment already",
+    r"(\S*python -m )?pip install .*": "installs from a network; that the extras exist is checked",
+    r"export \w+=.*": "a key of nobody's",
+    r"armwright experiment .*--model .*": "needs a model's key",
+    r"armwright .*--model .*": "needs a model; test_llm.py and test_draft.py run such against a server of their own",
+    r"armwright .*--proposer replay:.*": "needs a run that a model was asked in; test_replay.py makes one",
+    r"armwright .*--proposer manual:.*": "waits for people; test_manual.py answers",
+    r"armwright optimize .*--live|armwright live .*": "serves until nobody looks on; test_live.py looks on",
+    r"armwright compare-arms .* ur5e panda .*": "robot_descriptions fetches these arms from a network",
+    r"armwright optimize .*--workers .*|armwright worker .*": "waits for other processes; test_workers.py starts them",
+    r"optuna-dashboard .*": "serves until it is stopped",
+    r"xargs .* < cells.txt": "minutes: all cells of the experiment; the lines of cells.txt are checked",
+    r"python -m (tests\.fuzz|pytest) .*": "minutes to hours; the suite has a short form of both",
+    r"python benchmarks/.*": "half an hour of benchmark; docs/benchmarks.md has the figures",
+}
+# Experiments of minutes to hours: run with --print-commands, so that all of their cells are made and none is run.
+LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/\S+)( --model \S+)?")
+# Pages whose programs are run elsewhere, where what comes of them is looked at, too.
+PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
+
+LONGEST_WAIT = 900.0  # [s] for a command: one that waits for something that never comes is a fault of the page
+
+# What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
+SHORT = "--n-total 40 --no-figures"
+POINTS = {"points.csv": "x,y,z\n400,-200,100\n400,200,100\n100,350,500\n"}
+TEMPLATE = '{% extends "proposal.md.j2" %}\n{% block analysis %}\nSay which lengths are in stock.\n{% endblock %}\n'
+FILES = {
+    "docs/tasks.md": POINTS,
+    "docs/spaces.md": {
+        "mine.yaml": "name: mine\ntargets: [[0.3, 0.0, 0.2], [0.2, 0.2, 0.3]]\n",
+        "space.yaml": "joints: 2\njoint_types: [Y, P]\n",
+        "arm.json": '{"params": {"origin_x": 0.0, "origin_y": 0.0, "origin_z": 0.0, "joint_1": "Y", "joint_2": "P", '
+        '"link_1": 0.2, "link_2": 0.25}}',
+    },
+    "docs/experiments.md": {"shelf.yaml": "name: rack\ntargets: [[0.3, 0.0, 0.2]]\n", "my-prompt.md.j2": TEMPLATE,
+                            "six-axis.yaml": "joints: 6\n"},
+}  # fmt: skip
+BEFORE = {
+    "docs/exports.md": [f"armwright optimize target-1 {SHORT}"],
+    "docs/page.md": [f"armwright optimize target-1 {SHORT} --out runs/{name}" for name in "ab"],
+    "docs/language-models.md": [f"armwright optimize target-1 {SHORT} --out runs/mine"],
+    "docs/experiments.md": [f"armwright optimize target-1 --proposer {proposer} {SHORT} --out runs/{name}"
+                            for name, proposer in (("a", "none"), ("b", "rules"), ("others/c", "rules --seed 1"))],
+}  # fmt: skip
+
+
+def cli() -> dict[str, Any]:
+    """Each command by its name, as Typer parses it."""
+    return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+
+def reason_not_to_run(command: str) -> str:
+    return next((reason for pattern, reason in NOT_RUN.items() if re.fullmatch(pattern, command)), "")
+
+
+def parsed(arguments: Sequence[str]) -> None:
+    """Arguments of armwright, taken apart by its own parser; nothing is run."""
+    name, *rest = arguments
+    assert name in cli(), f"there is no command {name}"
+    cli()[name].make_context(f"armwright {name}", list(rest))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_and_option_exists(page: str) -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for command in commands(page):
+        program, *arguments = shlex.split(command.text.split(" > ")[0].split(" < ")[0])
+        match Path(program).name:
+            case "armwright":
+                parsed(arguments)
+            case "make":
+                assert {a for a in arguments if "=" not in a} <= targets, command.where
+            case "python" | "python3" if arguments[0].endswith(".py"):
+                assert (ROOT / arguments[0]).is_file(), command.where
+            case "pip" | "python" | "python3" if "install" in arguments:
+                for name in re.findall(r"\[([\w,]+)\]", command.text):
+                    assert set(name.split(",")) <= extras.keys(), command.where
+                assert all((ROOT / arguments[i + 1]).is_file() for i, a in enumerate(arguments) if a == "-c")
+            case _:
+                run = reason_not_to_run(command.text) or shutil.which(program)
+                assert run, f"{command.where}: {command.text} can neither be run, nor is it excused"
+
+
+def test_what_is_not_run_is_there_to_be_excused() -> None:
+    shown = [command.text for page in PAGES for command in commands(page)]
+    for pattern in NOT_RUN:
+        assert any(re.fullmatch(pattern, command) for command in shown), pattern
+    for page, file in PROGRAMS_RUN_IN.items():
+        assert Path(page).name in next((ROOT / "tests").rglob(file)).read_text(), page
+
+
+def test_what_is_said_in_passing_exists() -> None:
+    """`armwright front`, `--budget` and the like within sentences."""
+    options = {
+        name: {o for p in command.params for o in (*p.opts, *p.secondary_opts)} for name, command in cli().items()
+    }
+    scripts = "".join(file.read_text() for place in ("benchmarks", "tests") for file in (ROOT / place).rglob("*.py"))
+    ours = set(re.findall(r'add(?:_argument|option)\(\s*"(--[a-z-]+)"', scripts))
+    known = set[str]().union(*options.values()) | {"--version", "--help"} | ours
+    for page in PAGES:
+        for span in code_spans(page):
+            words = span.split()
+            said = {word.split("=")[0] for word in words if re.fullmatch(r"--[a-z][a-z-]+(=.*)?", word)}
+            if words[0] == "armwright" and len(words) > 1 and not words[1].startswith("-"):
+                assert words[1] in options, f"{page}: {span}"
+                assert said <= options[words[1]] | {"--help"}, f"{page}: {span}"
+            elif words[0].startswith("--"):
+                assert said <= known, f"{page}: {span}"
+
+
+def test_every_file_that_is_named_exists() -> None:
+    for page in PAGES:
+        for span in code_spans(page):
+            if re.fullmatch(r"(src|tests|benchmarks|examples|tools|optunahub)/[\w./-]+", span):
+                assert (ROOT / span).exists(), f"{page}: {span}"
+
+
+def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[str]:
+    """A line as a user types it, in a folder, with armwright on the path."""
+    program = folder / ".bin" / "armwright"
+    if not program.is_file():
+        program.parent.mkdir()
+        program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m armwright "$@"\n')
+        program.chmod(0o755)
+    path = os.pathsep.join([str(program.parent), str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = {**os.environ, "PATH": path, "PYTHONWARNINGS": "error"}
+    done = subprocess.run(
+        ["bash", "-c", line],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=LONGEST_WAIT,
+    )
+    assert done.returncode == 0, f"{where}: {line}\n{done.stdout}{done.stderr}"
+    assert "Traceback" not in done.stderr, f"{where}: {line}\n{done.stderr}"
+    return done
+
+
+def planned(experiment: str, folder: Path, where: str) -> None:
+    """All cells of an experiment, as commands that could be run."""
+    cells = shell(f"{experiment} --print-commands", folder, where).stdout.splitlines()
+    assert len(cells) > 20
+    for line in cells:
+        words = shlex.split(line)
+        parsed(words[[Path(word).name for word in words].index("armwright") + 1 :])
+
+
+EXPERIMENTS = {command.text for page in PAGES for command in commands(page) if LONG.fullmatch(command.text)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("experiment", sorted(EXPERIMENTS - {"armwright experiment mine.yaml"}))
+def test_long_experiments_are_planned(experiment: str, in_folder: Path) -> None:
+    shutil.copytree(ROOT / "examples", in_folder / "examples")
+    planned(experiment, in_folder, experiment)
+
+
+def run_command(command: Command, folder: Path) -> str:
+    """What it prints, or writes into the file that it names."""
+    text = command.text.replace(".venv/bin/", "")
+    if LONG.fullmatch(text):
+        if "mine.yaml" in text:  # the others are planned once for all pages
+            planned(text, folder, command.where)
+    elif not reason_not_to_run(command.text):
+        printed = shell(text, folder, command.where).stdout
+        out = re.search(r"--out (\S+)", text)
+        written = out is not None and (folder / out[1]).is_file()
+        return (folder / out[1]).read_text(encoding="utf-8") if out is not None and written else printed
+    return ""
+
+
+def letters(text: str) -> str:
+    """What of an output is the same on every processor."""
+    return " ".join(re.findall(r"[A-Za-z]+", text))
+
+
+def file_of(block: Block) -> str | None:
+    """The file that a block is shown as: the paragraph before it ends with its name and a colon."""
+    before = "\n".join((ROOT / block.page).read_text(encoding="utf-8").splitlines()[: block.line - 1]).rstrip()
+    found = re.search(r"`([\w-]+\.\w+)`:$", before)
+    return found[1] if found else None
+
+
+FOLLOWED = [page for page in PAGES if commands(page)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", FOLLOWED)
+def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
+    """Its commands, files and programs, from the first to the last, in one folder."""
+    shutil.copytree(ROOT / "examples", in_folder / "examples")
+    for name, file in (("ur3", "ur3_robot"), ("so101", "so101")):
+        shutil.copy(robot(file), in_folder / f"{name}.urdf")
+    for name, text in FILES.get(page, {}).items():
+        (in_folder / name).write_text(text)
+    for line in BEFORE.get(page, ()):
+        shell(line, in_folder, page)
+    run = {command.where: command for command in commands(page)}
+    said = ""  # by what was run last
+    for block in blocks(page):
+        for number in range(len(block.text.splitlines()) + 1):
+            command = run.get(f"{page}:{block.line + number}")
+            if command is not None:
+                said = run_command(command, in_folder)
+        if block.language in ("yaml", "csv", "python") and (name := file_of(block)):
+            (in_folder / name).write_text(block.text)
+        if block.language == "python" and page not in PROGRAMS_RUN_IN:
+            (in_folder / "program.py").write_text(block.text)
+            said = shell("python program.py", in_folder, block.where).stdout
+        if block.language == "jinja":
+            (in_folder / "shown.md.j2").write_text(block.text)
+            shell("armwright prompt target-1 --prompt shown.md.j2", in_folder, block.where)
+        if block.language == "text":
+            assert letters(block.text.splitlines()[0]) in letters(said), block.where
+
+
+@pytest.mark.parametrize(
+    "block", [b for page in PAGES for b in blocks(page) if b.language == "yaml"], ids=lambda b: b.where
+)
+def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
+    content = yaml.safe_load(block.text)
+    for name, text in FILES.get("docs/experiments.md", {}).items():
+        (in_folder / name).write_text(text)
+    file = in_folder / "shown.yaml"
+    if "methods" in content:
+        file.write_text(block.text)
+        plan, beside = load_experiment("shown.yaml")
+        cells, skipped = cells_of(plan, beside, in_folder / "out")
+        assert len(cells) + len(skipped) == len(plan.methods) * len(plan.task_list) * len(plan.seed_list)
+    elif content.keys() & (Task.model_fields.keys() - DesignSpace.model_fields.keys()):
+        named = "" if "name" in content else "name: shown\n"  # a part of a file
+        some = "" if {"targets", "workspace"} & content.keys() else "targets: [[0.3, 0.0, 0.2]]\n"
+        file.write_text(named + some + block.text)
+        space = DesignSpace(actuators=("XL430-W250",), joints=3)  # type: ignore[arg-type]
+        problem = aw.Problem(aw.load_task("shown.yaml"), space)
+        assert len(problem.evaluate(problem.space.sample(2, 0)).values) == 2
+    else:
+        file.write_text(block.text)
+        assert aw.load_space("shown.yaml").parameters
+
+
+def test_every_block_is_of_a_kind_that_is_tried() -> None:
+    """What commands print is text; formulas and drawings have no language."""
+    for page in PAGES:
+        for block in blocks(page):
+            assert block.language in ("sh", "yaml", "csv", "python", "jinja", "text", ""), block.where
+            formulas = page in ("docs/method.md", "docs/architecture.md")
+            assert block.language or formulas, f"{block.where}: a block of no language"
+
+
+def test_every_key_of_an_experiment_s_method_is_an_option() -> None:
+    """The reference tells them by the help of `armwright optimize`."""
+    options = {parameter.name for parameter in cli()["optimize"].params}
+    assert set(ExperimentPlan.model_fields["methods"].annotation.__args__[1].model_fields) <= options | {
+        "label",
+        "front",
+    }  # type: ignore[union-attr]

@@ -1,0 +1,30 @@
+"""The stored baselines belong to the tasks and the best known fronts that they lie beside."""
+
+import runpy
+
+import pytest
+
+from armwright.experiments.baselines import baselines, baselines_of
+from armwright.runs.best_known import best_known_hypervolume
+from armwright.tasks.task import builtin_tasks
+from tests import ROOT
+
+
+def test_every_task_has_its_baselines() -> None:
+    for name, task in builtin_tasks().items():
+        best = best_known_hypervolume(task)
+        found = baselines_of(name)
+        assert [baseline.method for baseline in found] == ["BBO", "BBO/rules"]
+        for baseline in found:
+            assert baseline.runs == 5
+            assert baseline.e_hv < baseline.final < best
+            assert baseline.share == pytest.approx(baseline.final / best, abs=2e-4), (
+                f"the best known front of {name} or its baselines were made anew without the other"
+            )
+    assert {baseline.task for baseline in baselines()} == set(builtin_tasks())
+
+
+def test_the_page_is_the_stored_one() -> None:
+    script = runpy.run_path(str(ROOT / "benchmarks" / "baselines.py"))
+    stored = (ROOT / "docs" / "suite.md").read_text(encoding="utf-8")
+    assert stored == script["page"](), "python benchmarks/baselines.py makes it anew"

@@ -1,0 +1,323 @@
+"""Buy or build: arms that exist on a task, beside the designs of a run."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+
+import armwright as aw
+from armwright.exceptions import ArmError, FailureError, MissingExtraError, RunFolderError, SettingsError, TaskError
+from armwright.experiments.compare_arms import (
+    EXISTING_ARMS,
+    ArmComparison,
+    ComparedArm,
+    compare_arms,
+    dominance_counts,
+    read_existing_arms,
+)
+from armwright.kinematics.arm_arrays import stack_arms
+from armwright.problem.objectives import named_objectives
+from armwright.report.figures import draw_front, write_figures
+from armwright.report.page import write_report
+from armwright.report.style import RC
+from armwright.robot.robot_descriptions import find_urdf
+from armwright.robot.urdf_reader import read_urdf
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+from tests.support.browser import Tab
+from tests.support.command_line import armwright
+from tests.support.robots import robot
+
+TASK = Task(name="feeder", targets=((0.4, -0.2, 0.1), (0.4, 0.2, 0.1), (0.1, 0.35, 0.5)), payload=(0.5, 0.5, 0.0))
+SPACE = DesignSpace(
+    joints=3,
+    origin_z=(0.0, 0.0),
+    origin_x=(-0.5, 0.5),
+    link=(0.05, 0.4),
+    mass={"kind": "tube", "density": 2700, "outer_diameter": 0.06, "wall": 0.004},  # type: ignore[arg-type]
+)
+UR5, PANDA = robot("ur5_robot"), robot("panda")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("buying") / "run"
+    aw.optimize(aw.Problem(TASK, SPACE), proposer="none", n_init=10, n_total=30, out=folder)
+    return folder
+
+
+@pytest.fixture
+def history(run: Path) -> History:
+    return read_run(run)[1]
+
+
+@pytest.fixture(scope="module")
+def compared(run: Path) -> ArmComparison:
+    return compare_arms(TASK, [UR5, PANDA], run)
+
+
+@pytest.fixture
+def tab(browser: Browser) -> Iterator[Tab]:
+    opened = Tab(browser, offline=True)
+    yield opened
+    opened.close()
+
+
+def test_a_design_that_is_bought_has_the_values_of_one_that_is_built(run: Path, history: History) -> None:
+    """The front's URDFs as arms for sale, where their designs stand."""
+    members = history.front[:4]
+    files = [run / "designs" / f"{member.number:04d}" / "arm.urdf" for member in members]
+    comparison = compare_arms(TASK, files, run, base=(0.0, 0.0, 0.0))
+    for member, arm in zip(members, comparison.arms, strict=True):
+        assert arm.values == pytest.approx(member.values, rel=1e-3, abs=1e-4)
+        assert arm.mass == pytest.approx(member.arm.mass)
+        assert arm.reach == pytest.approx(member.arm.reach)
+        assert arm.joints == 3
+        assert (arm.measures["position_error"], arm.measures["torque"]) == arm.values
+    assert len({arm.name for arm in comparison.arms}) == 4  # all files are called arm.urdf
+    assert comparison.positions == 0
+
+
+def test_numbers_are_those_of_the_arm_where_it_stands(compared: ArmComparison) -> None:
+    """By the formulas of the objectives, from postures, masses of the URDF and the task's payloads."""
+    for arm, placed in zip(compared.arms, compared.placed, strict=True):
+        evaluation = compared.problem.physics_of_arms(stack_arms([placed]))
+        torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
+        efforts = [joint.effort for joint in placed.joints]
+        assert arm.values == (arm.measures["position_error"], arm.measures["torque"])
+        assert arm.measures["position_error"] == pytest.approx(error.sum())
+        assert arm.measures["torque"] == pytest.approx(40 * np.linalg.norm(torque, axis=1).sum())
+        assert arm.measures["worst_error"] == pytest.approx(error.max())
+        assert arm.measures["unreached_targets"] == (error >= 1e-3).sum()
+        assert arm.measures["peak_torque"] == pytest.approx(np.abs(torque).max())
+        assert arm.measures["torque_utilisation"] == pytest.approx((np.abs(torque) / efforts).max())
+        without = replace(compared.problem, task=TASK.model_copy(update={"payload": 0.0}))
+        lighter = without.physics_of_arms(stack_arms([placed])).joint_torques[0]
+        assert not np.allclose(lighter[:2], torque[:2])
+        assert np.array_equal(lighter[2], torque[2])
+    assert [arm.name for arm in compared.arms] == ["ur5_robot", "panda"]
+    assert [arm.joints for arm in compared.arms] == [6, 7]
+
+
+def test_the_base_is_searched_within_the_spaces_ranges(compared: ArmComparison) -> None:
+    """No place of a thousand others that misses as little needs clearly less torque; the same seed, the same place."""
+    rng = np.random.default_rng(5)
+    for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
+        x, y, z = arm.base
+        assert -0.5 <= x <= 0.5
+        assert -1.0 <= y <= 1.0
+        assert z == 0.0
+        bought = read_urdf(file).arm
+        first = compared.placed[list(compared.arms).index(arm)].base
+        assert np.subtract(first, arm.base) == pytest.approx(bought.base)
+        others = rng.uniform((-0.5, -1.0, 0.0), (0.5, 1.0, 0.0), (1000, 3))
+        moved = [replace(bought, base=tuple(np.add(bought.base, place).tolist())) for place in others]
+        evaluation = compared.problem.physics_of_arms(stack_arms(moved))
+        missed = np.maximum(evaluation.position_error - 1e-3, 0.0).sum(axis=1)
+        torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
+        assert arm.measures["unreached_targets"] == 0
+        assert arm.measures["torque"] <= 1.01 * torque[missed == 0.0].min()  # type: ignore[operator]
+    assert compare_arms(TASK, [PANDA], space=SPACE).arms[0].base == compared.arms[1].base
+    assert compare_arms(TASK, [PANDA], space=SPACE, seed=1).arms[0].base != compared.arms[1].base
+
+
+def test_standing_beside_the_front(history: History) -> None:
+    values = np.array([member.values for member in history.front])
+    for point in [
+        *values,
+        values.min(axis=0),
+        values.max(axis=0) + 1.0,
+        *np.random.default_rng(1).uniform(0, 9, (9, 2)),
+    ]:
+        better = sum(all(p <= v) and any(p < v) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
+        worse = sum(all(v <= p) and any(v < p) for p, v in ((point, row) for row in values))  # type: ignore[arg-type]
+        assert dominance_counts(point.tolist(), (), history) == (better, worse)
+    assert dominance_counts((values.min(axis=0) - 1e-9).tolist(), (), history) == (len(values), 0)
+    assert dominance_counts((1.0, None), (), history) is None
+
+
+def test_the_run_keeps_the_arms_for_its_figures_and_its_page(run: Path, compared: ArmComparison, tab: Tab) -> None:
+    comparison = compare_arms(TASK, [UR5, PANDA], run)
+    kept = read_existing_arms(run, 2)
+    assert kept == comparison.arms == compared.arms
+    assert {"front.png"} <= {path.name for path in write_figures(run)}
+    history = read_run(run)[1]
+    with matplotlib.rc_context(RC):
+        near = replace(kept[0], name="near", values=tuple(0.5 * np.array(history.reference_point)))
+        far = replace(kept[1], name="far", values=(1e-3, 1e6))
+        (axes,) = draw_front(history, [near, far, replace(kept[1], name="odd", values=(None, 1.0))]).axes
+    words = [text.get_text() for text in axes.texts]
+    assert "near" in words
+    assert "far\nbeyond, at 0.001, 1,000,000" in words
+    assert not any("odd" in text for text in words)
+    assert "existing arm" in [text.get_text() for text in axes.get_legend().get_texts()]
+    tab.open(write_report(run))
+    assert tab.faults == []
+    trace = tab.ask('(({ x, y, text }) => ({ x, y, text }))(pareto.data.find((one) => one.name === "existing arm"))')
+    assert trace["text"] == ["ur5_robot", "panda"]
+    assert trace["y"] == [arm.values[1] for arm in kept]
+    note = tab.text("#pareto-note")
+    for arm in kept:
+        designs = "1 design" if arm.dominates == 1 else f"{arm.dominates} designs"
+        assert f"{arm.name}" in note
+        assert f"dominates {designs} of the front, dominated by {arm.dominated_by}" in note
+
+
+def test_a_name_that_is_no_text_of_a_page(run: Path, tmp_path: Path, tab: Tab) -> None:
+    hostile = tmp_path / "<img src=x onerror='window.hacked = 1'>.urdf"
+    hostile.write_text(UR5.read_text())
+    compare_arms(TASK, [hostile], run, base=(0.0, 0.0, 0.0))
+    tab.open(write_report(run))
+    assert tab.ask("window.hacked") is None
+    assert tab.faults == []
+    (run / EXISTING_ARMS).unlink()
+
+
+def test_without_arms_nothing_is_drawn(run: Path, history: History) -> None:
+    (run / EXISTING_ARMS).unlink(missing_ok=True)
+    assert read_existing_arms(run, 2) == ()
+    (run / EXISTING_ARMS).write_text('[{"name": "x"}]')
+    with pytest.raises(RunFolderError, match=r"existing_arms.json is damaged; remove it"):
+        write_figures(run)
+    (run / EXISTING_ARMS).unlink()
+    (axes,) = draw_front(history).axes
+    assert "existing arm" not in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+@pytest.mark.slow
+def test_what_is_not_known_of_an_arm_is_not_compared(tmp_path: Path) -> None:
+    space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
+    problem = aw.Problem(
+        TASK, space, objectives=named_objectives(["position_error", "mass", "price", "torque_utilisation"])
+    )
+    aw.optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path / "run")
+    silent = tmp_path / "silent.urdf"
+    silent.write_text(UR5.read_text().replace('effort="', 'effort="0" was="'))
+    ur5, without = compare_arms(TASK, [UR5, silent], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
+    assert (ur5.values[2], without.values[2]) == (None, None)
+    assert ur5.values[3] == ur5.measures["torque_utilisation"] != None  # noqa: E711
+    assert (without.values[3], without.measures["torque_utilisation"]) == (None, None)
+    assert (ur5.dominates, ur5.dominated_by) == (None, None)
+    assert any("its price is not known" in note for note in ur5.notes)
+    assert any("not every joint states an effort" in note for note in without.notes)
+    assert write_figures(tmp_path / "run")
+
+
+def test_constraints_hold_for_arms_too(tmp_path: Path) -> None:
+    """What an arm breaks is said with its number, and it then stands nowhere; clearance of a URDF is not known."""
+    task = TASK.model_copy(update={"constraints": ("mass <= 19", "self_clearance >= 0.01")})
+    aw.optimize(aw.Problem(task, SPACE), proposer="none", n_init=10, n_total=10, out=tmp_path / "run")
+    ur5, panda = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
+    assert ur5.violated == ("mass <= 19 (it has 21)",)
+    assert (ur5.dominates, ur5.dominated_by) == (None, None)
+    assert panda.violated == ()
+    assert panda.dominates is not None
+    assert "whether it keeps self_clearance >= 0.01 is not known" in panda.notes
+
+
+def test_slides_are_geared_as_those_of_designs(tmp_path: Path) -> None:
+    """Their force stays; the torque is that of an actuator with the space's travel."""
+    tiago = read_urdf(robot("tiago_no_hand"))
+    (plain,) = compare_arms(TASK, [tiago], base=(0.0, 0.0, 0.0), space=SPACE.model_copy(update={"travel": 1.0})).placed
+    (geared,) = compare_arms(TASK, [tiago], base=(0.0, 0.0, 0.0), space=SPACE).placed
+    assert [joint.kind for joint in geared.joints].count("prismatic") == 1
+    for one, other in zip(plain.joints, geared.joints, strict=True):
+        assert (one.effort, one.speed) == pytest.approx((other.effort, other.speed))
+        assert other.travel == (SPACE.travel if other.kind == "prismatic" else 1.0)
+
+
+def test_mistakes(run: Path, tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="no arm was named"):
+        compare_arms(TASK, [])
+    with pytest.raises(TaskError, match="is a run of the task feeder, with other targets or payloads"):
+        compare_arms("target-1", [UR5], run)
+    with pytest.raises(TaskError, match="other targets or payloads"):
+        compare_arms(TASK.model_copy(update={"payload": 1.0}), [UR5], run)
+    with pytest.raises(SettingsError, match="the run has its own"):
+        compare_arms(TASK, [UR5], run, space=SPACE)
+    with pytest.raises(SettingsError, match="three finite numbers"):
+        compare_arms(TASK, [UR5], base=(0.0, float("nan"), 0.0))
+    with pytest.raises(ArmError, match="there is no file"):
+        compare_arms(TASK, ["none.urdf"])
+    with pytest.raises(ArmError, match="is a folder"):
+        compare_arms(TASK, [tmp_path])
+    with pytest.raises(RunFolderError):
+        compare_arms(TASK, [UR5], tmp_path / "none")
+
+
+@pytest.mark.slow
+def test_arms_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """robot_descriptions itself, with a repository that lies there already, as after the first time."""
+    place = tmp_path / "cache" / "example-robot-data-here" / "example-robot-data"
+    urdf = place / "robots" / "ur_description" / "urdf" / "x.urdf"
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("ROBOT_DESCRIPTION_COMMIT", "here")
+    panda = place / "robots" / "panda_description" / "urdf" / "panda.urdf"
+    for file, content in ((panda, PANDA.read_bytes()), (urdf, b"")):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+    git = ["git", "-C", str(place), "-c", "user.name=a", "-c", "user.email=a@b.invalid"]
+    for command in (["init", "-q", "-b", "here"], ["add", "."], ["commit", "-q", "-m", "a"]):
+        subprocess.run([*git, *command], check=True)
+    assert find_urdf("Panda") == panda
+    assert compare_arms(TASK, ["Panda"], base=(0.0, 0.0, 0.0)).arms[0].joints == 7
+    with pytest.raises(ArmError, match=r'has no URDF "pandda"\. Did you mean "panda"\?'):
+        find_urdf("pandda")
+    with pytest.raises(ArmError, match="no URDF"):
+        find_urdf("viper_mj")
+
+
+@pytest.mark.slow
+def test_names_that_cannot_be_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A network that is not there, and a package that is not there."""
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))
+    for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "all_proxy"):
+        monkeypatch.setenv(name, "http://127.0.0.1:9")
+    with pytest.raises(FailureError, match=r"cannot give the URDF of z1: fatal: .*a URDF file of your own") as fault:
+        find_urdf("z1")
+    assert "\n" not in str(fault.value)
+    monkeypatch.setitem(sys.modules, "robot_descriptions", None)
+    with pytest.raises(MissingExtraError, match=r'pip install "armwright\[arms\]"'):
+        find_urdf("panda")
+
+
+def test_the_command(run: Path, in_folder: Path) -> None:
+    Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)))
+    done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures")
+    assert done.returncode == 0, done.stderr
+    assert "…" not in done.stdout
+    for word in ("ur5_robot", "panda", "1,500 positions", "of the front, dominated by", 'tip is the link "ee_link"'):
+        assert word in done.stdout
+    told = json.loads(
+        armwright("compare-arms", "task.yaml", UR5, "--run", run, "--base", "0,0.1,0", "--no-figures", "--json").stdout
+    )
+    assert told["arms"][0]["base"] == [0.0, 0.1, 0.0]
+    assert told["designs"][0]["values"] == list(read_run(run)[1].front[0].values)
+    (run / EXISTING_ARMS).unlink()
+    for args, words in (
+        (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": three numbers with commas'),
+        (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
+        (("target-1", UR5, "--run", run), "with other targets or payloads"),
+    ):
+        done = armwright("compare-arms", *args)
+        assert done.returncode == 2
+        (line,) = done.stderr.strip().splitlines()
+        assert words in line
+
+
+def test_a_compared_arm_of_no_run(compared: ArmComparison) -> None:
+    comparison = compare_arms(TASK, [UR5], space=SPACE, base=(0.0, 0.0, 0.0))
+    (arm,) = comparison.arms
+    assert isinstance(arm, ComparedArm)
+    assert (arm.dominates, arm.dominated_by, comparison.designs, comparison.run) == (None, None, (), None)
+    assert len(compared.designs) >= 2
+    assert all(design.name.startswith("#") for design in compared.designs)

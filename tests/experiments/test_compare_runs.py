@@ -1,0 +1,296 @@
+"""Runs side by side: the numbers of the paper's table, and what cannot be compared."""
+
+import csv
+import json
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymoo.indicators.hv import HV
+from scipy.stats import wilcoxon
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import RunFolderError, SettingsError
+from armwright.experiments.compare_runs import (
+    Comparison,
+    Run,
+    compare_runs,
+    find_runs,
+    list_runs,
+    read_run_record,
+    side_by_side,
+)
+from armwright.experiments.statistics import interval, paired_test
+from armwright.problem.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.report.comparison_figures import write_comparison_figures
+from armwright.report.tables import latex, markdown, write_tables
+from armwright.runs.best_known import known_front
+from armwright.runs.folder import read_run
+from armwright.study.front_run import find_front
+from armwright.study.study import optimize
+from armwright.tasks.task import Task, load_task
+from tests.support.chat_server import ChatServer, wants_design
+
+SEEDS = range(3)
+TASKS = ("target-1", "random-4")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Black box and rules on two tasks with three seeds, 12 counted trials each."""
+    place = tmp_path_factory.mktemp("runs")
+    for task in TASKS:
+        for proposer in ("none", "rules"):
+            for seed in SEEDS:
+                optimize(
+                    Problem(load_task(task)), proposer=proposer, n_init=4, n_step=4, n_total=12, seed=seed,
+                    out=place / f"{task}-{proposer}-{seed}", verify=False,
+                )  # fmt: skip
+    return place
+
+
+@pytest.fixture
+def comparison(runs: Path) -> Comparison:
+    return compare_runs(runs, baseline="BBO (12 trials)")
+
+
+def changed(folder: Path, change: Callable[[dict], None]) -> None:
+    """Changes a run's summary, as another run would have left it."""
+    summary = json.loads((folder / "summary.json").read_text())
+    change(summary)
+    (folder / "summary.json").write_text(json.dumps(summary))
+
+
+def test_the_numbers_of_the_table_are_those_of_the_histories(runs: Path, comparison: Comparison) -> None:
+    assert comparison.rows
+    for row in comparison.rows:
+        proposer = "none" if row.method.startswith("BBO (") else "rules"
+        summaries = [json.loads((runs / f"{row.task}-{proposer}-{s}/summary.json").read_text()) for s in SEEDS]
+        curves = np.array([summary["hypervolume"]["history"] for summary in summaries])
+        assert curves.shape == (3, 12)
+        assert row.e_hv == interval([summary["hypervolume"]["mean"] for summary in summaries])
+        # METHOD 7: the mean over the trials of the mean, and of the deviation, over the seeds.
+        assert row.e_hv.mean == pytest.approx(np.mean([np.mean(at) for at in curves.T]))
+        assert row.deviation == pytest.approx(np.mean([np.std(at) for at in curves.T]))
+        assert row.final.mean == pytest.approx(curves[:, -1].mean())
+    assert len(comparison.rows) == 4
+
+
+def test_shares_are_given_where_a_front_is_known(comparison: Comparison) -> None:
+    shares = {row.task: row.share for row in comparison.rows}
+    assert shares["random-4"] is None
+    assert shares["target-1"] is not None
+    assert 0.0 < shares["target-1"].mean < 1.0
+
+
+def test_contrasts_pair_the_seeds(comparison: Comparison) -> None:
+    assert comparison.contrasts
+    for contrast in comparison.contrasts:
+        ours, theirs = (
+            [run.curve.mean() for run in comparison.of(method, contrast.task)]
+            for method in (contrast.method, comparison.baseline)
+        )
+        assert contrast.test == paired_test(ours, theirs)
+        assert contrast.p_holm >= contrast.test.p
+    assert comparison.is_undecidable
+
+
+def test_over_all_tasks_each_counts_once(runs: Path) -> None:
+    records = [read_run_record(folder) for folder in find_runs([runs]) if "target-1" in folder.name]
+    gains = [0.9, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
+
+    def as_task(run: Run, i: int) -> Run:
+        """The same run on another task, the rules' hypervolume so many times as large."""
+        gain = gains[i] if "rules" in run.method else 1.0
+        history = [gain * value for value in run.summary["hypervolume"]["history"]]
+        summary = {**run.summary, "hypervolume": {**run.summary["hypervolume"], "history": history}}
+        return replace(run, task=f"task-{i}", summary=summary)
+
+    several = [as_task(run, i) for i in range(7) for run in records]
+    (over,) = side_by_side(several).overall
+    means = {m: np.mean([run.curve.mean() for run in records if run.method == m]) for m in {r.method for r in records}}
+    ours = next(mean for method, mean in means.items() if "rules" in method)
+    ratios = np.array(gains) * ours / next(mean for method, mean in means.items() if "rules" not in method)
+    assert over.ratio.mean == pytest.approx(ratios.mean())
+    assert over.test.p == pytest.approx(wilcoxon(np.log(ratios)).pvalue)
+    assert over.test.better == int(np.sum(ratios > 1.0))
+    assert "## Over all tasks" in markdown(side_by_side(several), "x")
+    five = [run for run in several if run.task not in ("task-5", "task-6")]
+    assert side_by_side(five).overall == []
+
+
+def test_times_say_how_many_got_there(comparison: Comparison) -> None:
+    assert comparison.times
+    for time in comparison.times:
+        curves = comparison.curves(time.method, time.task)
+        there = [next((i + 1 for i, v in enumerate(curve) if v >= time.hypervolume), None) for curve in curves]
+        assert time.reached == sum(t is not None for t in there)
+        assert (time.median is None) == (time.reached < 2)
+
+
+def test_a_flagged_run_stands_for_nothing(runs: Path, tmp_path: Path) -> None:
+    place = shutil.copytree(runs, tmp_path / "runs")
+    changed(place / "target-1-rules-1", lambda s: s["proposer"].update(flagged=True, fallback_share=0.5))
+    found = side_by_side([read_run_record(folder) for folder in find_runs([place])])
+    method = next(m for m in found.methods if "rules" in m)
+    assert [run.seed for run in found.of(method, "target-1")] == [0, 2]
+    assert "excluded, because 50% of its proposals failed" in markdown(found, "x")
+
+
+def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> None:
+    place = shutil.copytree(runs, tmp_path / "runs")
+    for seed in SEEDS:
+        changed(place / f"target-1-rules-{seed}", lambda s: s["proposer"].update(origin="scripted", model="gpt-x"))
+    found = side_by_side([read_run_record(folder) for folder in find_runs([place])])
+    for text in (markdown(found, "x"), latex(found)):
+        assert "[scripted]" in text
+        assert "gpt-x" not in text
+        assert "a scripted stand-in answered instead of a language model" in text
+
+
+def test_what_cannot_be_compared_is_refused(runs: Path, tmp_path: Path) -> None:
+    record = read_run_record(runs / "target-1-none-0")
+    for words, task, settings in (
+        ("targets differ", Task(name="target-1", targets=((0.3, 0.0, 0.2),), reference_point=(5.0, 5.0)), {}),
+        ("12 and 13 counted trials", load_task("target-1"), {"n_total": 13}),
+    ):
+        out = tmp_path / words.split()[0]
+        optimize(Problem(task), proposer="none", n_init=4, seed=1, out=out, verify=False, **{"n_total": 12, **settings})
+        with pytest.raises(SettingsError, match=words):
+            side_by_side([record, read_run_record(out)])
+    copy = shutil.copytree(runs / "target-1-none-0", tmp_path / "copy")
+    with pytest.raises(SettingsError, match="leave one out"):
+        side_by_side([record, read_run_record(copy)])
+    with pytest.raises(SettingsError, match='no run is of the method "x"'):
+        side_by_side([record], "x")
+    (copy / "summary.json").unlink()
+    with pytest.raises(RunFolderError, match="not finished"):
+        read_run_record(copy)
+    with pytest.raises(SettingsError, match="no finished run"):
+        side_by_side([])
+
+
+def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest(tmp_path: Path) -> None:
+    task = Task(name="mine", targets=load_task("shelf").targets)
+    stated = task.model_copy(update={"reference_point": (0.5, 9.0)})
+    for seed in SEEDS:
+        for proposer in ("none", "rules"):
+            optimize(Problem(task), proposer=proposer, n_init=4, n_total=6, n_step=3, seed=seed, verify=False,
+                     out=tmp_path / f"{proposer}-{seed}")  # fmt: skip
+    optimize(Problem(stated), sampler="random", proposer="none", n_init=4, n_total=6, verify=False, out=tmp_path / "s")
+    find_front(Problem(task), budget=2000, out=tmp_path / "front")
+    records = [read_run_record(folder) for folder in find_runs([tmp_path])]
+    own = [record.config.reference_point for record in records]
+    assert len(set(own)) > 2
+    found = side_by_side(records)
+    shared = tuple(max(values) for values in zip(*own, strict=True))
+    assert found.widened == ["mine"]
+    assert found.reference_point("mine") == shared
+    assert found.runs
+    for run in found.runs:
+        values = read_run(run.folder)[1].values
+        if len(run.curve):  # pymoo's hypervolume, after each counted trial
+            assert run.curve == pytest.approx([HV(np.array(shared))(values[: 4 + i]) for i in range(1, 7)])
+        assert run.final == pytest.approx(HV(np.array(shared))(values))
+        if run.proposer:
+            assert sum(run.gained.values()) == pytest.approx(1.0)
+    text = markdown(found, "x")
+    assert "mine: runs had different reference points" in text
+    assert f"{shared[0]:.4g}, {shared[1]:.4g}" in text
+
+
+def test_searches_for_the_whole_front_stand_beside_studies(runs: Path, tmp_path: Path) -> None:
+    find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
+    found = side_by_side([read_run_record(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
+    row = next(row for row in found.rows if row.method == "front search")
+    assert row.e_hv is None
+    assert row.final.mean > 8.0
+    assert "front search" in markdown(found, "x")
+
+
+def test_the_tables_hold_the_same_numbers(comparison: Comparison, tmp_path: Path) -> None:
+    published = {("BBO (12 trials)", "target-1"): (6.7, 2.03)}
+    files = write_tables(tmp_path, comparison, "All", published, "The Paper", ["one cell is missing"])
+    assert {path.name for path in files} >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "time-to.csv"}
+    text = (tmp_path / "table.md").read_text()
+    rows = list(csv.DictReader((tmp_path / "table.csv").read_text().splitlines()))
+    for row in rows:
+        assert f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})" in text
+    assert "6.70 (2.03)" in text
+    assert "The Paper" in text
+    assert "one cell is missing" in text
+    assert "smallest p that 3 pairs of runs can give is 0.25" in text
+    for line in re.findall(r"(?m)^\|.*$", text):
+        assert line.endswith("|")
+    tex = (tmp_path / "table.tex").read_text()
+    body = [line for line in tex.splitlines() if line.endswith(r"\\")]
+    columns = re.search(r"\{tabular\}\{(\w+)\}", tex)[1]
+    assert all(line.count("&") == len(columns) - 1 for line in body[1:])
+    assert tex.count("{") == tex.count("}")
+    assert "_" not in re.sub(r"\\_|[E\\]?\w*_\{hv\}", "", tex)
+
+
+@pytest.mark.slow
+def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) -> None:
+    names = {path.stem for path in write_comparison_figures(tmp_path, comparison, samples=["BBO/rules (12 trials)"])}
+    assert names >= {
+        "targets", "area", "hypervolume-methods", "time-to", "attainment-target-1", "attainment-random-4", "credit",
+        "samples-target-1", "solution-1-target-1", "solution-2-target-1",
+    }  # fmt: skip
+    for name in names:
+        assert (tmp_path / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        pdf = (tmp_path / "figures" / f"{name}.pdf").read_bytes()
+        assert b"/FontFile2" in pdf, "the fonts are embedded, as TrueType"
+
+
+@pytest.mark.slow
+def test_figures_show_a_front_search_beside_a_study(runs: Path, tmp_path: Path) -> None:
+    find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
+    found = side_by_side([read_run_record(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
+    names = {path.stem for path in write_comparison_figures(tmp_path, found)}
+    assert {"hypervolume-methods", "attainment-target-1"} <= names
+
+
+@pytest.mark.slow
+def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_server: ChatServer) -> None:
+    words = "Step 1: $\\alpha_{x \x1b[31m and _no_ markup\n" + "reason " * 3000
+    problem = Problem(load_task("target-1"))
+    known = known_front(problem)
+    best = json.dumps({**known.designs[0].params, "reason": "the most precise of all"})  # so it becomes Solution 1
+    chat_server.answer = lambda request: best if wants_design(request) else words
+    proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
+    optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
+    found = side_by_side([read_run_record(tmp_path / "run", "no $\\alpha_{x markup")])
+    names = {path.stem for path in write_comparison_figures(tmp_path, found)}
+    assert "reasoning-target-1" in names
+
+
+def test_the_commands(runs: Path, tmp_path: Path) -> None:
+    runner = CliRunner()
+    result = runner.invoke(app, ["compare", str(runs), "--out", str(tmp_path / "out"), "--no-figures"])
+    assert result.exit_code == 0, result.output
+    assert "## Differences" in result.output
+    assert (tmp_path / "out" / "table.tex").is_file()
+    listed = json.loads(runner.invoke(app, ["runs", str(runs), "--json"]).output)
+    assert len(listed) == 12
+    assert {run["state"] for run in listed} == {"finished"}
+    assert "random-4" in runner.invoke(app, ["runs", str(runs)]).output
+
+
+def test_runs_that_are_not_whole_are_listed_as_they_are(runs: Path, tmp_path: Path) -> None:
+    half = shutil.copytree(runs / "target-1-none-0", tmp_path / "a" / "half")
+    (half / "summary.json").unlink()
+    (half / "trials.jsonl").write_bytes(b"\n".join((half / "trials.jsonl").read_bytes().split(b"\n")[:7]) + b"\n")
+    damaged = tmp_path / "b"
+    damaged.mkdir()
+    (damaged / "config.yaml").write_text("a: [")
+    states = [run["state"] for run in list_runs(find_runs([tmp_path]))]
+    assert states == ["unfinished, 7 of 16 trials", "damaged config.yaml"]
+    with pytest.raises(RunFolderError, match="there is no"):
+        find_runs([tmp_path / "nothing"])

@@ -1,0 +1,247 @@
+"""Experiments: what a file stands for, and that its cells are run once, wherever that is."""
+
+import csv
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import FailureError, SettingsError, TaskError
+from armwright.experiments.outcome import collect, published
+from armwright.experiments.plan import (
+    ExperimentPlan,
+    builtin_experiments,
+    builtin_text,
+    cells_of,
+    load_experiment,
+    with_model,
+    with_only,
+    with_seeds,
+)
+from armwright.experiments.runner import run_cell
+from armwright.tasks.task import builtin_tasks
+from tests.support.chat_server import ChatServer
+
+SMALL: dict[str, Any] = {
+    "name": "small",
+    "tasks": ["target-1", "random-3"],
+    "seeds": 2,
+    "n_init": 4,
+    "n_total": 6,
+    "methods": {
+        "bbo": {"label": "BBO", "proposer": "none"},
+        "rules": {"label": "BBO/rules", "proposer": "rules", "n_step": 3},
+    },
+}
+
+
+def plan_of(**changes: Any) -> ExperimentPlan:
+    return ExperimentPlan.model_validate({**SMALL, **changes})
+
+
+def file_of(folder: Path, **changes: Any) -> Path:
+    file = folder / "small.yaml"
+    file.write_text(yaml.safe_dump({**SMALL, **changes}))
+    return file
+
+
+def asking(server: ChatServer, **settings: Any) -> dict[str, Any]:
+    """A method that asks our server."""
+    named = {"model": "test-model", "base_url": server.url, "origin": "scripted"}
+    return {"label": "BBO/LLM+", "proposer": "llm", "n_step": 3, **named, **settings}
+
+
+def invoke(*arguments: str | Path) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def run_here(file: Path, *options: str) -> Any:
+    """The command for an experiment, whose cells run in this process."""
+    return invoke("experiment", file, "--workers", "0", "--no-figures", *options)
+
+
+def test_the_paper_s_experiment_is_the_paper_s() -> None:
+    plan = builtin_experiments()["paper"]
+    assert plan.task_list == ("target-1", "target-2", "target-3")
+    assert plan.seed_list == (0, 1, 2, 3, 4)
+    assert (plan.n_init, plan.n_total) == (10, 200)
+    steps = {key: method.n_step for key, method in plan.methods.items() if method.prompt == "plus"}
+    assert steps == {"llm-plus-5": 5, "llm-plus": 10, "llm-plus-50": 50}
+    assert all(method.temperature == 0 for method in plan.methods.values() if method.asks_a_model)
+    table = published(plan)
+    assert table["BBO", "target-1"] == (6.70, 2.03)
+    assert table["BBO/LLM-", "target-2"] == (13.87, 2.33)
+    assert table["BBO/LLM+", "target-3"] == (16.29, 1.53)
+
+
+def test_the_built_in_experiments_can_be_edited(tmp_path: Path) -> None:
+    for name, plan in builtin_experiments().items():
+        file = tmp_path / f"{name}.yaml"
+        file.write_text(builtin_text(name))
+        assert load_experiment(str(file)) == (plan, tmp_path)
+    assert builtin_experiments()["suite"].task_list == tuple(builtin_tasks())
+    assert len(builtin_experiments()["rules"].seed_list) == 20
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"methods": {"bbo": {"label": "BBO", "propser": "none"}}}, "propser"),
+        ({"methods": {"bbo": {"label": "BBO", "proposer": "ruls"}}}, 'Did you mean "rules"'),
+        ({"baseline": "bob"}, 'Did you mean "bbo"'),
+        ({"samples": ["x"]}, 'samples names "x"'),
+        ({"seeds": []}, "seeds"),
+        ({"seeds": [1, 1]}, "each once"),
+        ({"tasks": []}, "tasks is empty"),
+        ({"methods": {}}, "methods"),
+        ({"methods": {"a": {"label": "A"}, "b": {"label": "A"}}}, "same label"),
+        ({"methods": {"../a": {"label": "A"}}}, "match pattern"),
+        ({"n_total": 0}, "n_total"),
+    ],
+)
+def test_a_mistake_in_the_file_is_named(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(SettingsError, match=words):
+        load_experiment(str(file_of(tmp_path, **changes)))
+
+
+def test_unknown_names_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match='Did you mean "paper"'):
+        load_experiment("papr")
+    with pytest.raises(SettingsError, match=r'has no method "rulez"\. Did you mean "rules"'):
+        with_only(plan_of(), ["rulez"], [])
+    with pytest.raises(TaskError, match="unknown task"):
+        cells_of(plan_of(tasks=["targt-1"]), tmp_path, tmp_path)
+    with pytest.raises(TaskError, match="there is no file"):
+        cells_of(plan_of(tasks=["mine.yaml"]), tmp_path, tmp_path)
+    with pytest.raises(SettingsError, match="--seeds 0"):
+        with_seeds(plan_of(), 0)
+
+
+def test_files_are_found_beside_the_experiment(tmp_path: Path) -> None:
+    (tmp_path / "shelf.yaml").write_text("name: shelf\ntargets: [[0.4, 0.0, 0.2]]\nreference_point: [1.0, 1.0]\n")
+    (tmp_path / "three.yaml").write_text("joints: 3\n")
+    plan = plan_of(tasks=["shelf.yaml"], space="three.yaml")
+    cells, _ = cells_of(plan, tmp_path, tmp_path / "out")
+    assert {cell.task_name for cell in cells} == {"shelf"}
+    assert all(Path(cell.task).is_absolute() and Path(str(cell.space)).is_absolute() for cell in cells)
+    outcome = run_cell(cells[0])
+    assert not outcome.fault
+    assert len(json.loads((cells[0].folder / "trials.jsonl").read_text().splitlines()[0])["params"]) == 9
+
+
+def test_cells_without_a_model_are_skipped_and_said_so(tmp_path: Path) -> None:
+    methods = {**SMALL["methods"], "llm": {"label": "BBO/LLM", "proposer": "llm"}}
+    cells, skipped = cells_of(plan_of(methods=methods), tmp_path, tmp_path)
+    assert {one.cell.method for one in skipped} == {"llm"}
+    assert len(skipped) == 4
+    assert "no language model is configured" in skipped[0].reason
+    assert {cell.method for cell in cells} == {"bbo", "rules"}
+    cells, skipped = cells_of(with_model(plan_of(methods=methods), "gpt-x", None), tmp_path, tmp_path)
+    assert not skipped
+    assert {cell.plan.model for cell in cells if cell.method == "llm"} == {"gpt-x"}
+
+
+@pytest.mark.slow
+def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
+    file = file_of(in_folder)
+    result = invoke("experiment", file, "--workers", "2", "--no-figures")
+    assert result.exit_code == 0, result.output
+    assert "8 cells: 8 to run on 2 local workers, 0 finished before, 0 skipped" in result.output
+    assert "With fewer than six seeds, no test can reject at 5 %" in result.output
+    out = in_folder / "experiments" / "small"
+    rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
+    assert {(row["task"], row["method"], row["runs"]) for row in rows} == {
+        (task, method, "2") for task in ("target-1", "random-3") for method in ("BBO", "BBO/rules")
+    }
+    stamps = {path: path.stat().st_mtime_ns for path in out.glob("runs/**/trials.jsonl")}
+    assert len(stamps) == 8
+    again = run_here(file)
+    assert "8 cells: nothing to run, 8 finished before" in again.output
+    assert {path: path.stat().st_mtime_ns for path in stamps} == stamps
+    more = run_here(file, "--seeds", "3", "--method", "bbo", "--json")
+    assert more.exit_code == 0
+    assert json.loads(more.stdout)["cells"] == 6
+
+
+@pytest.mark.slow
+def test_a_changed_file_is_not_taken_for_the_run_that_lies_there(in_folder: Path) -> None:
+    assert run_here(file_of(in_folder, seeds=1, tasks=["random-3"])).exit_code == 0
+    methods = {**SMALL["methods"], "rules": {**SMALL["methods"]["rules"], "n_step": 2}}
+    result = run_here(file_of(in_folder, seeds=1, tasks=["random-3"], methods=methods))
+    assert result.exit_code == 1
+    assert "FAILED: BBO/rules, random-3, seed 0" in result.output
+    assert "n_step: 3 there, 2 asked" in result.output
+
+
+@pytest.mark.slow
+def test_a_failing_cell_is_reported_and_does_not_stop_the_others(in_folder: Path) -> None:
+    blocked = in_folder / "experiments/small/runs/rules/target-1"
+    blocked.mkdir(parents=True)
+    (blocked / "seed1").write_text("a file where a folder should be")
+    result = run_here(file_of(in_folder))
+    assert result.exit_code == 1
+    assert "FAILED: BBO/rules, target-1, seed 1" in result.output
+    assert "Traceback" not in result.output
+    table = (in_folder / "experiments/small/table.md").read_text()
+    assert "FAILED: BBO/rules, target-1, seed 1" in table
+    finished = list(in_folder.glob("experiments/small/runs/*/*/*/summary.json"))
+    assert len(finished) == 7
+    (blocked / "seed1").unlink()
+    mended = run_here(file_of(in_folder))
+    assert mended.exit_code == 0
+    assert "1 to run" in mended.output
+
+
+@pytest.mark.slow
+def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
+    methods = {
+        "bbo": {"label": "BBO", "sampler": "nsga2"},
+        "rules": {"label": "BBO/rules", "proposer": "rules", "n_step": 3, "polish_every": 3},
+        "front": {"label": "front", "front": "1500"},
+    }
+    file = file_of(in_folder, methods=methods, tasks=["random-3"], seeds=[7], robust=True)
+    printed = invoke("experiment", file, "--print-commands")
+    lines = printed.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["armwright"] * 3
+    for line in lines:
+        subprocess.run([sys.executable, "-m", *shlex.split(line), "--no-figures"], check=True, capture_output=True)
+    result = run_here(file)
+    assert result.exit_code == 0, result.output
+    # A search is asked again whether its budget is spent; nothing is computed.
+    assert "3 cells: 1 to run one after another, " in result.output
+    assert "2 finished before" in result.output
+    plan, beside = load_experiment(str(file))
+    cells, _ = cells_of(plan, beside, in_folder / "experiments" / "small")
+    assert all(run_cell(cell).resumed for cell in cells)
+
+
+@pytest.mark.slow
+def test_a_recorded_experiment_is_played_again_without_a_model(in_folder: Path, chat_server: ChatServer) -> None:
+    settings: dict[str, Any] = {"tasks": ["random-3"], "methods": {"llm": asking(chat_server)}}
+    file = file_of(in_folder, **settings)
+    first = run_here(file, "--out", "first")
+    assert first.exit_code == 0, first.output
+    assert "2 of them ask test-model for some 4 proposals in all" in first.output
+    assert "[scripted]" in (in_folder / "first" / "table.md").read_text()
+    chat_server.requests.clear()
+    again = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")
+    assert again.exit_code == 0, again.output
+    assert not chat_server.requests
+    assert "skipped: BBO/LLM+, 1 cell: first holds no record of it" in again.output
+    for seed in range(2):
+        runs = [in_folder / place / f"runs/llm/random-3/seed{seed}/trials.jsonl" for place in ("first", "again")]
+        one, other = ([json.loads(line)["params"] for line in run.read_text().splitlines()] for run in runs)
+        assert one == other
+
+
+def test_nothing_finished_is_nothing_to_compare(tmp_path: Path) -> None:
+    cells, _ = cells_of(plan_of(), tmp_path, tmp_path)
+    with pytest.raises(FailureError, match="no cell of the experiment is finished"):
+        collect(plan_of(), cells)

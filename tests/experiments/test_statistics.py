@@ -1,0 +1,75 @@
+"""What is said of a few runs, against scipy, statsmodels and by properties."""
+
+import gc
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+from statsmodels.stats.multitest import multipletests
+
+from armwright.experiments.statistics import can_reject, holm, interval, least_p, paired_test
+
+VALUES = st.floats(-1e3, 1e3).map(lambda x: round(x, 3))
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
+def test_holm_is_that_of_statsmodels(p_values: list[float]) -> None:
+    gc.freeze()  # each call of theirs collects, which takes long after many other tests
+    assert holm(p_values) == pytest.approx(multipletests(p_values, method="holm")[1], abs=1e-12)
+
+
+@settings(deadline=None)
+@given(st.lists(VALUES, min_size=3, max_size=15), st.integers(0, 2**32 - 1))
+def test_an_interval_holds_its_mean_and_is_the_same_again(values: list[float], seed: int) -> None:
+    found = interval(values, seed)
+    assert found.mean == pytest.approx(np.mean(values))
+    assert min(values) - 1e-9 <= found.low <= found.mean + 1e-9
+    assert found.mean - 1e-9 <= found.high <= max(values) + 1e-9
+    assert interval(values, seed) == found
+
+
+def test_intervals_cover_the_mean_nearly_as_often_as_they_say() -> None:
+    rng = np.random.default_rng(0)
+    found = [interval(rng.normal(2.0, 1.0, 20)) for _ in range(100)]
+    assert 88 <= sum(one.low <= 2.0 <= one.high for one in found) <= 99
+
+
+@pytest.mark.parametrize("values", [[3.0], [2.0, 2.0, 2.0]])
+def test_equal_values_have_an_interval_without_width(values: list[float]) -> None:
+    found = interval(values)
+    assert (found.low, found.high) == (values[0], values[0])
+
+
+@pytest.mark.parametrize("n", range(1, 12))
+def test_the_least_p_is_that_of_pairs_that_all_agree(n: int) -> None:
+    test = paired_test(np.arange(n) + 1.0 + np.arange(n), np.arange(n))
+    assert test.p == pytest.approx(least_p(n))
+    assert (test.better, test.effect) == (n, 1.0)
+    assert can_reject(n) == (n >= 6) == (test.p <= 0.05)
+
+
+def test_the_test_is_scipys_and_the_effect_that_of_its_rank_sums() -> None:
+    rng = np.random.default_rng(1)
+    first, second = rng.normal(0.4, 1.0, (2, 20)) + np.array([[0.3], [0.0]])
+    test = paired_test(first, second)
+    theirs = stats.wilcoxon(first, second)
+    assert test.p == pytest.approx(theirs.pvalue)
+    against = theirs.statistic  # the smaller of the two rank sums
+    assert abs(test.effect) == pytest.approx(1.0 - 2.0 * against / (20 * 21 / 2))
+    assert test.difference.mean == pytest.approx(np.mean(first - second))
+
+
+def test_equal_pairs_tell_nothing() -> None:
+    test = paired_test([1.0, 2.0], [1.0, 2.0])
+    assert (test.n, test.better, test.p, test.effect) == (2, 0, 1.0, 0.0)
+    some = paired_test([1.0, 5.0, 2.0], [1.0, 1.0, 1.0])
+    assert (some.n, some.better, some.effect) == (3, 2, 1.0)
+
+
+def test_the_other_way_round_speaks_against() -> None:
+    one, other = paired_test([3.0, 1.0, 5.0], [1.0, 2.0, 2.0]), paired_test([1.0, 2.0, 2.0], [3.0, 1.0, 5.0])
+    assert one.effect == -other.effect
+    assert one.p == other.p
+    assert one.difference.mean == -other.difference.mean

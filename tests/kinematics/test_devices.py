@@ -1,0 +1,205 @@
+"""The boundary of the kernels: threads, forks, the process's stderr, devices and their memory."""
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.exceptions import FailureError, SettingsError
+from armwright.kinematics import devices
+from armwright.kinematics import ik as solve
+from armwright.kinematics.ik import solve_postures
+from armwright.problem import problem
+from armwright.problem.problem import Problem
+from armwright.tasks.task import load_task
+
+THREADS = """
+import sys, threading
+import numpy as np
+from armwright.problem.evaluation import evaluate
+from armwright.spaces.design_space import paper_space
+arms = [paper_space().arm(d) for d in paper_space().sample(2, 0)]
+threads = [threading.Thread(target=evaluate, args=(arms, np.zeros((1, 3)))) for _ in range(8)]
+[t.start() for t in threads]
+[t.join() for t in threads]
+print("still heard", file=sys.stderr)
+"""
+
+FORK = """
+import os
+import numpy as np
+from armwright.problem.evaluation import evaluate
+from armwright.spaces.design_space import paper_space
+arms = [paper_space().arm(d) for d in paper_space().sample(5000, 0)]
+targets = np.full((1, 3), 0.3)
+parent = evaluate(arms, targets).q
+child = os.fork()
+if child == 0:
+    os._exit(0 if np.array_equal(evaluate(arms, targets).q, parent) else 1)
+raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+
+
+@pytest.mark.slow
+def test_first_use_by_many_threads_leaves_stderr_as_it_was() -> None:
+    """Warp's native code is silenced while it starts, and only then."""
+    assert run(THREADS).stderr.splitlines()[-1] == "still heard"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", ["", "import os; os.close(2)\n"])
+def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
+    done = run(
+        closed + "from armwright.kinematics.devices import load; load('float32', 8, 'revolute', 'position', 'cpu')"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.slow
+def test_a_forked_child_solves_too() -> None:
+    """It has the parent's pool, but not its threads."""
+    assert run(FORK).returncode == 0
+
+
+# Devices
+
+
+def test_auto_is_cuda_only_where_it_is_and_for_much_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    for there, many, expected in ((True, True, "cuda"), (True, False, "cpu"), (False, True, "cpu")):
+        monkeypatch.setattr(devices, "_has_cuda", lambda there=there: there)
+        assert devices.resolve_device("auto", many) == expected
+        assert devices.resolve_device("cpu", many) == "cpu"
+
+
+def test_devices_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(devices, "_has_cuda", lambda: False)
+    with pytest.raises(SettingsError, match=r'device = "cuda": no NVIDIA GPU with its driver is here; take .*"cpu"'):
+        devices.resolve_device("cuda", many=True)
+    with pytest.raises(SettingsError, match=r'device = "cud" is not one of auto, cpu, cuda. Did you mean "cuda"'):
+        devices.resolve_device("cud", many=True)
+    with pytest.raises(SettingsError, match="is not one of auto, cpu, cuda"):
+        Problem(load_task("target-1"), device="gpu")  # type: ignore[arg-type]
+    asking = Problem(load_task("target-1"), device="cuda")  # a run of another machine may say so
+    designs = asking.space.sample(2, 0)
+    with pytest.raises(SettingsError, match="no NVIDIA GPU"):
+        asking.evaluate(designs)
+    with pytest.raises(SettingsError, match="no NVIDIA GPU"):
+        asking.evaluate_matrix(asking.space.matrix(designs))
+
+
+def test_auto_is_settled_when_the_problem_is_made() -> None:
+    assert Problem(load_task("target-1"), device="auto").device in ("cpu", "cuda")  # type: ignore[arg-type]
+
+
+COMPILE_FOR_CUDA = """
+import sys
+import warp as wp
+from armwright.kinematics.clearance_kernels import clearance_kernels_of
+from armwright.kinematics.pose_kernels import pose_kernels
+from armwright.kinematics.position_kernels import position_kernels
+variants = [position_kernels("float32", 1, motions) for motions in ("revolute", "any")]
+variants.append(pose_kernels("float32", 1, "any"))
+solving = [k for v in variants for k in (v.solve_ik, v.keep_pose, v.static_torque) if k is not None]
+measuring = clearance_kernels_of("float32")
+kernels = {kernel.module.name: kernel for kernel in (*solving, measuring.place, measuring.part, measuring.clear)}
+print(len(kernels), file=open(sys.argv[1] + "/count", "w"))
+for kernel in kernels.values():
+    print(*wp.compile_aot_module(kernel.module, arch=90, module_dir=sys.argv[1], use_ptx=True))
+"""
+
+
+@pytest.mark.slow
+def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
+    """To PTX, by the compiler that Warp brings. What they compute there, only a GPU can say."""
+    command = [sys.executable, "-c", COMPILE_FOR_CUDA, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    written = [path.read_text() for path in tmp_path.glob("*.ptx")]
+    assert len(written) == int((tmp_path / "count").read_text()) >= 9
+    assert all(".entry" in text and "sm_90" in text for text in written)
+
+
+# Memory
+
+
+def test_chunk_is_halved_until_the_gpu_has_memory_for_it() -> None:
+    solved: list[range] = []
+
+    def solving(rows: slice) -> None:
+        if rows.stop - rows.start > 30:
+            raise RuntimeError("Failed to allocate 123 bytes on device 'cuda:0'")
+        solved.append(range(rows.start, rows.stop))
+
+    solve._one_after_another(solving, 107, 100)
+    assert [number for rows in solved for number in rows] == list(range(107))
+    assert max(len(rows) for rows in solved) == 25
+
+    def never(rows: slice) -> None:
+        raise RuntimeError("CUDA error 2: out of memory")
+
+    with pytest.raises(FailureError, match="one arm at all its targets does not fit"):
+        solve._one_after_another(never, 107, 100)
+
+    def broken(rows: slice) -> None:
+        raise RuntimeError("CUDA error 700: an illegal memory access")
+
+    with pytest.raises(RuntimeError, match="illegal"):
+        solve._one_after_another(broken, 107, 100)
+
+
+def test_chunks_do_not_change_the_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither those of the solver, bounded by bytes, nor those of designs whose postures are in memory at a time."""
+    asked = Problem(load_task("target-2"))
+    matrix = asked.space.matrix(asked.space.sample(100, 3))
+    whole = asked.evaluate_matrix(matrix).values
+    assert np.array_equal(whole, asked.evaluate(asked.space.designs(matrix)).values)
+    monkeypatch.setitem(solve.LARGEST_CHUNK, "cpu", 1)
+    monkeypatch.setitem(problem.POSTURES_AT_ONCE, "cpu", 200)
+    assert np.array_equal(asked.evaluate_matrix(matrix).values, whole)
+    assert asked.evaluate_matrix(matrix[:0]).values.shape == (0, 2)
+
+
+def test_many_targets_are_a_question_of_memory_alone() -> None:
+    asked = Problem(load_task("target-1"))
+    arms = problem.stack_designs(asked.space, asked.space.matrix(asked.space.sample(3, 4)))
+    targets = np.random.default_rng(4).uniform(-0.7, 0.7, (2000, 3))
+    postures = solve_postures(arms, targets, updates=5)
+    assert postures.q.shape == (3, 2000, 4)
+    assert np.array_equal(postures.q[:, 1234:1235], solve_postures(arms, targets[1234:1235], updates=5).q)
+
+
+@pytest.mark.parametrize(("said", "most"), [("1", 1), ("3,1", 3), ("", 8), ("many", 8), ("0", 8), ("99", 8)])
+def test_threads_are_no_more_than_openmp_s(monkeypatch: pytest.MonkeyPatch, said: str, most: int) -> None:
+    monkeypatch.setattr(devices.os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", said)
+    assert devices.cores() == most
+
+
+def test_threads_that_solve_other_numbers_of_arms_at_other_tasks_get_the_same_bits() -> None:
+    problems = [Problem(load_task(name)) for name in ("target-1", "target-2", "autodesign-1")]
+    known = [(rows := p.space.matrix(p.space.sample(700, 0)), p.evaluate_matrix(rows).values) for p in problems]
+    wrong: list[tuple[int, int]] = []
+
+    def work(seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        for _ in range(40):
+            which, n = int(rng.integers(len(problems))), int(rng.choice([1, 2, 7, 33, 100, 250, 300, 600]))
+            rows, values = known[which]
+            first = int(rng.integers(0, 700 - n))
+            part = slice(first, first + n)
+            if not np.array_equal(problems[which].evaluate_matrix(rows[part]).values, values[part]):
+                wrong.append((which, n))
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong

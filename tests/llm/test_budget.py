@@ -1,0 +1,291 @@
+"""What a run may spend, and what it says about it."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic_ai.messages import ModelResponse
+from pydantic_ai.usage import RequestUsage
+
+from armwright.exceptions import ModelError, ProposalError, SettingsError
+from armwright.llm import client as chat
+from armwright.llm.backend import CHECK, LlmBackend, Question, Reply
+from armwright.llm.session import LlmSession
+from armwright.problem.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import load_task
+from tests.support import wire_formats as wires
+from tests.support.chat_server import Answer, ChatServer, Request, designer
+
+PROBLEM = Problem(load_task("target-1"))
+
+
+def run(
+    proposer: LlmProposer,
+    out: Path | None = None,
+    n_total: int = 12,
+    seen: list[Progress] | None = None,
+    **settings: Any,
+) -> Run:
+    watch = None if seen is None else seen.append
+    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch, **settings)
+
+
+def notes(seen: list[Progress]) -> list[str]:
+    return [progress.note for progress in seen if progress.note]
+
+
+class Greedy(LlmBackend):
+    """Takes all requests that it may, each for 0.1 USD."""
+
+    model = "greedy"
+    origin = "scripted"
+
+    def __init__(self, most: int = 3) -> None:
+        self.most = most
+        self.requests = 0
+        self.asking = threading.Event()
+        self.go_on = threading.Event()
+        self._lock = threading.Lock()
+
+    def begin(self) -> None: ...
+
+    def check(self, question: Question = CHECK) -> Reply:
+        return self.ask(question)
+
+    def ask(self, question: Question) -> Reply:
+        taken = min(self.most, question.most_requests or self.most)
+        with self._lock:
+            self.requests += taken
+        self.asking.set()
+        self.go_on.wait()
+        return Reply("so be it", taken, cost_usd=0.1 * taken)
+
+    def ask_for(self, question: Question, schema: object, read: object) -> Reply:
+        return self.ask(question)
+
+    def cancel(self) -> None: ...
+
+
+class Session(LlmSession):
+    """Asks from many threads at a time."""
+
+    def ask_together(self, threads: int, before_answers: Callable[[], None]) -> list[ProposalError | str]:
+        came: list[ProposalError | str] = []
+
+        def ask() -> None:
+            try:
+                came.append(self._call(Question("p-0001", "answer", "Which?"), self.backend.ask, self._over))
+            except ProposalError as fault:
+                came.append(fault)
+
+        asked = [threading.Thread(target=ask) for _ in range(threads)]
+        for thread in asked:
+            thread.start()
+        assert isinstance(self.backend, Greedy)
+        self.backend.asking.wait()
+        before_answers()
+        self.backend.go_on.set()
+        for thread in asked:
+            thread.join()
+        return came
+
+
+@pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (4, 1), (5, 2), (9, 4), (50, 4)])
+def test_after_so_many_calls_it_asks_no_more(chat_server: ChatServer, most: int, proposals: int) -> None:
+    seen: list[Progress] = []
+    result = run(LlmProposer("m", chat_server.url, max_calls=most), seen=seen)
+    assert len(chat_server.requests) <= most
+    assert sum(trial.source == "llm" for trial in result.trials) == proposals
+    assert result.summary["proposer"]["failures"] == ({"budget": 4 - proposals} if proposals < 4 else {})
+    assert sum("--max-calls" in note for note in notes(seen)) == (proposals < 4)  # said once
+
+
+def test_a_refused_answers_calls_count(chat_server: ChatServer) -> None:
+    """Three requests for one answer; the budget bounds the requests within one call, too."""
+    good = chat_server.answer
+    chat_server.answer = lambda request: "no JSON" if "response_format" in request else good(request)
+    run(LlmProposer("m", chat_server.url, max_calls=4), n_total=6)
+    assert len(chat_server.requests) == 4
+
+
+def test_the_budget_is_the_whole_runs(chat_server: ChatServer, tmp_path: Path) -> None:
+    """Earlier sessions included; a larger one goes on asking."""
+    run(LlmProposer("m", chat_server.url, max_calls=5), tmp_path / "run", n_total=6)
+    again = run(LlmProposer("m", chat_server.url, max_calls=6), tmp_path / "run", n_total=12)
+    assert len(chat_server.requests) == 6
+    assert [trial.fault for trial in again.trials[10:]] == ["budget", None, None, "budget", None, None]
+    more = run(LlmProposer("m", chat_server.url, max_calls=50), tmp_path / "run", n_total=15)
+    assert more.trials[16].source == "llm"
+
+
+def test_a_bound_on_cost_needs_a_price(chat_server: ChatServer) -> None:
+    with pytest.raises(ModelError, match="price of m is not known, so --max-cost cannot hold; use --max-calls"):
+        run(LlmProposer("m", chat_server.url, max_cost=1.0))
+
+
+def test_what_a_run_will_take_is_said_before_it_begins(chat_server: ChatServer) -> None:
+    seen: list[Progress] = []
+    run(LlmProposer("m", chat_server.url), seen=seen)
+    assert seen[0].doing == "beginning"
+    assert seen[0].note.startswith("4 proposals: about 9 calls, ")
+    assert seen[0].note.endswith("; on a server of your own")
+
+
+def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-test-of-a-forecast")
+    forecast = LlmProposer("openai-chat:gpt-4o").forecast(PROBLEM, 20)
+    assert forecast.startswith("20 proposals: about 41 calls, ")
+    assert "USD by public prices" in forecast
+    half = LlmProposer("openai-chat:gpt-4o", answer="one-step", proposals=4).forecast(PROBLEM, 20)
+    assert half.startswith("20 proposals: about 6 calls, ")
+    unknown = LlmProposer("openai-chat:a-model-of-tomorrow").forecast(PROBLEM, 20)
+    assert unknown.endswith("price not known")
+
+
+def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatServer) -> None:
+    """Whatever it is called: forecast, summary and bound agree."""
+    seen: list[Progress] = []
+    result = run(LlmProposer("openai-chat:gpt-4o", chat_server.url), seen=seen, n_total=3)
+    assert seen[0].note.endswith("; on a server of your own")
+    assert result.summary["proposer"]["cost_usd"] is None
+    with pytest.raises(ModelError, match="price of gpt-4o is not known"):
+        run(LlmProposer("gpt-4o", chat_server.url, max_cost=1.0))
+
+
+@pytest.mark.parametrize(
+    ("model", "address", "words"),
+    [
+        ("qwen3", "http://192.168.0.7:8080/v1", "on a server of your own"),
+        ("qwen3", "http://gpu-box:8080/v1", "on a server of your own"),
+        ("qwen3", "https://models.example.com/v1", "at https://models.example.com/v1; its price is not known"),
+        ("gpt-4o", "https://models.example.com/v1", "at https://models.example.com/v1; its price is not known"),
+        ("gpt-4o", "https://api.openai.com/v1", "about 12.50 USD by public prices"),
+        ("openai-chat:gpt-4o", "https://api.openai.com/v1", "about 12.50 USD by public prices"),
+        ("ollama:qwen3:8b", None, "on a server of your own"),
+        ("openai-chat:gpt-4o", None, "about 12.50 USD by public prices"),
+        ("openai-chat:a-model-of-tomorrow", None, "price not known"),
+    ],
+)
+def test_the_price_is_that_of_the_host(model: str, address: str | None, words: str) -> None:
+    assert chat.describe_cost(model, address, 10**6, 10**6) == words
+    place = chat._place(model, address)
+    if place is not None:
+        usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)
+        response = ModelResponse([], usage=usage, model_name=place.name, provider_url=address)
+        assert chat._cost(response, place) == (12.5 if "12.50" in words else None)
+
+
+def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatServer, tmp_path: Path) -> None:
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=6)
+    seen: list[Progress] = []
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=12, seen=seen)
+    # the server counts 100 tokens in and 20 out for each of two calls
+    assert seen[0].note == "2 proposals: about 5 calls, 400 tokens in, 80 out; on a server of your own"
+
+
+@pytest.mark.parametrize("wire", ["openai", "anthropic"])
+def test_after_so_many_dollars_it_asks_no_more(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
+) -> None:
+    """The price is the public one of the tokens that the server counts; every call costs the same here."""
+    free = run(wires.proposer(wire, chat_server, monkeypatch), n_total=3).summary["proposer"]
+    each = free["cost_usd"] / free["calls"]
+    assert each > 0.0
+    chat_server.requests.clear()
+    seen: list[Progress] = []
+    result = run(wires.proposer(wire, chat_server, monkeypatch, max_cost=5.5 * each), seen=seen)
+    proposer = result.summary["proposer"]
+    assert (proposer["calls"], len(chat_server.requests)) == (5, 5)
+    assert proposer["cost_usd"] == pytest.approx(5 * each)
+    assert proposer["failures"] == {"budget": 2}
+    assert sum("--max-cost" in progress.note for progress in seen) == 1
+
+
+@pytest.mark.parametrize("wrong", [{"max_calls": 0}, {"max_calls": -1}, {"max_cost": -1.0}, {"max_cost": float("nan")}])
+def test_a_budget_that_makes_no_sense_is_refused(chat_server: ChatServer, wrong: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError, match=f"{next(iter(wrong))} = .* is needed"):
+        LlmProposer("m", chat_server.url, **wrong)
+
+
+def test_a_bound_on_cost_holds_without_a_price_too(chat_server: ChatServer) -> None:
+    """However the run was told to go on."""
+    seen: list[Progress] = []
+    result = run(LlmProposer("m", chat_server.url, max_cost=1.0), seen=seen, on_model_failure="continue")
+    assert len(chat_server.requests) == 1  # the check, which showed that there is no price
+    assert result.summary["proposer"]["failures"] == {"budget": 4}
+    assert sum("--max-cost cannot hold" in note for note in notes(seen)) == 1
+
+
+def test_a_bound_on_cost_holds_for_a_run_whose_calls_had_no_price(chat_server: ChatServer, tmp_path: Path) -> None:
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=3)
+    chat_server.requests.clear()
+    seen: list[Progress] = []
+    again = run(LlmProposer("m", chat_server.url, max_cost=1.0), tmp_path / "run", seen=seen)
+    assert not chat_server.requests
+    assert again.summary["proposer"]["failures"] == {"budget": 3}
+    assert sum("--max-cost 1 cannot hold; use --max-calls" in note for note in notes(seen)) == 1
+
+
+@pytest.mark.parametrize("in_flight", [None, 2])
+def test_a_run_whose_budget_is_used_up_goes_on(chat_server: ChatServer, tmp_path: Path, in_flight: int | None) -> None:
+    run(LlmProposer("m", chat_server.url, max_calls=3), tmp_path / "run", n_total=3, in_flight=in_flight)
+    seen: list[Progress] = []
+    proposer = LlmProposer("m", chat_server.url, max_calls=3)
+    again = run(proposer, tmp_path / "run", seen=seen, in_flight=in_flight)
+    assert len(chat_server.requests) == 3
+    assert again.summary["proposer"]["failures"] == {"budget": 3}
+    assert sum("--max-calls 3 is used up" in note for note in notes(seen)) == 1
+
+
+@pytest.mark.parametrize(("status", "kind", "asked"), [(401, "key", 1), (400, "rejected", 4)])
+def test_a_run_that_has_begun_goes_on_without_its_model(
+    chat_server: ChatServer, tmp_path: Path, status: int, kind: str, asked: int
+) -> None:
+    """Said once; where asking again is of no use, nothing more is asked."""
+    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=3)
+    chat_server.requests.clear()
+    chat_server.answer = lambda request: (status, '{"error": {"message": "not today"}}')
+    seen: list[Progress] = []
+    again = run(LlmProposer("m", chat_server.url), tmp_path / "run", seen=seen)
+    assert again.summary["proposer"]["failures"] == {kind: 3}
+    assert len(chat_server.requests) == asked
+    assert [p.note for p in seen if p.doing == "beginning" and "not today" in p.note]
+    assert sum("not today" in note for note in notes(seen)) == asked
+
+
+@pytest.mark.parametrize("most", [4, 9, 10])
+def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_server: ChatServer, most: int) -> None:
+    def answer(request: Request) -> Answer:
+        return "no design" if "response_format" in request else designer(request)
+
+    chat_server.answer = answer
+    run(LlmProposer("m", chat_server.url, answer="one-step", max_calls=most), n_total=24, in_flight=4)
+    assert len(chat_server.requests) == most
+
+
+@pytest.mark.parametrize("budget", [{"max_calls": 10}, {"max_cost": 1.05}])
+@pytest.mark.parametrize("threads", [3, 4, 8])
+def test_questions_beside_each_other_share_one_budget(budget: dict[str, Any], threads: int) -> None:
+    backend = Greedy()
+    came = Session(backend, "asking", **budget).ask_together(threads, lambda: None)
+    assert backend.requests == min(10, 3 * threads)
+    assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["budget"] * max(0, threads - 4)
+
+
+def test_what_was_set_aside_and_not_taken_is_there_for_others() -> None:
+    backend = Greedy(most=1)
+    came = Session(backend, "asking", max_calls=7).ask_together(9, lambda: None)
+    assert backend.requests == 7
+    assert came.count("so be it") == 7
+
+
+def test_who_waits_for_the_budget_of_others_is_let_go_at_the_end() -> None:
+    backend = Greedy()
+    session = Session(backend, "asking", max_calls=3)
+    came = session.ask_together(4, session.cancel)
+    assert backend.requests == 3
+    assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["cancelled"] * 3

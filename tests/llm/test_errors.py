@@ -1,0 +1,355 @@
+"""What goes wrong with a model, over the real protocols, against a server of our own that makes each fault."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from armwright.exceptions import ModelError
+from armwright.llm import client as chat
+from armwright.llm.backend import FINAL, CallError, Question
+from armwright.llm.transcript import Transcript
+from armwright.problem.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import (
+    GOOD_DESIGN,
+    Answer,
+    ChatServer,
+    Request,
+    Response,
+    completion,
+    designer,
+    message,
+    sent_events,
+    streamed_events,
+)
+from tests.support.model_faults import FAULTS, anthropic_error, openai_error, rate_limit, said
+from tests.support.wire_formats import WIRES, proposer
+
+PROBLEM = Problem(load_task("target-1"))
+ENDLESS = ("slow first byte", "dripping body")
+ALL_FAULTS = [pytest.param(kind, name, id=name) for kind, faults in FAULTS.items() for name in faults]
+
+both_formats = pytest.mark.parametrize("wire", ["openai", "anthropic"])
+every_wire = pytest.mark.parametrize("wire", WIRES)
+every_fault = pytest.mark.parametrize(("kind", "name"), ALL_FAULTS)
+
+
+@pytest.fixture(autouse=True)
+def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
+
+
+@pytest.fixture
+def ask(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Callable[..., tuple[Run, list[Progress]]]:
+    """A short run in tmp_path/run, and all that it reported."""
+
+    def run(wire: str, n_total: int = 6, n_step: int = 3, **how: Any) -> tuple[Run, list[Progress]]:
+        shown: list[Progress] = []
+        watch = how.pop("watch", shown.append)
+        asked = proposer(wire, chat_server, monkeypatch)
+        result = optimize(
+            PROBLEM, proposer=asked, n_init=4, n_step=n_step, n_total=n_total, out=tmp_path / "run", watch=watch, **how
+        )
+        return result, shown
+
+    return run
+
+
+def after(n: int, fault: Answer, last: int | None = None) -> Callable[[Request], Answer]:
+    """Good answers to the first n requests, then the fault: for good, or up to the last-th request."""
+    count = iter(range(1, 1_000_000))
+
+    def answer(request: Request) -> Answer:
+        number = next(count)
+        return designer(request) if number <= n or (last is not None and number > last) else fault
+
+    return answer
+
+
+def sources(run: Run) -> Sequence[str]:
+    return [trial.source for trial in run.trials[4:]]
+
+
+@every_fault
+@both_formats
+def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
+    chat_server: ChatServer,
+    monkeypatch: pytest.MonkeyPatch,
+    ask: Callable[..., Any],
+    tmp_path: Path,
+    wire: str,
+    kind: str,
+    name: str,
+) -> None:
+    if name in ENDLESS:
+        monkeypatch.setattr(chat, "CHECK_SECONDS", 0.2)
+    chat_server.answer = lambda request: FAULTS[kind][name]
+    with pytest.raises(ModelError) as caught:
+        ask(wire)
+    words = str(caught.value)
+    assert words.startswith(f"{WIRES[wire] or 'test-model'}: ")
+    assert "\n" not in words
+    assert "model_name" not in words  # the server's words, not a dictionary
+    assert (tmp_path / "run" / "trials.jsonl").read_text() == ""
+    (call,) = Transcript(tmp_path / "run" / "transcripts.jsonl").calls
+    assert (call.step, call.fault) == ("check", kind)
+
+
+@every_fault
+@both_formats
+def test_later_a_fault_is_a_black_box_trial_and_is_counted(
+    chat_server: ChatServer,
+    monkeypatch: pytest.MonkeyPatch,
+    ask: Callable[..., Any],
+    tmp_path: Path,
+    wire: str,
+    kind: str,
+    name: str,
+) -> None:
+    shown: list[Progress] = []
+
+    def watch(progress: Progress) -> None:
+        shown.append(progress)
+        if name in ENDLESS and progress.number == 7:
+            monkeypatch.setattr(chat, "CALL_SECONDS", 0.2)
+
+    chat_server.answer = after(3, FAULTS[kind][name])
+    run, _ = ask(wire, watch=watch)
+    assert sources(run) == ["llm", "bbo", "bbo"] + ["bbo"] * 3
+    assert [trial.fault for trial in run.trials[4:]] == [None, None, None, kind, None, None]
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())["proposer"]
+    assert (summary["failures"], summary["call_failures"]) == ({kind: 1}, {kind: 1})
+    assert (summary["fallback_share"], summary["flagged"]) == (0.5, True)
+    assert (shown[-1].faults, shown[-1].fault) == ({kind: 1}, None)
+    (told,) = [progress for progress in shown if progress.fault]
+    assert (told.number, told.fault) == (7, kind)
+    assert "\n" not in told.note
+    assert ("no more questions are asked" in told.note) == (kind in FINAL)
+    failed = Transcript(tmp_path / "run" / "transcripts.jsonl").calls[-1]
+    assert (failed.proposal, failed.step, failed.fault) == ("llm-0007", "reasoning", kind)
+    assert failed.error
+    assert told.note.startswith(failed.error)
+
+
+@pytest.mark.parametrize("fault", [("server", "overloaded"), ("key", "wrong key")], ids=lambda fault: fault[1])
+@every_wire
+def test_a_run_may_be_told_to_go_on_without_its_model(
+    chat_server: ChatServer, ask: Callable[..., Any], wire: str, fault: tuple[str, str]
+) -> None:
+    chat_server.answer = lambda request: FAULTS[fault[0]][fault[1]]
+    run, shown = ask(wire, on_model_failure="continue")
+    assert sources(run) == ["bbo"] * 6
+    assert run.summary["proposer"]["failures"] == {fault[0]: 2}
+    assert any(progress.doing == "beginning" and "HTTP" in progress.note for progress in shown)
+
+
+@pytest.mark.parametrize("name", ["wrong key", "quota gone", "unknown model"])
+@every_wire
+def test_a_fault_that_asking_does_not_mend_is_told_once_and_ends_the_asking(
+    chat_server: ChatServer, ask: Callable[..., Any], wire: str, name: str
+) -> None:
+    kind = next(kind for kind, faults in FAULTS.items() if name in faults)
+    chat_server.answer = after(3, FAULTS[kind][name])
+    run, shown = ask(wire, n_total=12)
+    assert len(chat_server.requests) == 4  # the check, two for the first proposal, the fault
+    assert [trial.fault for trial in run.trials[4:] if trial.fault] == [kind] * 3
+    assert sources(run) == ["llm"] + ["bbo"] * 11
+    assert run.summary["proposer"]["failures"] == {kind: 3}
+    assert run.summary["proposer"]["call_failures"] == {kind: 1}
+    assert sum("no more questions are asked in this session" in progress.note for progress in shown) == 1
+
+
+@pytest.mark.parametrize("sent", [{"retry_after": "0"}, {"retry_after_ms": "5"}], ids=str)
+@both_formats
+def test_a_server_that_wants_a_moment_gets_it(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Callable[..., Any], wire: str, sent: dict[str, str]
+) -> None:
+    monkeypatch.setattr(chat, "RETRY_SECONDS", 1000.0)  # the server's word counts, not ours
+    chat_server.answer = after(3, rate_limit(**sent), last=5)
+    run, _ = ask(wire)
+    assert sources(run) == ["llm", "bbo", "bbo"] * 2
+    assert len(chat_server.requests) == 5 + 2
+    assert run.summary["proposer"]["call_failures"] == {}
+
+
+@pytest.mark.parametrize("retry_after", ["100", "61", "Fri, 01 Jan 2100 00:00:00 GMT"])
+@both_formats
+def test_a_server_that_wants_more_patience_than_the_deadline_has_failed_at_once(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Callable[..., Any], wire: str, retry_after: str
+) -> None:
+    monkeypatch.setattr(chat, "CALL_SECONDS", 60.0)  # a test that waited for it would be seen
+    chat_server.answer = after(3, rate_limit(retry_after=retry_after))
+    run, _ = ask(wire)
+    assert run.trials[7].fault == "rate_limit"
+    assert len(chat_server.requests) == 4
+
+
+@both_formats
+def test_faults_that_may_pass_are_asked_again_twice(
+    chat_server: ChatServer, ask: Callable[..., Any], wire: str
+) -> None:
+    chat_server.answer = after(3, FAULTS["server"]["overloaded"], last=5)
+    run, _ = ask(wire)
+    assert sources(run) == ["llm", "bbo", "bbo"] * 2
+    assert len(chat_server.requests) == 5 + 2
+
+
+@every_wire
+def test_a_server_that_is_gone_and_back_is_asked_again(
+    chat_server: ChatServer, ask: Callable[..., Any], wire: str
+) -> None:
+    def watch(progress: Progress) -> None:
+        if (progress.doing, progress.number) == ("proposing", 7):
+            chat_server.stop()
+        if (progress.doing, progress.number) == ("finished", 7):
+            chat_server.start()
+
+    run, _ = ask(wire, n_total=9, watch=watch)
+    assert sources(run) == ["llm", "bbo", "bbo", "bbo", "bbo", "bbo", "llm", "bbo", "bbo"]
+    assert run.summary["proposer"]["failures"] == {"connection": 1}
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [("no JSON at all", "no JSON at all"), ('{"link_1": 0.2, "lin', '{"link_1": 0.2, "lin'), ('{"link_1": 7}', "7")],
+)
+@every_wire
+def test_what_came_back_is_kept(
+    chat_server: ChatServer, ask: Callable[..., Any], tmp_path: Path, wire: str, text: str, kept: str
+) -> None:
+    chat_server.answer = after(4, text)
+    run, _ = ask(wire)
+    assert run.trials[7].fault == "answer"
+    failed = Transcript(tmp_path / "run" / "transcripts.jsonl").calls[-1]
+    assert kept in failed.answer
+    assert failed.requests == 3
+
+
+@every_wire
+def test_an_answer_that_breaks_off_is_no_design(
+    chat_server: ChatServer, ask: Callable[..., Any], tmp_path: Path, wire: str
+) -> None:
+    chat_server.answer = after(4, said('{"origin_x": 0.1, "ori', "length", "max_tokens"))
+    run, _ = ask(wire)
+    assert run.trials[7].fault == "answer"
+    assert Transcript(tmp_path / "run" / "transcripts.jsonl").calls[-1].answer == '{"origin_x": 0.1, "ori'
+
+
+@pytest.mark.parametrize(("n_total", "flagged"), [(9, True), (10, False)])
+def test_a_run_with_more_than_a_tenth_of_fallbacks_is_flagged(
+    chat_server: ChatServer, ask: Callable[..., Any], n_total: int, flagged: bool
+) -> None:
+    chat_server.answer = after(3, FAULTS["rejected"]["rejected"], last=4)
+    run, _ = ask("own server", n_total=n_total, n_step=1)
+    assert run.summary["proposer"]["failures"] == {"rejected": 1}
+    assert run.summary["proposer"]["flagged"] is flagged
+
+
+@pytest.mark.parametrize("key", ["sk-planted-key\n", "sk-planted\nkey-in-two", "sk-planted-ключ"])
+def test_a_key_that_no_header_can_hold_is_named_as_that(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
+    monkeypatch.setenv("ARMWRIGHT_API_KEY", key)
+    with pytest.raises(ModelError, match="its key cannot be sent") as caught:
+        optimize(PROBLEM, proposer=LlmProposer("m", chat_server.url), n_total=1)
+    assert "planted" not in str(caught.value)
+
+
+# Servers that say anything at all.
+
+SCALARS = (
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.sampled_from([10**400, "\ud800", "tool_use", "text", "error"])
+)
+KEYS = st.sampled_from(["type", "error", "message", "content", "choices", "text"]) | st.text(max_size=6)
+ANY_JSON = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3))
+
+
+def places(content: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The paths of all that a document holds."""
+    yield above
+    items = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    for key, inner in items:
+        yield from places(inner, (*above, key))
+
+
+def with_other(content: Any, place: Sequence[Any], other: Any) -> Any:
+    """The document with something else at a place."""
+    if not place:
+        return other
+    changed = content.copy()
+    changed[place[0]] = with_other(content[place[0]], place[1:], other)
+    return changed
+
+
+def almost(*documents: Any) -> st.SearchStrategy[Any]:
+    """Documents with anything at all at one of their places."""
+    return st.one_of(st.builds(with_other, st.just(d), st.sampled_from(list(places(d))), ANY_JSON) for d in documents)
+
+
+def stream(events: Any) -> str:
+    if not isinstance(events, list):
+        return json.dumps(events)
+    return sent_events(e if isinstance(e, dict) and isinstance(e.get("type"), str) else {"type": "x"} for e in events)
+
+
+TOOL_CALL = {"model": "m", "tools": [{"name": "final_result", "function": {"name": "final_result"}}]}
+TEXT = json.dumps(GOOD_DESIGN)
+BODIES = st.one_of(
+    st.binary(max_size=60),
+    ANY_JSON.map(json.dumps),
+    almost(completion(TEXT, TOOL_CALL), completion(TEXT, {}), message(TEXT, TOOL_CALL)).map(json.dumps),
+    almost(streamed_events(message(TEXT, TOOL_CALL)), streamed_events(message(TEXT, {}))).map(stream),
+    almost(*(json.loads(error.body) for error in (openai_error(429, "a", "b"), anthropic_error(400, "a", "b")))).map(
+        json.dumps
+    ),
+    st.sampled_from(["[" * 9000, '{"a":' * 9000]),
+)
+STATUSES = st.just(200) | st.sampled_from([100, 204, 206, 302, 307, 400, 401, 404, 408, 413, 422, 429, 500, 529, 999])
+HEADERS = st.dictionaries(
+    st.sampled_from(["retry-after", "retry-after-ms", "content-encoding", "location", "transfer-encoding"]),
+    st.sampled_from(["0", "-1", "nan", "1e999", "9" * 30, "gzip", "br", "chunked", "/v1/messages", "http://[::", "ÿ"]),
+    max_size=2,
+)
+TYPES = st.sampled_from(["application/json", "text/event-stream", "text/html", "text/plain; charset=utf-16", "ÿ", ""])
+
+
+@pytest.mark.filterwarnings("ignore:Failed to extract usage")
+# The vendor's client leaves the stream of a broken answer to the garbage collector, which may come at a bad time.
+@pytest.mark.filterwarnings("ignore:.*async_generator:pytest.PytestUnraisableExceptionWarning")
+@both_formats
+def test_whatever_a_server_says_is_an_answer_or_a_fault(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
+) -> None:
+    asked = proposer(wire, chat_server, monkeypatch)
+
+    nameless = [dict(event) for event in streamed_events(message(TEXT, TOOL_CALL))]
+    nameless[0]["message"] = {**nameless[0]["message"], "model": True}
+
+    @settings(max_examples=60, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @given(st.builds(Response, BODIES, STATUSES, HEADERS, TYPES), st.sampled_from(["reasoning", "answer"]))
+    @example(Response(stream(nameless), 200, {}, "text/event-stream"), "answer")
+    def check(response: Response, step: str) -> None:
+        chat_server.answer = lambda request: response
+        question = Question("llm-0004", step, "Which?")
+        with suppress(CallError):
+            if step == "answer":
+                asked.ask_designs(question, PROBLEM)
+            else:
+                asked.backend.ask(question)
+
+    check()

@@ -1,0 +1,254 @@
+"""Keys stay in the environment: a server that repeats them everywhere, and everything that is shown and written."""
+
+import base64
+import json
+import os
+import re
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from armwright.llm.redaction import redacted, without_keys
+from armwright.problem.problem import Problem
+from armwright.study.study import optimize
+from armwright.tasks.task import load_task
+from tests.support import wire_formats as wires
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, wants_design
+from tests.support.command_line import armwright
+from tests.support.wire_formats import ANTHROPIC_KEY, OPENAI_KEY, SERVER_KEY, WIRES, proposer
+
+SHORT = ("--n-init", "4", "--n-step", "1", "--n-total", "6")
+STUDY = ("optimize", "target-1", *SHORT, "--no-figures", "--out", "run")
+KEYS = (OPENAI_KEY, ANTHROPIC_KEY, SERVER_KEY)
+
+
+def run(server: ChatServer, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A command with all keys in its environment."""
+    return armwright(*arguments, **wires.environment(server))
+
+
+def run_alone(server: ChatServer, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The same in a process of its own, in which libraries read what they log."""
+    command = [sys.executable, "-m", "armwright", *arguments]
+    env = {**os.environ, **wires.environment(server), **environment}
+    return subprocess.run(command, capture_output=True, text=True, env=env, stdin=subprocess.DEVNULL)
+
+
+def model_of(wire: str, server: ChatServer) -> tuple[str, ...]:
+    model = WIRES[wire]
+    return ("--model", "m", "--base-url", server.url) if model is None else ("--model", model)
+
+
+def words_of(file: Path) -> str:
+    """What a file says; of a page what it is about, not the libraries that it carries."""
+    text = file.read_bytes().decode("latin-1")
+    data = re.search(r'id="content">([^<]*)<', text)
+    return text if data is None else zlib.decompress(base64.b64decode(data[1])).decode("latin-1")
+
+
+def no_key_in(text: str) -> None:
+    """Neither whole, nor its beginning or end."""
+    for key in KEYS:
+        assert key not in text
+        assert key[:12] not in text
+        assert key[-8:] not in text
+
+
+def sent_key(server: ChatServer) -> str:
+    """What the request under way carries."""
+    headers = server.headers[-1]
+    return headers.get("x-api-key") or headers["authorization"].removeprefix("Bearer ")
+
+
+def parrot(server: ChatServer) -> Callable[[Request], Answer]:
+    """Repeats the key in what it answers: a design, an error, a value that is refused, a page, a wrong key."""
+    answers = iter(["text", "text", "design", "rejected", "text", "value", "value", "value", *["page"] * 3, "key"])
+
+    def answer(request: Request) -> Answer:
+        key, kind = sent_key(server), next(answers)
+        if kind == "text":
+            assert not wants_design(request)
+            return f"Your key is {key}, in short {key[:14]}, or {key[:8]}****{key[-4:]}."
+        if kind == "design":
+            return json.dumps({**GOOD_DESIGN, "reason": f"{key} told me, that is {key[-14:]}"})
+        if kind == "value":
+            return json.dumps({**GOOD_DESIGN, "joint_1": key, "link_1": f"{key} m"})
+        if kind == "rejected":
+            return 400, json.dumps({"error": {"message": f"{key} may not", "type": key, "code": key}})
+        if kind == "page":
+            headers = {"retry-after": "0", "set-cookie": key}
+            return Response(f"<h1>500</h1><pre>{request}\nauthorization: {key}</pre>", 500, headers, "text/html")
+        words = f"Incorrect API key provided: {key[:8]}{'*' * 20}{key[-4:]}. You can find your API key at …"
+        return 401, json.dumps(
+            {"error": {"message": words, "type": "invalid_request_error", "code": "invalid_api_key"}}
+        )
+
+    return answer
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
+    chat_server.answer = parrot(chat_server)
+    done = run(chat_server, *STUDY, *model_of(wire, chat_server))
+    check_for_keys(done, chat_server, in_folder, done.stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wire", ["openai", "anthropic"])
+def test_no_key_is_shown_by_libraries_that_log(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
+    chat_server.answer = parrot(chat_server)
+    logs = {f"{wire.upper()}_LOG": "debug"}
+    done = run_alone(chat_server, *STUDY, "--json", *model_of(wire, chat_server), **logs)
+    check_for_keys(done, chat_server, in_folder, done.stderr)
+    assert "DEBUG] HTTP Re" in done.stderr
+
+
+@pytest.mark.slow
+def test_no_key_is_on_the_page(chat_server: ChatServer, in_folder: Path) -> None:
+    chat_server.answer = parrot(chat_server)
+    study = [argument for argument in STUDY if argument != "--no-figures"]
+    done = run(chat_server, *study, *model_of("own server", chat_server))
+    assert "report.html" in {path.name for path in in_folder.rglob("*")}
+    check_for_keys(done, chat_server, in_folder, done.stdout)
+
+
+def check_for_keys(
+    done: subprocess.CompletedProcess[str], chat_server: ChatServer, in_folder: Path, shown: str
+) -> None:
+    """No key in what the study shows and writes, whatever the server answered."""
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((in_folder / "run" / "summary.json").read_text())
+    assert summary["proposer"]["failures"] == {"rejected": 1, "answer": 1, "server": 1, "key": 2}
+    assert sent_key(chat_server) in KEYS
+    files = [path for path in in_folder.rglob("*") if path.is_file()]
+    assert {"config.yaml", "transcripts.jsonl", "trials.jsonl", "summary.json"} <= {path.name for path in files}
+    for path in files:
+        no_key_in(words_of(path))
+    no_key_in(done.stdout + done.stderr)
+    assert "_API_KEY>" in (in_folder / "run" / "transcripts.jsonl").read_text()
+    assert "iteration 6/6" in shown
+    assert "failed 5" in shown
+    assert shown.count("no usable proposal") == 4  # the last fault is told once
+    assert shown.count("no more questions are asked in this session") == 1
+
+
+@pytest.mark.parametrize("command", [("optimize", "target-1", *SHORT), ("doctor", "--call")], ids=lambda c: c[0])
+def test_no_key_is_shown_where_the_first_call_fails(
+    chat_server: ChatServer, in_folder: Path, command: tuple[str, ...]
+) -> None:
+    chat_server.answer = lambda request: (401, json.dumps({"error": {"message": f"bad: {sent_key(chat_server)}"}}))
+    done = run(chat_server, *command, *model_of("openai", chat_server))
+    assert done.returncode == 1
+    assert done.stderr.startswith("armwright: openai-chat:gpt-4o: bad: <OPENAI_API_KEY> (HTTP 401)")
+    assert len(done.stderr.splitlines()) == 1
+    no_key_in(done.stdout + done.stderr)
+
+
+def test_no_key_is_shown_where_the_first_call_repeats_it(chat_server: ChatServer, in_folder: Path) -> None:
+    chat_server.answer = parrot(chat_server)
+    done = run(chat_server, "doctor", "--call", *model_of("anthropic", chat_server))
+    assert done.returncode == 0, done.stderr
+    assert '"Your key is <ANTHROPIC_API_KEY>' in done.stdout
+    no_key_in(done.stdout + done.stderr)
+
+
+@pytest.mark.slow
+def test_no_key_is_on_a_command_line(chat_server: ChatServer, in_folder: Path) -> None:
+    """As every user of the machine sees them: of the study, and of the server of its page."""
+    seen: set[str] = set()
+
+    def answer(_request: Request) -> Answer:
+        for command in Path("/proc").glob("[0-9]*/cmdline"):
+            with suppress(OSError):  # it ended
+                seen.add(command.read_bytes().replace(b"\0", b" ").decode(errors="replace"))
+        return json.dumps(GOOD_DESIGN)
+
+    chat_server.answer = answer
+    how = (*model_of("openai", chat_server), "--answer", "one-step", "--no-figures", "--live", "--out", "run")
+    done = run_alone(chat_server, "optimize", "target-1", *SHORT, *how)
+    assert done.returncode == 0, done.stderr
+    own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]
+    assert any("armwright live" in command for command in own)
+    assert any("armwright optimize" in command for command in own)
+    assert sent_key(chat_server) in KEYS
+    no_key_in(" ".join(seen))
+
+
+KEY = "sk-proj-abcdefghijklmnopqrstuvwxyz0123"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        (f"key {KEY}!", "key <MY_KEY>!"),
+        (f"{KEY}{KEY}", "<MY_KEY><MY_KEY>"),
+        (f"key {KEY[:20]}", "key <MY_KEY>"),
+        (f"ends in {KEY[-12:]}", "ends in <MY_KEY>"),
+        ("sk-proj-************0123.", "<MY_KEY>."),
+        ("sk-p...0123", "<MY_KEY>"),
+        ("sk-proj-abc…", "<MY_KEY>"),
+        ("**bold**, 2**3, and so on...", "**bold**, 2**3, and so on..."),
+        ("sk-other-*******9999", "sk-other-*******9999"),
+        ("a short word: shortest", "a short word: shortest"),
+    ],
+)
+def test_keys_are_blotted_out(monkeypatch: pytest.MonkeyPatch, text: str, shown: str) -> None:
+    monkeypatch.setenv("MY_KEY", KEY)
+    monkeypatch.setenv("SHORT_KEY", "short")
+    assert redacted(text) == shown
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("SORT_KEY", "origin_x"),
+        ("PRIMARY_KEY", "universal"),
+        ("CSRF_TOKEN", "position_error"),
+        ("NEXT_TOKEN", "trial_10"),
+        ("MY_SECRET", "remember the universal shoulder"),
+    ],
+)
+def test_ordinary_words_are_no_keys(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+    monkeypatch.setenv(name, value)
+    text = "origin_x: a universal shoulder keeps the position_error small, as trial_10 shows; remember it"
+    assert redacted(text) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("VLLM_API_KEY", "placeholder"), ("MY_PASSWORD", "s3cretword"), ("MY_SECRET", "a-b-" * 5)]
+)
+def test_what_is_sent_and_what_is_no_word_is_a_key(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+    monkeypatch.setenv(name, value)
+    assert redacted(f"it is {value}.") == f"it is <{name}>."
+
+
+def test_only_texts_of_an_answer_are_blotted_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MY_API_KEY", "origin_x")
+    monkeypatch.setenv("A_TOKEN", "12345678901234567890")
+    content = {"origin_x": 12345678901234567890, "why": ["origin_x", None, True, {"origin_x": "is origin_x"}]}
+    assert without_keys(content) == {
+        "origin_x": 12345678901234567890,
+        "why": ["<MY_API_KEY>", None, True, {"origin_x": "is <MY_API_KEY>"}],
+    }
+
+
+@pytest.mark.parametrize("wire", ["own server", "openai"])
+def test_a_key_that_is_a_name_of_the_answer_breaks_nothing(
+    chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
+) -> None:
+    """Neither as a parameter's name, nor as a value: that is a text that the design space refuses."""
+    for name, value in (("MY_API_KEY", "origin_x"), ("MY_TOKEN", "reasoning")):
+        monkeypatch.setenv(name, value)
+    llm = proposer(wire, chat_server, monkeypatch, answer="one-step")
+    run = optimize(Problem(load_task("target-1")), proposer=llm, n_init=2, n_total=1)
+    assert (run.trials[2].source, run.trials[2].fault) == ("llm", None)
+
+
+def test_a_key_with_line_breaks_is_blotted_out_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MY_TOKEN", "first-piece\nsecond-piece\n")
+    assert redacted("b'first-piece\\nsecond-piece\\n'") == "b'<MY_TOKEN>\\n<MY_TOKEN>\\n'"

@@ -1,0 +1,113 @@
+"""An evaluation: its shapes, and what its arrays say of each other."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.exceptions import ArmError, TaskError
+from armwright.problem.evaluation import evaluate
+from armwright.problem.objectives import PAPER_OBJECTIVES, TORQUE_SCALE
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import load_task
+from tests.support import reference_kinematics as reference
+from tests.support.arms import general_arms, paper_arms
+
+TARGETS = np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1], [0.0, 0.0, 3.0]])
+
+
+def test_shapes() -> None:
+    result = evaluate(paper_arms(5, 4, 31), TARGETS)
+    assert len(result) == 5
+    assert result.targets.shape == (3, 3)
+    assert result.q.shape == result.joint_torques.shape == (5, 3, 4)
+    assert result.reached.shape == (5, 3, 3)
+    assert result.position_error.shape == (5, 3)
+    assert {a.dtype for a in (result.q, result.reached, result.position_error, result.joint_torques)} == {
+        np.dtype(float)
+    }
+
+
+def test_position_error_is_the_distance_from_the_target() -> None:
+    """Also where the target is out of reach: a result, never an exception."""
+    result = evaluate(paper_arms(50, 4, 32), TARGETS)
+    assert np.allclose(result.position_error, np.linalg.norm(result.reached - TARGETS, axis=-1), atol=1e-12)
+    assert np.all(result.position_error[:, 2] > 0.5)
+
+
+def test_fixed_joints_have_columns_of_zeros() -> None:
+    """Every joint of the arm has its column, in the arm's own order; only those that move have values."""
+    fixed, turn = Joint("fixed", "x"), Joint("revolute", "y", -2.0, 2.0)
+    joints = (fixed, turn, fixed, Joint("revolute", "x", -2.0, 2.0), fixed)
+    arm = Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.05, 0.2), 0.3, 0.015),) * 5)
+    result = evaluate([arm], TARGETS)
+    for values in (result.q, result.joint_torques):
+        assert not values[..., [0, 2, 4]].any()
+        assert values[..., [1, 3]].any(axis=(0, 1)).all()
+    chains = reference.chains([arm])
+    assert np.abs(reference.tip(chains, result.q[..., [1, 3]]) - result.reached).max() < 1e-5
+    assert (
+        np.abs(reference.gravity_torque(chains, result.q[..., [1, 3]]) - result.joint_torques[..., [1, 3]]).max() < 1e-4
+    )
+
+
+def test_limits_are_kept_exactly() -> None:
+    """To the last bit of a float64 reader: 2.4 rad is 2.4 rad."""
+    arms = general_arms(500, 4, 33)
+    q = evaluate(arms, TARGETS).q
+    lower, upper = (np.array([[getattr(j, end) for j in arm.joints] for arm in arms]) for end in ("lower", "upper"))
+    assert np.all(lower[:, None] <= q)
+    assert np.all(q <= upper[:, None])
+    assert np.abs(evaluate(paper_arms(500, 4, 33), TARGETS).q).max() <= 2.4
+
+
+def test_evaluating_changes_no_input() -> None:
+    targets = TARGETS.copy()
+    evaluate(paper_arms(3, 4, 35), targets)
+    assert np.array_equal(targets, TARGETS)
+
+
+def test_objectives_are_the_sums_of_the_method() -> None:
+    """E_pos = Σ |p - target| [m], E_torque = 40 Σ |τ|; `each` are their shares per target."""
+    problem = Problem(load_task("target-1"))
+    designs = problem.space.sample(20, 36)
+    result = problem.physics(designs)
+    values = problem.outcomes(result).values
+    assert TORQUE_SCALE == 40.0
+    assert values.shape == (20, 2)
+    assert np.allclose(values[:, 0], np.linalg.norm(result.reached - problem.task.points, axis=2).sum(axis=1))
+    assert np.allclose(values[:, 1], 40.0 * np.sqrt((result.joint_torques**2).sum(axis=2)).sum(axis=1))
+    assert np.array_equal(problem.evaluate(designs).values, values)
+    assert all(objective.each(result).shape == (20, 8) for objective in PAPER_OBJECTIVES)
+
+
+@pytest.mark.parametrize("targets", [np.zeros((0, 3)), np.zeros((2, 2)), np.zeros(3), np.array([[0.0, np.nan, 1.0]])])
+def test_targets_that_cannot_be(targets: np.ndarray) -> None:
+    with pytest.raises(TaskError, match=r"finite numbers in an array \(T, 3\)"):
+        evaluate(paper_arms(1, 4, 37), targets)
+
+
+def test_no_arms() -> None:
+    with pytest.raises(ArmError, match="no arms"):
+        evaluate([], TARGETS)
+
+
+@pytest.mark.parametrize(
+    "mass",
+    [
+        {"kind": "per_metre"},
+        {"kind": "per_link", "kg": 0.002},
+        {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
+    ],
+)
+@pytest.mark.parametrize("joints", [1, 4, 8])
+def test_designs_as_rows_give_the_same_bits(joints: int, mass: dict[str, Any]) -> None:
+    space = DesignSpace.model_validate({"joints": joints, "mass": mass, "joint_types": ("Y", "R")})
+    problem = Problem(load_task("target-2"), space)
+    designs = space.sample(200, seed=joints)
+    matrix = space.matrix(designs)
+    assert matrix.shape == (200, 2 * joints + 3)
+    assert space.designs(matrix) == designs
+    assert problem.evaluate_matrix(matrix).values.tolist() == problem.evaluate(designs).values.tolist()

@@ -1,0 +1,211 @@
+"""Evaluators of one's own."""
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armwright as aw
+from armwright.exceptions import EvaluatorError, RunConflictError, SettingsError
+from armwright.problem.objectives import LENGTH, POSITION_ERROR
+from armwright.runs.folder import read_run
+from tests.support.arms import paper_arms
+
+SPACE = aw.paper_space(joints=3)
+TASK = aw.load_task("target-1")
+WHOLE = TASK.model_copy(update={"reference_point": None})  # which is for other objectives than ours
+ARM = paper_arms(1, 3, 0)[0]
+
+
+@aw.evaluator("reach [m]", "joints_used")
+def measured(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+    """How far it reaches."""
+    return sum(link.length for link in arm.links), len(arm.joints)
+
+
+def raising(fault: BaseException) -> aw.Evaluator:
+    def measure(arm: aw.Arm, task: aw.Task) -> float:
+        raise fault
+
+    return aw.evaluator("energy [J]")(measure)
+
+
+def test_objectives_are_those_that_the_function_names() -> None:
+    problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
+    assert [(o.name, o.unit, o.label, o.words) for o in problem.objectives] == [
+        ("reach", "m", "Reach", "How far it reaches."),
+        ("joints_used", "", "Joints used", "How far it reaches."),
+    ]
+    designs = SPACE.sample(4, 0)
+    ours = aw.Problem(WHOLE, SPACE, objectives=(LENGTH,))
+    assert problem.evaluate(designs).values[:, 0] == pytest.approx(ours.evaluate(designs).values[:, 0], abs=1e-9)
+    assert problem.evaluate([designs[1]])[0] == problem.evaluate(designs)[1]
+
+
+def test_beside_our_objectives_and_constraints() -> None:
+    task = aw.Task(name="near", targets=((0.3, 0.0, 0.2),), constraints=("length <= 0.5",))
+    reach, _ = measured.objectives
+    problem = aw.Problem(task, SPACE, objectives=(POSITION_ERROR, reach), evaluator=measured)
+    plain = aw.Problem(task, SPACE)
+    designs = SPACE.sample(5, 1)
+    outcomes = problem.evaluate(designs)
+    values, broken = outcomes.values, outcomes.violations
+    assert values[:, 0].tolist() == plain.evaluate(designs).values[:, 0].tolist()
+    assert broken.tolist() == plain.evaluate(designs).violations.tolist()
+    assert values[:, 1] == pytest.approx([sum(link.length for link in problem.arm(d).links) for d in designs])
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda arm, task: (1.0, 2.0), r"gave \(1.0, 2.0\); 1 numbers are needed: energy"),
+        (lambda arm, task: None, "gave None; 1 numbers are needed"),
+        (lambda arm, task: "much", "gave 'much'; 1 numbers are needed"),
+        (lambda arm, task: math.nan, "gave energy = nan; it must be a finite number for every arm"),
+        (lambda arm, task: np.array([np.inf]), "gave energy = inf; it must be a finite number"),
+        (lambda arm, task: 10**400, "gave energy = inf; it must be a finite number"),
+        (lambda arm, task: 1 / 0, r"failed: ZeroDivisionError: division by zero \(test_measuring.py, line \d+\)"),
+    ],
+)
+def test_what_a_function_gives_is_checked(made: Callable[[aw.Arm, aw.Task], float], words: str) -> None:
+    with pytest.raises(EvaluatorError, match=words):
+        aw.evaluator("energy [J]")(made)(ARM, TASK)
+
+
+def test_the_end_of_the_process_is_a_failure_too() -> None:
+    with pytest.raises(EvaluatorError, match="failed: SystemExit: 3"):
+        raising(SystemExit(3))(ARM, TASK)
+    with pytest.raises(KeyboardInterrupt):
+        raising(KeyboardInterrupt())(ARM, TASK)
+
+
+def test_the_working_folder_is_that_of_before(in_folder: Path) -> None:
+    """Where a solver goes elsewhere, the folder of a run is still found by its name."""
+
+    @aw.evaluator("reach [m]", "joints_used", worst=(9.0, 9.0))
+    def elsewhere(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+        os.chdir("/")
+        if len(arm.joints) == 3:
+            raise ValueError
+        return measured.measure(arm, task)  # type: ignore[return-value]
+
+    problem = aw.Problem(WHOLE, SPACE, evaluator=elsewhere)
+    aw.optimize(problem, proposer="none", n_init=2, n_total=2, out="run")
+    assert (in_folder / "run" / "summary.json").is_file()
+    assert Path.cwd() == in_folder
+
+
+def test_one_number_needs_no_tuple() -> None:
+    assert aw.evaluator("energy [J]")(lambda arm, task: np.float32(0.5))(ARM, TASK) == (0.5,)
+
+
+def test_a_function_that_fails_counts_the_worst_where_that_is_stated() -> None:
+    design = SPACE.sample(1, 0)[0]
+    careful = aw.evaluator("energy [J]", worst=[50])(raising(OSError("no licence")).measure)
+    outcome = aw.Problem(WHOLE, SPACE, evaluator=careful).evaluate([design])[0]
+    assert outcome.values == (50.0,)
+    assert "OSError: no licence" in outcome.failure
+    with pytest.raises(EvaluatorError, match="no licence"):
+        aw.Problem(WHOLE, SPACE, evaluator=raising(OSError("no licence"))).evaluate([design])
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: aw.evaluator(), "1 to 5 different names are needed"),
+        (lambda: aw.evaluator("a", "a"), "different names"),
+        (lambda: aw.evaluator("energy [J]", worst=[1, 2]), "1 finite numbers are needed"),
+        (lambda: aw.evaluator("energy [J]", worst=[math.inf]), "finite"),
+        (lambda: aw.evaluator("Energy")(len), "small letters"),
+        (lambda: aw.evaluator("torque")(len), "one of armwright's own"),
+        (lambda: aw.Problem(TASK, SPACE, tolerance=0.001, evaluator=measured), "a tolerance does not go with"),
+        (
+            lambda: aw.optimize(aw.Problem(WHOLE, SPACE, evaluator=measured), polish_every=5),
+            "--polish-every does not go with an evaluator",
+        ),
+    ],
+)
+def test_what_is_asked_is_checked(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(SettingsError, match=words):
+        make()
+
+
+def test_a_search_for_the_whole_front_needs_our_kernels(tmp_path: Path) -> None:
+    problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
+    with pytest.raises(SettingsError, match="only in `armwright optimize`"):
+        aw.find_front(problem, budget=100, out=tmp_path / "front")
+
+
+FILE = """
+import armwright as aw
+from beside import FACTOR
+
+@aw.evaluator("reach [m]", "droop [m]")
+def simulate(arm, task):
+    return FACTOR * sum(link.length for link in arm.links), arm.base[2] + 1.0
+
+def plain(arm, task):
+    return 1.0
+"""
+
+
+@pytest.fixture
+def file(in_folder: Path) -> Path:
+    (in_folder / "beside.py").write_text("FACTOR = 2.0\n")
+    (in_folder / "sim.py").write_text(FILE)
+    return in_folder / "sim.py"
+
+
+def test_a_file_is_loaded_with_what_lies_beside_it(file: Path) -> None:
+    loaded = aw.load_evaluator(f"{file}:simulate")
+    assert loaded.name == "sim.py:simulate"
+    assert len(loaded.version) == 12
+    assert loaded(ARM, TASK)[0] == pytest.approx(2 * sum(link.length for link in ARM.links))
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("sim.py", "FILE.py:FUNCTION or MODULE:FUNCTION is needed"),
+        ("nothing.py:simulate", "there is no such file"),
+        ("no_module_of_that_name:simulate", "cannot import no_module_of_that_name: ModuleNotFoundError"),
+        ("sim.py:plain", "is a plain function: put @armwright.evaluator"),
+        ("sim.py:simulat", 'Did you mean "simulate"'),
+        ("broken.py:f", r"cannot load broken.py: SyntaxError: .*\(broken.py, line 2\)"),
+        ("raises.py:f", r"cannot load raises.py: RuntimeError: at once \(raises.py, line 1\)"),
+        ("exits.py:f", r"cannot load exits.py: SystemExit: 3 \(exits.py, line 1\)"),
+    ],
+)
+def test_what_cannot_be_loaded_is_said_in_one_line(file: Path, place: str, words: str) -> None:
+    (file.parent / "broken.py").write_text("x = 1\ndef f(:\n")
+    (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n")
+    (file.parent / "exits.py").write_text("raise SystemExit(3)\n")
+    with pytest.raises(SettingsError, match=words) as raised:
+        aw.load_evaluator(place)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_run_is_resumed_with_its_evaluator_alone(file: Path) -> None:
+    """The file may be mended; that is noted. The run folder names it, and never loads it."""
+    task = WHOLE
+
+    def run(n_total: int, evaluator: aw.Evaluator | None) -> aw.Run:
+        problem = aw.Problem(task, SPACE, evaluator=evaluator)
+        return aw.optimize(problem, proposer="rules", n_init=5, n_total=n_total, out="runs/own")
+
+    first = run(5, aw.load_evaluator("sim.py:simulate"))
+    (file.parent / "sim.py").write_text(FILE + "# mended\n")
+    more = run(8, aw.load_evaluator("sim.py:simulate"))
+    assert [t.values for t in more.trials[:10]] == [t.values for t in first.trials]
+    assert [v["evaluator"] for v in more.config.earlier_versions] == [first.config.versions["evaluator"]]
+    with pytest.raises(RunConflictError, match=r"evaluator: sim\.py:simulate there, None asked"):
+        run(8, None)
+    (file.parent / "sim.py").unlink()
+    config, history = read_run("runs/own")
+    assert config.evaluator == "sim.py:simulate"
+    assert history.values.shape == (13, 2)
+    assert aw.write_report(Path("runs/own")).is_file()
+    assert aw.write_figures(Path("runs/own"))

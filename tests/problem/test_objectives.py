@@ -1,0 +1,290 @@
+"""Problems with one objective, or with three: a run completes, resumes, and its numbers are moocore's."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import moocore
+import numpy as np
+import pinocchio
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError, UsageError
+from armwright.problem.evaluation import evaluate
+from armwright.problem.objectives import (
+    OBJECTIVES,
+    PAPER_OBJECTIVES,
+    POSITION_ERROR,
+    RENAMED,
+    Objective,
+    named_objectives,
+)
+from armwright.problem.problem import Problem
+from armwright.report.figures import chosen_members, write_figures
+from armwright.report.page_content import RunContent
+from armwright.robot.arm import Arm, Joint, Link
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.folder import read_run
+from armwright.runs.results import verify_run
+from armwright.spaces.design_space import paper_space
+from armwright.study.front_run import find_front
+from armwright.study.study import Run, optimize
+from armwright.tasks.task import Task, load_task
+from tests.support.arms import general_arms
+
+SPREAD = Objective(
+    name="spread",
+    label="Spread",
+    unit="rad",
+    symbol="E_spread",
+    words="how far the joints turn",
+    each=lambda evaluation: np.abs(evaluation.q).sum(axis=-1),
+)
+
+
+ONE, THREE = (POSITION_ERROR,), (*PAPER_OBJECTIVES, SPREAD)
+
+
+def one(task: Task) -> Problem:
+    return Problem(task, objectives=ONE)
+
+
+def three(task: Task) -> Problem:
+    return Problem(task, objectives=THREE)
+
+
+OPEN = load_task("target-1").model_copy(update={"reference_point": None})
+
+
+def test_polish_within_a_study_of_one_objective() -> None:
+    run = optimize(one(OPEN), proposer="none", n_init=3, n_total=8, polish_every=3)
+    assert any(trial.refines is not None for trial in run.trials)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+def test_an_objective_that_is_no_finite_number_is_refused(tmp_path: Path, number: float) -> None:
+    broken = (POSITION_ERROR, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))
+    with pytest.raises(SettingsError, match="objective spread of a design is"):
+        optimize(Problem(OPEN, objectives=broken), proposer="none", n_total=2, out=tmp_path / "run")
+
+
+def bounded(*point: float) -> Task:
+    return OPEN.model_copy(update={"reference_point": point})
+
+
+PROBLEMS = [one(OPEN), one(bounded(5.0)), three(OPEN), three(bounded(5.0, 5.0, 60.0))]
+
+
+def short(problem: Problem, n_total: int, out: Path | None = None) -> Run:
+    return optimize(problem, proposer="rules", n_init=5, n_step=3, n_total=n_total, out=out)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_a_run_completes_resumes_and_counts_right(tmp_path: Path, problem: Problem) -> None:
+    short(problem, 10, tmp_path / "run")
+    run = short(problem, 30, tmp_path / "run")
+    assert [trial.values for trial in run.trials] == [trial.values for trial in short(problem, 30).trials]
+    assert run.resumed == 15
+    assert {trial.source for trial in run.trials} == {"random", "rules", "bbo"}
+    values = np.array([trial.values for trial in run.trials])
+    assert values.shape == (35, len(problem.objectives))
+    point = run.config.reference_point
+    if problem.reference_point is None:
+        first = values[:5][moocore.is_nondominated(values[:5])]
+        assert point == pytest.approx(1.1 * first.max(axis=0))
+    else:
+        assert point == problem.reference_point
+    assert point is not None
+    front = np.flatnonzero(moocore.is_nondominated(values, keep_weakly=False))
+    assert sorted(member.number for member in run.front) == front.tolist()
+    inside = values[np.all(values < point, axis=1)]
+    assert run.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(inside, ref=point))
+    if len(point) == 1:
+        assert run.summary["hypervolume"]["final"] == pytest.approx(point[0] - values.min())
+    gained = [credit["hypervolume_gained"] for credit in run.summary["credit"].values()]
+    assert sum(gained) == pytest.approx(run.summary["hypervolume"]["final"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("problem", [one(OPEN), three(OPEN)])
+def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, problem: Problem) -> None:
+    run = short(problem, 12, tmp_path / "run")
+    config, history = read_run(tmp_path / "run")
+    names = [objective.name for objective in problem.objectives]
+    assert [objective.name for objective in history.problem.objectives] == names
+    assert config == run.config
+    assert [member.values for member in history.front] == [member.values for member in run.front]
+    assert history.hypervolume == pytest.approx(run.hypervolume)
+    drawn = {path.stem for path in write_figures(tmp_path / "run")}
+    assert {"hypervolume", "credit", "arms"} <= drawn
+    assert ("front" in drawn) == (len(names) > 1)
+    titles = [title for title, _ in chosen_members(history)]
+    assert all("position error" in title or "spread" in title or "nee" in title for title in titles)
+    designs = problem.space.sample(3, 0)
+    if SPREAD in problem.objectives:
+        with pytest.raises(RunFolderError, match="an objective of its own"):
+            history.problem.evaluate(designs)
+    else:
+        assert np.array_equal(history.problem.evaluate(designs).values, problem.evaluate(designs).values)
+    assert (tmp_path / "run" / "trials.csv").read_text().splitlines()[0].endswith(",".join(names))
+
+
+def test_other_objectives_are_another_run(tmp_path: Path) -> None:
+    short(three(OPEN), 3, tmp_path / "run")
+    with pytest.raises(RunConflictError, match="objectives: "):
+        short(Problem(OPEN), 3, tmp_path / "run")
+
+
+@pytest.mark.parametrize(("objectives", "point"), [(ONE, (5.0, 5.0)), (THREE, (5.0, 5.0)), (PAPER_OBJECTIVES, (5.0,))])
+def test_a_reference_point_for_other_objectives_is_refused(
+    objectives: tuple[Objective, ...], point: tuple[float, ...]
+) -> None:
+    n = len(objectives)
+    with pytest.raises(TaskError, match=rf"reference_point of {len(point)} values .*; the problem minimises {n}: "):
+        Problem(bounded(*point), objectives=objectives)
+
+
+LOADED = Task(name="loaded", targets=((0.3, 0.0, 0.2), (0.2, 0.2, 0.3), (0.2, -0.2, 0.4)), payload=(0.5, 0.2, 0.0))
+
+
+def test_the_named_objectives_are_what_they_say() -> None:
+    names = [
+        "position_error",
+        "torque",
+        "worst_error",
+        "unreached_targets",
+        "peak_torque",
+        "rms_torque",
+        "mass",
+        "length",
+        "joints",
+    ]
+    problem = Problem(LOADED, objectives=named_objectives(names[:5]))
+    rest = Problem(LOADED, objectives=named_objectives(names[5:]))
+    designs = problem.space.sample(50, 1)
+    evaluation = problem.physics(designs)
+    error, torque = evaluation.position_error, evaluation.joint_torques
+    told = dict(zip(names, np.hstack([problem.evaluate(designs).values, rest.evaluate(designs).values]).T, strict=True))
+    norms = np.linalg.norm(torque, axis=2)
+    for row, design in enumerate(designs):
+        arm = problem.arm(design)
+        assert told["position_error"][row] == pytest.approx(sum(error[row]))
+        assert told["torque"][row] == pytest.approx(40.0 * sum(norms[row]))
+        assert told["worst_error"][row] == max(error[row])
+        assert told["unreached_targets"][row] == sum(e >= 1e-3 for e in error[row])
+        assert told["peak_torque"][row] == max(map(abs, torque[row].ravel()))
+        assert told["rms_torque"][row] == pytest.approx((sum(n**2 for n in norms[row]) / 3) ** 0.5)
+        assert told["mass"][row] == pytest.approx(sum(link.mass for link in arm.links), rel=1e-6)
+        assert told["length"][row] == pytest.approx(sum(design.links), rel=1e-6)
+        assert told["joints"][row] == len(design.joints)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["masss"], 'unknown objective "masss".*Did you mean "mass"'),
+        (["mass", "mass"], "1 to 5 different ones"),
+        ([], "1 to 5 different ones"),
+        (list(OBJECTIVES)[:6], "1 to 5 different ones"),
+    ],
+)
+def test_names_that_cannot_be_are_refused(names: list[str], words: str) -> None:
+    with pytest.raises(SettingsError, match=words):
+        named_objectives(names)
+
+
+@pytest.mark.parametrize(("old", "new"), RENAMED.items())
+def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path, old: str, new: str) -> None:
+    assert new in OBJECTIVES
+    assert new not in RENAMED, "no current name is a former name of another objective"
+    file = tmp_path / "old.yaml"
+    for key, value in (("objectives", old), ("constraints", f"{old} <= 1")):
+        file.write_text(yaml.safe_dump({"name": "old", "targets": [[0.4, 0.1, 0.3]], key: [value]}))
+        with pytest.raises(UsageError, match=f'"{old}".*It is now called "{new}".') as refusal:
+            Problem(load_task(file))
+        assert str(refusal.value).count("now called") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("worst_error",),
+        ("worst_error", "peak_torque", "mass"),
+        ("unreached_targets", "mass", "length", "rms_torque", "torque"),
+    ],
+)
+def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: tuple[str, ...]) -> None:
+    """From the task file to the folder, the prompt, the figures, the page and the search for the whole front."""
+    task = LOADED.model_copy(update={"objectives": names})
+    file = tmp_path / "task.yaml"
+    file.write_text(yaml.safe_dump(task.model_dump(mode="json")))
+    result = CliRunner().invoke(
+        app, ["optimize", str(file), "--n-init", "5", "--n-total", "12", "--out", str(tmp_path / "run")]
+    )
+    assert result.exit_code == 0, result.output
+    config, history = read_run(tmp_path / "run")
+    assert tuple(objective.name for objective in config.objectives) == names
+    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
+    for name in names:
+        assert name.replace("_", " ") in result.output
+    prompt = CliRunner().invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
+    assert "payloads, point masses of [kg], for each TARGET in this order: 0.5, 0.2, 0." in prompt
+    for objective in history.problem.objectives:
+        assert objective.words in prompt
+    front = find_front(Problem(task), budget=2000, out=tmp_path / "front")
+    values = np.array([member.values for member in front.front])
+    point = front.summary["hypervolume"]["reference_point"]
+    assert front.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(values, ref=point), rel=0.02)
+    assert front.summary["best_known"] is None
+    assert verify_run(tmp_path / "run")[1]["verification"]["solid"] >= 0
+    page = RunContent(tmp_path / "run")
+    assert page.packed()
+
+
+def test_other_objectives_by_option_leave_the_task_s_reference_point(tmp_path: Path) -> None:
+    for names in ("position_error,mass", "position_error, torque"):
+        out = str(tmp_path / names[-4:])
+        options = ["--objectives", names, "--n-init", "4", "--n-total", "4", "--no-figures", "--out", out]
+        assert CliRunner().invoke(app, ["optimize", "target-1", *options]).exit_code == 0
+    assert read_run(tmp_path / "mass")[0].task.reference_point is None
+    assert read_run(tmp_path / "rque")[0].task.reference_point == (5.0, 5.0)
+
+
+# What the tip carries
+
+
+@pytest.mark.parametrize("dof", [1, 3, 4, 6, 8])
+def test_torques_with_a_payload_are_pinocchio_s(dof: int) -> None:
+    """A payload is a point mass at the tip: in the URDF a massive link without length, fixed there."""
+    targets, payload = np.random.default_rng(dof).uniform(-0.8, 0.8, (3, 3)), np.array([0.0, 0.7, 2.5])
+    arms = general_arms(20, dof, 3)
+    evaluation = evaluate(arms, targets, payload=payload)
+    for row, arm in enumerate(arms):
+        for t, kg in enumerate(payload):
+            carried = Link(offset=(0.0, 0.0, 0.0), mass=float(kg), com=(0.0, 0.0, 0.0), radius=0.01)
+            loaded = Arm(arm.base, (*arm.joints, Joint("fixed", "x")), (*arm.links, carried))
+            model = pinocchio.buildModelFromXML(to_urdf(loaded))
+            q = evaluation.q[row, t][[joint.kind != "fixed" for joint in arm.joints]]
+            torque = pinocchio.computeGeneralizedGravity(model, model.createData(), q)
+            ours = evaluation.joint_torques[row, t][[joint.kind != "fixed" for joint in arm.joints]]
+            load = 9.81 * (sum(link.mass for link in arm.links) + kg) * arm.reach
+            assert ours == pytest.approx(torque, abs=1e-5 * load)
+
+
+def test_a_payload_changes_torques_and_nothing_else() -> None:
+    designs = paper_space().sample(50, 2)
+    bare, loaded = (Problem(LOADED.model_copy(update={"payload": kg})).physics(designs) for kg in (0.0, 1.0))
+    assert np.array_equal(bare.q, loaded.q)
+    assert np.array_equal(bare.position_error, loaded.position_error)
+    doubled = Problem(LOADED.model_copy(update={"payload": 2.0})).physics(designs)
+    gain = loaded.joint_torques - bare.joint_torques
+    assert doubled.joint_torques - bare.joint_torques == pytest.approx(2.0 * gain, abs=1e-4 * np.abs(gain).max())
+
+
+@pytest.mark.parametrize("payload", [-1.0, (1.0, 2.0), 2e4, float("nan")])
+def test_a_payload_that_cannot_be_is_refused(payload: object) -> None:
+    with pytest.raises(ValueError, match="payload"):
+        Task.model_validate({"name": "x", "targets": [[0.1, 0.2, 0.3]], "payload": payload})

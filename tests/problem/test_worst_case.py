@@ -1,0 +1,89 @@
+"""The worst over payloads and over targets that are off, against each case as a task of its own."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from armwright.exceptions import TaskError
+from armwright.problem.objectives import named_objectives
+from armwright.problem.problem import Problem
+from armwright.runs.folder import read_run
+from armwright.runs.verification import verify
+from armwright.study.study import optimize
+from armwright.tasks.task import Task, load_task
+
+NAMES = ["position_error", "torque", "worst_error"]
+PLAIN = Task(name="plain", targets=((0.4, 0.1, 0.3), (0.2, -0.3, 0.5), (-0.1, 0.4, 0.2)), payload=(0.1, 0.2, 0.0))
+ROBUST = PLAIN.model_copy(
+    update={"payload_factors": (0.0, 1.5), "target_noise": 0.004, "constraints": ("peak_torque <= 2",)}
+)
+
+
+def alone() -> list[Task]:
+    """Each case as a task of its own."""
+    shifts = [sign * 0.004 * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
+    moved = [tuple(map(tuple, (PLAIN.points + shift).tolist())) for shift in shifts]
+    heavier = [tuple((factor * PLAIN.payloads).tolist()) for factor in (0.0, 1.5)]
+    tasks = [PLAIN, *(PLAIN.model_copy(update={"payload": load}) for load in heavier)]
+    tasks += [PLAIN.model_copy(update={"targets": targets}) for targets in moved]
+    return [task.model_copy(update={"constraints": ROBUST.constraints}) for task in tasks]
+
+
+def test_the_worst_of_all_cases_counts() -> None:
+    problem = Problem(ROBUST, objectives=named_objectives(NAMES))
+    rows = problem.space.matrix(problem.space.sample(60, 1))
+    each = [Problem(task, objectives=named_objectives(NAMES)).evaluate_matrix(rows) for task in alone()]
+    outcomes = problem.evaluate_matrix(rows)
+    values = outcomes.values
+    assert np.array_equal(values, np.max([case.values for case in each], axis=0))
+    assert np.array_equal(outcomes.violations, np.max([case.violations for case in each], axis=0))
+    designs = problem.space.designs(rows)
+    assert np.array_equal(problem.evaluate(designs).values, values)
+    assert np.any(values > each[0].values)
+    exact = verify(problem, designs[:5], values[:5], (5.0, 5.0, 1.0)).exact
+    assert np.all(np.abs(np.median(exact / values[:5]) - 1.0) < 0.05)  # float64 takes other ways at times
+
+
+def test_it_goes_with_a_workshop_s_tolerance() -> None:
+    problem = Problem(ROBUST, tolerance=1e-3)
+    designs = problem.space.sample(5, 2)
+    both, one, other = (
+        candidate.evaluate(designs).values for candidate in (problem, Problem(ROBUST), Problem(PLAIN, tolerance=1e-3))
+    )
+    assert np.all(both >= np.maximum(one, other))
+
+
+def test_a_run_keeps_it(tmp_path: Path) -> None:
+    file = tmp_path / "robust.yaml"
+    file.write_text(
+        yaml.safe_dump({"name": "robust", "targets": [[0.4, 0.1, 0.3]], "payload": 0.2, "target_noise": 0.01})
+    )
+    run = optimize(Problem(load_task(file)), proposer="rules", n_total=10, out=tmp_path / "run")
+    config, history = read_run(tmp_path / "run")
+    assert config.task.target_noise == 0.01
+    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
+    assert run.summary["n_trials"] == 20
+
+
+def test_the_model_is_told() -> None:
+    from armwright.llm.prompt import load_prompt
+    from tests.support.fixed_problem import FixedProblem, fixed_history
+
+    told = load_prompt("plus").render(fixed_history(FixedProblem(ROBUST), n=12), 0)
+    assert (
+        "the worst of the task as it stands, of payloads 0, 1.5 times as heavy, and of targets that are all 4 mm"
+        in told
+    )
+    assert "may come otherwise" not in load_prompt("plus").render(fixed_history(FixedProblem(PLAIN), n=12), 0)
+
+
+@pytest.mark.parametrize(
+    "given", [{"target_noise": -0.1}, {"target_noise": 5.0}, {"payload_factors": [-1.0]}, {"target_noise": ".nan"}]
+)
+def test_cases_that_cannot_be_are_refused(given: dict[str, object], tmp_path: Path) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text(yaml.safe_dump({"name": "bad", "targets": [[0.4, 0.1, 0.3]], **given}))
+    with pytest.raises(TaskError, match=str(next(iter(given)))):
+        load_task(file)

@@ -1,0 +1,507 @@
+"""Proposals in a plain `study.optimize`: how many, by whom, and each of Optuna's traps."""
+
+import json
+import logging
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import optuna
+import pytest
+from optuna.samplers import NSGAIIISampler, NSGAIISampler, TPESampler
+from optuna.storages import InMemoryStorage, JournalStorage
+from optuna.storages.journal import JournalFileBackend
+from optuna.trial import TrialState
+
+from armwright.exceptions import ModelError, ProposalError, SettingsError
+from armwright.llm.transcript import Transcript
+from armwright.pareto import hypervolume
+from armwright.problem.problem import Problem
+from armwright.proposers.for_optuna.callback import ProposalCallback
+from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer, study_history
+from armwright.proposers.llm import LlmProposer
+from armwright.proposers.proposer import Proposal
+from armwright.proposers.rules import RulesProposer
+from armwright.spaces.optuna_distributions import distributions
+from armwright.spaces.parameters import Design
+from armwright.tasks.task import Task, load_task
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
+
+
+class Told(StudyProposer):
+    """Proposes (x, y) that nobody else draws: x is the number that was asked for."""
+
+    name = "told"
+
+    def __init__(self, **others: Any) -> None:
+        self.others = others
+
+    def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
+        return StudyProposal({"x": float(number), "y": 3, **self.others}, f"told-{number:04d}", "as told")
+
+
+class Failing(Told):
+    """Fails with one fault after the other; then it proposes."""
+
+    def __init__(self, *faults: ProposalError) -> None:
+        super().__init__()
+        self.left = list(faults)
+        self.asked = 0
+
+    def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
+        self.asked += 1
+        if self.left:
+            raise self.left.pop(0)
+        return super().propose(study, seed, number)
+
+
+def objective(trial: optuna.Trial) -> float:
+    return trial.suggest_float("x", 0.0, 1000.0) + trial.suggest_int("y", 1, 9, step=2)
+
+
+def two_objectives(trial: optuna.Trial) -> tuple[float, float]:
+    x = objective(trial)
+    return x, -x
+
+
+@pytest.fixture(autouse=True)
+def quiet() -> Iterator[None]:
+    before = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    yield
+    optuna.logging.set_verbosity(before)
+
+
+@pytest.fixture
+def log() -> Iterator[list[str]]:
+    """What goes through Optuna's logger."""
+    lines: list[str] = []
+
+    class Lines(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            lines.append(record.getMessage())
+
+    handler = Lines(logging.WARNING)
+    logging.getLogger("optuna").addHandler(handler)
+    yield lines
+    logging.getLogger("optuna").removeHandler(handler)
+
+
+def proposals(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:
+    return [trial for trial in study.trials if trial.user_attrs.get("source") == "told"]
+
+
+def tpe(seed: int = 0, **settings: Any) -> optuna.Study:
+    return optuna.create_study(sampler=TPESampler(seed=seed), **settings)
+
+
+def test_one_trial_in_every_is_a_proposal_and_none_is_left_over() -> None:
+    study = tpe()
+    callback = ProposalCallback(Told(), every=10)
+    study.optimize(objective, n_trials=30, callbacks=[callback])
+    assert [trial.number for trial in proposals(study)] == [9, 19, 29]
+    assert [trial.params for trial in proposals(study)] == [{"x": float(n), "y": 3} for n in (9, 19, 29)]
+    assert proposals(study)[0].user_attrs == {"source": "told", "proposal": "told-0009", "reason": "as told"}
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
+    assert (callback.proposed, callback.faults) == (3, Counter())
+
+
+@pytest.mark.parametrize(
+    ("every", "first", "numbers"),
+    [(10, 10, [10, 20]), (4, 1, [1, 5, 9, 13, 17, 21]), (1, 20, [20, 21, 22]), (30, 9, [9])],
+)
+def test_the_first_proposal_comes_after_so_many_trials(every: int, first: int, numbers: list[int]) -> None:
+    study = tpe()
+    study.optimize(objective, n_trials=23, callbacks=[ProposalCallback(Told(), every, first=first)])
+    assert len(study.trials) - 23 == (every == 1)  # one more waits where every trial asks
+    assert [trial.number for trial in proposals(study)][: len(numbers)] == numbers
+
+
+def test_a_study_that_goes_on_keeps_the_ratio() -> None:
+    study = tpe()
+    for n in (7, 1, 5, 12):
+        study.optimize(objective, n_trials=n, callbacks=[ProposalCallback(Told(), 5)])
+    assert [trial.number for trial in proposals(study)] == [4, 9, 14, 19, 24]
+
+
+def test_failed_and_pruned_trials_count_and_ask_too() -> None:
+    def failing(trial: optuna.Trial) -> float:
+        objective(trial)
+        if trial.number in (3, 4):
+            raise RuntimeError("broken")
+        if trial.number == 8:
+            raise optuna.TrialPruned
+        return 1.0
+
+    study = tpe()
+    study.optimize(failing, n_trials=15, catch=(RuntimeError,), callbacks=[ProposalCallback(Told(), 5)])
+    assert [trial.number for trial in proposals(study)] == [4, 9, 14]
+
+
+@pytest.mark.parametrize("sampler", [TPESampler(seed=0), NSGAIISampler(population_size=8, seed=0)])
+def test_with_threads_each_block_has_exactly_one_proposal(sampler: optuna.samplers.BaseSampler) -> None:
+    study = optuna.create_study(sampler=sampler)
+    callback = ProposalCallback(Told(), every=5)
+    study.optimize(objective, n_trials=60, n_jobs=4, callbacks=[callback])
+    study.optimize(objective, n_trials=4)  # takes what the last block left waiting
+    came = sorted((trial.user_attrs["proposal"], trial.params["x"]) for trial in proposals(study))
+    assert came == [(f"told-{n:04d}", float(n)) for n in range(4, 60, 5)]
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
+    assert callback.proposed == 12
+
+
+WORKER = """
+import sys, warnings
+import optuna
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend
+import armwright as aw
+
+place, url, seed = sys.argv[1:]
+storage = JournalStorage(JournalFileBackend(place))
+sampler = optuna.samplers.NSGAIISampler(population_size=8, seed=int(seed))
+study = optuna.load_study(study_name="shared", storage=storage, sampler=sampler)
+
+def objective(trial):
+    x = trial.suggest_float("x", 0.0, 1.0)
+    return x, 1.0 - x
+
+proposer = aw.StudyLlmProposer("test-model", "two ends of a line", url, origin="scripted", answer="one-step")
+study.optimize(objective, n_trials=10, callbacks=[aw.ProposalCallback(proposer, every=5)])
+"""
+
+
+@pytest.mark.slow
+def test_several_processes_on_one_storage_share_the_proposals(chat_server: ChatServer, tmp_path: Path) -> None:
+    chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.125}, "reason": "an eighth"}'
+    place = str(tmp_path / "journal")
+    storage = JournalStorage(JournalFileBackend(place))
+    study = optuna.create_study(study_name="shared", storage=storage, directions=["minimize"] * 2)
+    command = [sys.executable, "-c", WORKER, place, chat_server.url]
+    workers = [subprocess.Popen([*command, str(seed)]) for seed in range(3)]
+    assert [worker.wait() for worker in workers] == [0, 0, 0]
+    finished = [trial.number for trial in study.trials if trial.state.is_finished()]
+    assert len(finished) == 30
+    asked = {f"scripted-{number + 1:04d}" for number in finished if number % 5 == 3}
+    study.sampler = NSGAIISampler(population_size=8, seed=9)
+    study.optimize(lambda trial: (trial.suggest_float("x", 0.0, 1.0), 0.0), n_trials=3)  # what was left waiting
+    came = [trial for trial in study.trials if trial.user_attrs.get("source") == "scripted"]
+    assert Counter(trial.user_attrs["proposal"] for trial in came) == dict.fromkeys(asked, 1)
+    assert len(chat_server.requests) == len(asked) >= 5
+    assert {trial.params["x"] for trial in came} == {0.125}
+    assert {trial.state for trial in came} == {TrialState.COMPLETE}
+    assert all("NSGAIISampler:generation" in trial.system_attrs for trial in came)
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+@pytest.mark.parametrize("genetic", [NSGAIISampler, NSGAIIISampler])
+def test_genetic_samplers_take_proposals_as_parents(genetic: type[NSGAIISampler]) -> None:
+    """They pass over enqueued trials that have no generation: with plain `enqueue_trial` no proposal is a parent."""
+
+    class Best(Told):
+        def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
+            return StudyProposal({"x": 0.001 * number, "y": 1}, f"told-{number}")
+
+    def plain(study: optuna.Study, trial: optuna.trial.FrozenTrial) -> None:
+        if trial.number % 2 == 0:
+            study.enqueue_trial({"x": 0.001 * (trial.number + 1), "y": 1})
+
+    def after_a_population(callback: Any) -> optuna.Study:
+        sampler = genetic(population_size=4, mutation_prob=0.0, crossover_prob=0.0, seed=0)
+        study = optuna.create_study(directions=["minimize"] * 2, sampler=sampler)
+        study.optimize(lambda trial: (objective(trial),) * 2, n_trials=4, callbacks=[callback])
+        study.optimize(lambda trial: (objective(trial),) * 2, n_trials=30)
+        return study
+
+    proposed, enqueued = after_a_population(ProposalCallback(Best(), every=2)), after_a_population(plain)
+    generation = f"{genetic.__name__}:generation"
+    assert [trial.system_attrs[generation] for trial in proposed.trials[:4]] == [0] * 4
+    # Without crossover and mutation each child is a parent, and the best take over.
+    assert {trial.params["x"] for trial in proposed.trials[20:]} <= {0.001, 0.003}
+    assert generation not in enqueued.trials[1].system_attrs
+    assert not {trial.params["x"] for trial in enqueued.trials[4:]} & {0.001, 0.003}
+
+
+def test_trials_out_of_range_do_not_keep_a_genetic_study_from_proposals() -> None:
+    study = optuna.create_study(sampler=NSGAIISampler(population_size=4, seed=0))
+    study.enqueue_trial({"x": -5.0, "y": 3})
+    with pytest.warns(UserWarning, match="out of range"):
+        study.optimize(objective, n_trials=5, callbacks=[ProposalCallback(Told(), 5)])
+    assert len(proposals(study)) == 1
+
+
+@pytest.mark.parametrize(
+    ("others", "words"),
+    [
+        ({"x": 2000.0}, "x = 2000 is outside 0 <= x <= 1000"),
+        ({"y": 2}, "y = 2 is between the steps of 1 <= y <= 9 in steps of 2"),
+        ({"y": 2.5}, "y = 2.5 is not a whole number"),
+        ({"kind": "c"}, "kind = 'c' is not one of a, b"),
+        ({"z": 1.0}, 'there is no parameter "z"'),
+    ],
+)
+def test_what_is_outside_the_space_never_enters_the_study(others: dict[str, Any], words: str, log: list[str]) -> None:
+    """Optuna takes an out-of-range value with a warning; an unknown category leaves its trial RUNNING."""
+    study = tpe()
+    callback = ProposalCallback(Told(**others), every=5)
+    study.optimize(
+        lambda trial: objective(trial) + len(trial.suggest_categorical("kind", ["a", "b"])),
+        n_trials=10,
+        callbacks=[callback],
+    )
+    assert callback.faults == {"design": 2}
+    assert proposals(study) == []
+    assert len(study.trials) == 10
+    assert [line for line in log if words in line] == log
+    assert len(log) == 2
+    assert log[0].endswith("the study goes on without this proposal")
+
+
+def test_values_reach_optuna_in_its_own_types() -> None:
+    """A step's float noise is moved onto the grid; numpy's numbers cannot be kept in a storage."""
+    study = tpe()
+    proposer = Told(x=np.float64(7.0), y=np.int64(5))
+    study.optimize(objective, n_trials=2, callbacks=[ProposalCallback(proposer, every=2)])
+    assert [type(value) for value in study.trials[1].system_attrs["fixed_params"].values()] == [float, int]
+
+
+def test_a_fault_leaves_the_study_going(log: list[str]) -> None:
+    study = tpe()
+    callback = ProposalCallback(Failing(ProposalError("timeout", "too slow"), ProposalError("answer", "what?")), 5)
+    study.optimize(objective, n_trials=20, callbacks=[callback])
+    assert callback.faults == {"timeout": 1, "answer": 1}
+    assert [trial.number for trial in proposals(study)] == [14, 19]
+    assert log == [f"{words}; the study goes on without this proposal" for words in ("too slow", "what?")]
+
+
+def test_a_fault_that_asking_again_does_not_mend_is_said_once(log: list[str]) -> None:
+    proposer = Failing(ProposalError("key", "wrong key", final=True))
+    callback = ProposalCallback(proposer, 5)
+    study = tpe()
+    study.optimize(objective, n_trials=20, callbacks=[callback])
+    assert (proposer.asked, callback.faults, proposals(study)) == (1, {"key": 4}, [])
+    assert log == ["wrong key; no more proposals are asked for"]
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_on_wish_a_model_that_fails_at_first_stops_the_study(n_jobs: int) -> None:
+    def callback(*faults: ProposalError) -> ProposalCallback:
+        return ProposalCallback(Failing(*faults), 5, on_model_failure="stop")
+
+    study = tpe()
+    with pytest.raises(ModelError, match="too slow"):
+        study.optimize(
+            objective, n_trials=40, n_jobs=n_jobs, callbacks=[callback(ProposalError("timeout", "too slow"))]
+        )
+    assert len(study.trials) < 40
+    study.optimize(objective, n_trials=20, n_jobs=n_jobs, callbacks=[callback()])
+    n = len(proposals(study))
+    study.optimize(objective, n_trials=10, n_jobs=n_jobs, callbacks=[callback(ProposalError("timeout", "too slow"))])
+    assert n >= 3
+    assert len(proposals(study)) > n  # once there was a proposal, nothing stops
+
+
+def test_two_proposers_share_a_study() -> None:
+    class Other(Told):
+        name = "other"
+
+    study = tpe()
+    study.optimize(objective, n_trials=22, callbacks=[ProposalCallback(Told(), 10), ProposalCallback(Other(), 5)])
+    assert Counter(trial.user_attrs.get("source") for trial in study.trials) == {None: 16, "told": 2, "other": 4}
+
+
+PROBLEM = Problem(load_task("target-1"))
+
+
+def arms(problem: Problem, study: optuna.Study, n_trials: int, callback: ProposalCallback | None) -> optuna.Study:
+    space = distributions(problem.space)
+
+    def evaluate(trial: optuna.Trial) -> tuple[float, ...]:
+        design = Design({name: trial._suggest(name, distribution) for name, distribution in space.items()})
+        return tuple(problem.evaluate([design]).values[0].tolist())
+
+    study.optimize(evaluate, n_trials=n_trials, callbacks=None if callback is None else [callback])
+    return study
+
+
+def test_rules_in_a_plain_study_beat_the_study_alone() -> None:
+    volumes: list[list[float]] = [[], []]
+    for seed in range(2):
+        for k in (0, 1):
+            study = tpe(seed, directions=["minimize"] * 2)
+            arms(PROBLEM, study, 60, ProposalCallback(RulesProposer(), 5, problem=PROBLEM) if k else None)
+            assert PROBLEM.reference_point is not None
+            volumes[k].append(hypervolume(np.array([t.values for t in study.trials]), PROBLEM.reference_point))
+            rules = [trial for trial in study.trials if trial.user_attrs.get("source") == "rules"]
+            assert [trial.number for trial in rules] == (list(range(4, 60, 5)) if k else [])
+    assert np.mean(volumes[1]) > np.mean(volumes[0])
+
+
+def test_a_history_is_made_of_complete_trials_alone() -> None:
+    study = tpe(directions=["minimize"] * 2)
+    arms(PROBLEM, study, 6, ProposalCallback(RulesProposer(), 3, problem=PROBLEM))
+    study.tell(study.ask(), state=TrialState.FAIL)
+    study.add_trial(optuna.create_trial(values=[1.0, 2.0]))  # of no design
+    arms(PROBLEM, study, 2, None)
+    history = study_history(study, PROBLEM)
+    assert [trial.number for trial in history] == list(range(8))
+    assert [trial.source for trial in history] == ["bbo", "bbo", "rules", "bbo", "bbo", "rules", "bbo", "bbo"]
+    assert history.trials[2].proposal == study.trials[2].user_attrs["proposal"]
+    assert history.trials[7].values == tuple(study.trials[9].values)
+
+
+def test_a_task_without_a_reference_point_gets_one_from_the_first_trials() -> None:
+    problem = Problem(Task(name="mine", targets=((0.2, 0.1, 0.3), (0.3, -0.1, 0.2))))
+    study = arms(problem, tpe(directions=["minimize"] * 2), 12, ProposalCallback(RulesProposer(), 2, problem=problem))
+    bound = study_history(study, problem).reference_point
+    assert bound is not None
+    arms(problem, study, 3, None)
+    assert study_history(study, problem).reference_point == bound
+
+
+def test_the_language_model_for_arms_works_in_a_plain_study(chat_server: ChatServer) -> None:
+    proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
+    study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 8, ProposalCallback(proposer, 4, problem=PROBLEM))
+    assert [trial.user_attrs.get("proposal") for trial in study.trials] == [
+        *(None, None, None, "scripted-0003", None, None, None, "scripted-0007")
+    ]
+    assert study.trials[3].user_attrs["reason"] == "a universal shoulder at the centre"
+    assert "3 designs have been evaluated" in chat_server.prompts()[0]
+
+
+def thinking(request: Request) -> Answer:
+    """Says how often it was asked, and gives a design of its own each time."""
+    if wants_design(request):
+        (n,) = re.findall(r"thought (\d+)", str(request["messages"]))
+        return json.dumps({**GOOD_DESIGN, "origin_x": int(n) / 100})
+    thinking.asked += 1  # type: ignore[attr-defined]
+    return f"thought {thinking.asked}"  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def thinker(chat_server: ChatServer) -> ChatServer:
+    thinking.asked = 0  # type: ignore[attr-defined]
+    chat_server.answer = thinking
+    return chat_server
+
+
+def origins(study: optuna.Study) -> list[float]:
+    return [trial.params["origin_x"] for trial in study.trials if trial.user_attrs.get("source") == "llm"]
+
+
+@pytest.mark.parametrize("callbacks", [1, 2])
+def test_one_proposer_in_two_studies_thinks_anew_for_each(thinker: ChatServer, callbacks: int) -> None:
+    """Both ask for trials 3 and 7; so would a study that is taken up again."""
+    llm = LlmProposer("test-model", thinker.url, max_calls=4)
+    made = [ProposalCallback(llm, 4, problem=PROBLEM) for _ in range(callbacks)]
+    studies = [tpe(seed, directions=["minimize"] * 2) for seed in range(2)]
+    for n, study in enumerate(studies):
+        arms(PROBLEM, study, 8, made[n % callbacks])
+    assert [origins(study) for study in studies] == [[0.01, 0.02], [0.03, 0.04]]
+    arms(PROBLEM, studies[0], 4, made[0])
+    assert origins(studies[0]) == [0.01, 0.02, 0.05]
+    assert [callback.faults for callback in made] == [{}] * callbacks  # each study has the whole budget
+
+
+def test_designs_left_of_another_study_are_not_taken_for_this_one() -> None:
+    class Pair(RulesProposer):
+        def propose(self, history: Any, seed: int, number: int) -> Any:
+            return [Proposal(d, f"pair-{number}.{i}") for i, d in enumerate(PROBLEM.space.sample(2, len(history)))]
+
+    callback = ProposalCallback(Pair(), 3, problem=PROBLEM)
+    for _ in range(2):
+        study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 3, callback)
+        assert [trial.user_attrs["proposal"] for trial in study.trials if trial.user_attrs] == ["pair-2.0"]
+
+
+def test_a_proposer_cannot_serve_two_studies_at_a_time(thinker: ChatServer) -> None:
+    llm = LlmProposer("test-model", thinker.url)
+
+    def meanwhile(request: Request) -> Answer:
+        other = tpe(1, directions=["minimize"] * 2)
+        with pytest.raises(SettingsError, match="llm is asking for another study; make one for each"):
+            arms(PROBLEM, other, 3, ProposalCallback(llm, 4, problem=PROBLEM))
+        return thinking(request)
+
+    thinker.answer = meanwhile
+    study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 4, ProposalCallback(llm, 4, problem=PROBLEM))
+    assert origins(study) == [0.01]
+
+
+def test_the_calls_of_a_study_are_kept_and_what_was_paid_for_is_used(thinker: ChatServer, tmp_path: Path) -> None:
+    storage = InMemoryStorage()
+
+    def go_on(n_trials: int) -> optuna.Study:
+        """As a new process would."""
+        study = optuna.create_study(
+            storage=storage, study_name="my/arms", directions=["minimize"] * 2, load_if_exists=True
+        )
+        llm = LlmProposer("test-model", thinker.url, proposals=2)
+        return arms(PROBLEM, study, n_trials, ProposalCallback(llm, 4, problem=PROBLEM, folder=tmp_path / "calls"))
+
+    def pair(request: Request) -> Answer:
+        if not wants_design(request):
+            return "two of them"
+        return json.dumps({"designs": [{**GOOD_DESIGN, "origin_x": x} for x in (0.1, 0.2)]})
+
+    thinker.answer = pair
+    go_on(4)
+    assert len(thinker.requests) == 2
+    study = go_on(4)
+    assert (origins(study), len(thinker.requests)) == ([0.1, 0.2], 2)
+    (folder,) = (tmp_path / "calls").iterdir()
+    assert folder.name.startswith("my_arms-2")
+    calls = Transcript(folder / "transcripts.jsonl").calls
+    assert [(call.proposal, call.step) for call in calls] == [("llm-0003", "reasoning"), ("llm-0003", "parameters")]
+    optuna.delete_study(study_name="my/arms", storage=storage)
+    assert origins(go_on(4)) == [0.1]  # another study of the same name: asked anew
+    assert len(thinker.requests) == 4
+    with pytest.raises(SettingsError, match="folder calls goes with problem"):
+        ProposalCallback(Told(), folder="calls")
+
+
+def test_several_designs_of_one_call_enter_one_a_block() -> None:
+    class Pair(RulesProposer):
+        per_call = 2
+        calls = 0
+
+        def propose(self, history: Any, seed: int, number: int) -> Any:
+            self.calls += 1
+            designs = PROBLEM.space.sample(2, number)
+            return [Proposal(design, f"pair-{number}.{i}") for i, design in enumerate(designs)]
+
+    pair = Pair()
+    study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 12, ProposalCallback(pair, 3, problem=PROBLEM))
+    noted = [trial.user_attrs["proposal"] for trial in study.trials if trial.user_attrs]
+    assert noted == ["pair-2.0", "pair-2.1", "pair-8.0", "pair-8.1"]
+    assert pair.calls == 2
+
+
+def test_a_study_of_other_directions_or_designs_is_refused() -> None:
+    callback = ProposalCallback(RulesProposer(), 2, problem=PROBLEM)
+    with pytest.raises(SettingsError, match="directions minimize; a study over an armwright problem minimises 2"):
+        tpe().optimize(objective, n_trials=2, callbacks=[callback])
+    with pytest.raises(SettingsError, match="not of the design space paper"):
+        tpe(directions=["minimize"] * 2).optimize(two_objectives, n_trials=2, callbacks=[callback])
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"proposer": RulesProposer()}, "proposes arms: give the problem"),
+        ({"proposer": Told(), "problem": PROBLEM}, "for any study: leave out problem"),
+        ({"proposer": Told}, r"is a class; give an instance of it: Told\(\)"),
+        ({"proposer": Told(), "every": 0}, "every = 0: a whole number"),
+        ({"proposer": Told(), "every": 2.5}, "every = 2.5: a whole number"),
+        ({"proposer": Told(), "first": 0}, "first = 0: a whole number"),
+        ({"proposer": Told(), "on_model_failure": "ignore"}, 'on_model_failure "ignore" is not one of'),
+    ],
+)
+def test_wrong_settings_are_refused(settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(SettingsError, match=words):
+        ProposalCallback(**settings)

@@ -1,0 +1,272 @@
+"""What Optuna asks of its samplers, asked of a study with proposals: its own suite, and what else a study may do."""
+
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import optuna
+import pytest
+from optuna.distributions import IntDistribution
+from optuna.samplers import (
+    BaseSampler,
+    NSGAIIISampler,
+    NSGAIISampler,
+    PartialFixedSampler,
+    QMCSampler,
+    RandomSampler,
+    TPESampler,
+)
+from optuna.storages import BaseStorage, InMemoryStorage, JournalStorage, RDBStorage
+from optuna.storages.journal import JournalFileBackend
+from optuna.testing.pytest_samplers import BasicSamplerTestCase
+from optuna.trial import FrozenTrial, TrialState
+
+import armwright as aw
+from tests.proposers.for_optuna.test_callback import quiet as quiet
+
+pytestmark = pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+SAMPLERS: list[Callable[..., BaseSampler]] = [RandomSampler, TPESampler, NSGAIISampler, NSGAIIISampler, QMCSampler]
+
+
+class TestOptunasOwnSuite(BasicSamplerTestCase):
+    """Its tests that optimise, with proposals; `first` so that none is left over where they count trials."""
+
+    # These look at the sampler alone.
+    test_float = test_int = test_categorical = test_conditional_sample_independent = None  # type: ignore[assignment]
+    test_sample_single_distribution = None  # type: ignore[assignment]
+    test_partial_fixed_sampling = None  # type: ignore[assignment]  # proposals go before samplers; see below
+
+    @pytest.fixture(params=SAMPLERS[:3])
+    def sampler(
+        self, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+    ) -> Iterator[Callable[[], BaseSampler]]:
+        optimize, made = optuna.Study.optimize, []
+
+        def proposing(self: optuna.Study, *arguments: Any, **others: Any) -> None:
+            made.append(rules(5, first=2))
+            optimize(self, *arguments, **others, callbacks=[made[-1]])
+
+        monkeypatch.setattr(optuna.Study, "optimize", proposing)
+        yield lambda: request.param(seed=0)
+        assert sum(callback.proposed for callback in made) > 0
+        assert not any(callback.faults for callback in made)
+
+
+def mixed(trial: optuna.Trial) -> float:
+    """Each kind of parameter, some of them conditional, some of a single value."""
+    value = trial.suggest_float("plain", -1.0, 1.0) ** 2
+    value += abs(np.log10(trial.suggest_float("log", 1e-7, 1.0, log=True)) + 3)
+    value += trial.suggest_float("stepped", -10.2, 10.2, step=0.1) ** 2
+    value += trial.suggest_int("whole", -10, 10, step=2) + trial.suggest_int("log whole", 1, 100, log=True)
+    value += trial.suggest_int("single", 3, 3) + trial.suggest_categorical("only", (1,))
+    match trial.suggest_categorical("kind", ("a", 1, None, True, 0.5)):
+        case "a":
+            value += trial.suggest_float("of a", 0.0, 1.0)
+        case None:
+            value += trial.suggest_int("of none", 0, 5)
+        case _:
+            value += 1.0
+    return value
+
+
+def two(trial: optuna.Trial) -> tuple[float, float]:
+    value = mixed(trial)
+    return value, -trial.params["plain"]
+
+
+def of_rules(study: optuna.Study) -> list[FrozenTrial]:
+    return [trial for trial in study.get_trials() if trial.user_attrs.get("source") == "rules"]
+
+
+def rules(every: int = 3, **settings: Any) -> aw.ProposalCallback:
+    return aw.ProposalCallback(aw.StudyRulesProposer(), every, **settings)
+
+
+@pytest.mark.parametrize("objective", [mixed, two])
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_each_kind_of_parameter_with_each_sampler(
+    sampler: Callable[..., BaseSampler], objective: Callable[[optuna.Trial], Any]
+) -> None:
+    study = optuna.create_study(directions=["minimize"] * (1 + (objective is two)), sampler=sampler(seed=1))
+    callback = rules()
+    study.optimize(objective, n_trials=36, callbacks=[callback])
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
+    assert [trial.number for trial in of_rules(study)] == list(range(2, 36, 3))
+    assert (callback.proposed, callback.faults) == (12, {})
+    for trial in study.trials:
+        for name, value in trial.params.items():
+            distribution = trial.distributions[name]
+            assert distribution._contains(distribution.to_internal_repr(value))
+            assert not isinstance(value, np.generic)
+
+
+@pytest.fixture(params=["memory", "sqlite", "journal"])
+def storage(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[BaseStorage]:
+    if request.param == "memory":
+        yield InMemoryStorage()
+    elif request.param == "journal":
+        yield JournalStorage(JournalFileBackend(str(tmp_path / "journal")))
+    else:
+        database = RDBStorage(f"sqlite:///{tmp_path / 'study.db'}")
+        yield database
+        database.remove_session()
+        database.engine.dispose()
+
+
+def test_each_storage_keeps_proposals_and_gives_them_back(storage: BaseStorage) -> None:
+    study = optuna.create_study(storage=storage, directions=["minimize"] * 2, sampler=TPESampler(seed=0))
+    study.optimize(two, n_trials=12, callbacks=[rules()])
+    again = optuna.load_study(study_name=study.study_name, storage=storage, sampler=TPESampler(seed=1))
+    again.optimize(two, n_trials=6, callbacks=[rules()])
+    assert [trial.number for trial in of_rules(again)] == list(range(2, 18, 3))
+    assert [set(trial.user_attrs) for trial in of_rules(again)] == [{"source", "proposal", "reason"}] * 6
+
+
+@pytest.mark.parametrize("sampler", [TPESampler(seed=0), NSGAIISampler(population_size=6, seed=0)])
+def test_threads(sampler: BaseSampler) -> None:
+    study = optuna.create_study(directions=["minimize"] * 2, sampler=sampler)
+    callback = rules()
+    study.optimize(two, n_trials=45, n_jobs=4, callbacks=[callback])
+    study.optimize(two, n_trials=4)  # what was left waiting
+    assert len({trial.user_attrs["proposal"] for trial in of_rules(study)}) == callback.proposed == 15
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
+
+
+def test_failed_pruned_and_nan_trials_teach_nothing_and_stop_nothing() -> None:
+    def broken(trial: optuna.Trial) -> float:
+        value = mixed(trial)
+        if "proposal" in trial.user_attrs or trial.number % 4 == 0:
+            ways = [RuntimeError("broken"), optuna.TrialPruned(), float("nan"), float("nan")]
+            way = ways[trial.number % 4]
+            if isinstance(way, Exception):
+                raise way
+            return way
+        return value
+
+    study = optuna.create_study(sampler=TPESampler(seed=0))
+    callback = rules()
+    study.optimize(broken, n_trials=40, catch=(RuntimeError,), callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (13, {})
+    assert {trial.state for trial in of_rules(study)} == {TrialState.FAIL, TrialState.PRUNED}
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE, TrialState.FAIL, TrialState.PRUNED}
+
+
+@pytest.mark.parametrize("value", [float("inf"), -float("inf"), 1e308, -1e308, 0.0])
+@pytest.mark.parametrize("n_objectives", [1, 2, 3])
+def test_values_beyond_measure_and_none_better_than_another(value: float, n_objectives: int) -> None:
+    """Where all are alike, or all infinite; one is not."""
+    study = optuna.create_study(directions=["maximize"] * n_objectives, sampler=RandomSampler(seed=0))
+    callback = rules()
+
+    def objective(trial: optuna.Trial) -> tuple[float, ...]:
+        mixed(trial)
+        return ((1.0,) if trial.number == 10 else (value,)) * n_objectives
+
+    study.optimize(objective, n_trials=24, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (8, {})
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
+
+
+def test_maximising_the_opposite_is_the_same_study() -> None:
+    def proposals(direction: str, sign: float) -> list[dict[str, Any]]:
+        study = optuna.create_study(directions=[direction, "minimize"], sampler=RandomSampler(seed=0))
+        study.optimize(lambda t: (sign * mixed(t), t.params["plain"]), n_trials=30, callbacks=[rules()])
+        return [trial.params for trial in of_rules(study)]
+
+    assert proposals("minimize", 1.0) == proposals("maximize", -1.0)
+
+
+def test_one_seed_is_one_study_and_another_seed_is_another() -> None:
+    def proposals(seed: int) -> list[dict[str, Any]]:
+        study = optuna.create_study(sampler=RandomSampler(seed=0))
+        study.optimize(mixed, n_trials=30, callbacks=[rules(seed=seed)])
+        return [trial.params for trial in of_rules(study)]
+
+    assert proposals(0) == proposals(0) != proposals(1)
+
+
+def test_a_study_that_is_stopped_asks_no_more_and_goes_on_with_what_was_proposed() -> None:
+    study = optuna.create_study(sampler=RandomSampler(seed=0))
+    callback = rules()
+
+    def stopping(study: optuna.Study, trial: FrozenTrial) -> None:
+        if trial.number == 4:
+            study.stop()
+
+    study.optimize(mixed, n_trials=30, callbacks=[stopping, callback])
+    assert [trial.state for trial in study.trials] == [TrialState.COMPLETE] * 5 + [TrialState.WAITING]
+    assert callback.proposed == 2
+    study.optimize(mixed, n_trials=1, callbacks=[callback])
+    assert study.trials[5].user_attrs["source"] == "rules"
+    assert len(study.trials) == 6
+
+
+def test_trials_of_before_teach_from_the_first_proposal_on() -> None:
+    before = optuna.create_study(sampler=RandomSampler(seed=0))
+    before.optimize(mixed, n_trials=20)
+    study = optuna.create_study(sampler=RandomSampler(seed=1))
+    study.add_trials(before.trials)
+    study.optimize(mixed, n_trials=4, callbacks=[rules()])
+    first, *_ = of_rules(study)
+    assert first.user_attrs["proposal"].rpartition("-")[2] != "far"
+
+
+def test_what_a_user_enqueued_comes_first_and_is_not_lost() -> None:
+    study = optuna.create_study(sampler=RandomSampler(seed=0))
+    for k in range(5):
+        study.enqueue_trial({"whole": 2 * k}, user_attrs={"mine": k})
+    study.optimize(mixed, n_trials=12, callbacks=[rules()])
+    assert [trial.user_attrs.get("mine") for trial in study.trials[:5]] == list(range(5))
+    assert [trial.params["whole"] for trial in study.trials[:5]] == [0, 2, 4, 6, 8]
+    assert len(of_rules(study)) == 4  # those that were asked for meanwhile wait behind them
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
+
+
+def test_parameters_that_are_new_in_each_trial() -> None:
+    study = optuna.create_study(sampler=TPESampler(seed=0))
+    callback = rules()
+    study.optimize(
+        lambda trial: sum(trial.suggest_float(f"x{n}", 0.0, 1.0) for n in range(trial.number, trial.number + 3)),
+        n_trials=21,
+        callbacks=[callback],
+    )
+    assert (callback.proposed, callback.faults) == (7, {})
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
+
+
+def test_constraints_keep_infeasible_trials_from_being_parents() -> None:
+    def objective(trial: optuna.Trial) -> float:
+        x, y = trial.suggest_float("x", 0.0, 1.0), trial.suggest_categorical("y", ["allowed", "forbidden"])
+        trial.set_constraint("forbidden", 1.0 if y == "forbidden" else -1.0)
+        return x - 9.0 * (y == "forbidden")
+
+    study = optuna.create_study(sampler=TPESampler(seed=0))
+    study.optimize(objective, n_trials=60, callbacks=[rules()])
+    late = [trial for trial in of_rules(study) if trial.number > 12]  # by then two are feasible
+    by_rule = [(trial.user_attrs["proposal"].rpartition("-")[2], trial.params["y"]) for trial in late]
+    assert len(by_rule) == 16
+    assert {y for rule, y in by_rule if rule != "swap"} == {"allowed"}
+
+
+def test_a_parameter_that_is_fixed_is_kept_by_a_stated_space() -> None:
+    """Optuna's enqueued trials go before its samplers, so a PartialFixedSampler alone does not bind proposals."""
+    study = optuna.create_study(sampler=TPESampler(seed=0))
+    study.optimize(mixed, n_trials=5)
+    study.sampler = PartialFixedSampler({"whole": 4}, study.sampler)
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(space={"whole": IntDistribution(4, 4)}), every=2)
+    study.optimize(mixed, n_trials=15, callbacks=[callback])
+    assert len(of_rules(study)) >= 7
+    assert {trial.params["whole"] for trial in study.trials[5:]} == {4}
+
+
+def test_a_range_that_moves_away_leaves_optuna_to_warn_of_what_was_waiting() -> None:
+    study = optuna.create_study(sampler=RandomSampler(seed=0))
+    study.optimize(lambda t: t.suggest_float("x", 0.0, 1.0), n_trials=3, callbacks=[rules(first=3)])
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        study.optimize(lambda t: t.suggest_float("x", 5.0, 6.0), n_trials=9, callbacks=[rules()])
+    assert [str(w.message) for w in seen if "out of range" in str(w.message)]
+    assert all(5.0 <= trial.params["x"] <= 6.0 for trial in of_rules(study)[1:])
+    assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}

@@ -1,0 +1,231 @@
+"""Any study's parameters and a model's answer: round trips over random distributions, and all that is refused."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
+
+from armwright.exceptions import DesignError
+from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
+from armwright.proposers.for_optuna.parameters import (
+    Parameter,
+    checked_params,
+    checked_value,
+    choice_texts,
+    described,
+    keys,
+    read_value,
+    told_parameters,
+    written_value,
+)
+from armwright.proposers.for_optuna.prompt import Told
+
+OBJECTIVES = [Told("value", "value", "minimised")]
+CHOICES = st.one_of(st.none(), st.booleans(), st.integers(-9, 9), st.floats(-9, 9), st.text(max_size=6))
+
+
+@st.composite
+def ints(draw: st.DrawFn) -> tuple[IntDistribution, int]:
+    low, steps = draw(st.integers(-1000, 1000)), draw(st.integers(0, 50))
+    if draw(st.booleans()):
+        low = abs(low) + 1
+        return IntDistribution(low, low + steps, log=True), low + draw(st.integers(0, steps))
+    step = draw(st.integers(1, 7))
+    return IntDistribution(low, low + steps * step, step=step), low + step * draw(st.integers(0, steps))
+
+
+@st.composite
+def floats(draw: st.DrawFn) -> tuple[FloatDistribution, float]:
+    low, width = draw(st.floats(-1e3, 1e3)), draw(st.floats(0, 1e3))
+    if draw(st.booleans()):
+        low = abs(low) + 1e-6
+        return FloatDistribution(low, low + width, log=True), draw(st.floats(low, low + width))
+    if draw(st.booleans()):
+        return FloatDistribution(low, low + width), draw(st.floats(low, low + width))
+    step, steps = draw(st.sampled_from([0.1, 0.25, 3.0, 1e-3])), draw(st.integers(0, 50))
+    distribution = FloatDistribution(low, low + step * steps, step=step)
+    return distribution, min(low + step * draw(st.integers(0, steps)), distribution.high)
+
+
+@st.composite
+def categories(draw: st.DrawFn) -> tuple[CategoricalDistribution, Any]:
+    choices = draw(st.lists(CHOICES, min_size=1, max_size=6, unique_by=lambda choice: (type(choice), choice)))
+    return CategoricalDistribution(choices), draw(st.sampled_from(choices))
+
+
+@pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
+@settings(deadline=None, max_examples=200)
+@given(st.dictionaries(st.text(max_size=70), st.one_of(ints(), floats(), categories()), min_size=1, max_size=5))
+def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
+    drawn: dict[str, tuple[BaseDistribution, Any]],
+) -> None:
+    space = {name: distribution for name, (distribution, _) in drawn.items()}
+    params = {name: value for name, (_, value) in drawn.items()}
+    parameters = told_parameters(space, [])
+    text = written_answer(StudyAnswer(params, "so", (1.5,)), parameters, OBJECTIVES)
+    back = read_answer(json.loads(text), parameters, OBJECTIVES)
+    assert dict(back.params) == params
+    assert [type(back.params[name]) for name in params] == [type(value) for value in params.values()]
+    assert (back.reason, back.expected) == ("so", (1.5,))
+    assert checked_params(back.params, space, space) == params
+    for name, value in back.params.items():
+        assert space[name]._contains(space[name].to_internal_repr(value))
+
+
+@settings(deadline=None)
+@given(st.one_of(ints(), categories()))
+def test_the_schema_allows_what_is_written(drawn: tuple[BaseDistribution, Any]) -> None:
+    distribution, value = drawn
+    (parameter,) = told_parameters({"x": distribution}, [])
+    schema = answer_schema([parameter], OBJECTIVES, reasoning=True, expected=True)
+    assert list(schema["properties"]) == ["reasoning", "parameters", "expected", "reason"]
+    field = schema["properties"]["parameters"]["properties"]["x"]
+    written = written_value(value, distribution)
+    if isinstance(distribution, CategoricalDistribution):
+        assert field["type"] == "string"
+        assert written in field["enum"]
+        assert len(field["enum"]) == len(distribution.choices)
+    else:
+        assert field["type"] == "integer"
+        assert type(written) is int
+
+
+@given(st.lists(st.text(max_size=70), unique=True, max_size=8))
+def test_every_parameter_has_a_key_of_its_own_that_vendors_take(names: list[str]) -> None:
+    found = keys(names)
+    assert len(set(found)) == len(names)
+    assert all(key.isascii() and 1 <= len(key) <= 64 and not set(key) & set(" /[](){}") for key in found)
+
+
+def test_a_plain_name_is_its_own_key() -> None:
+    assert keys(["lr", "layer/units", "layer_units", "学习率"]) == ["lr", "layer_units_2", "layer_units", "___"]
+
+
+@pytest.mark.parametrize(
+    ("distribution", "written", "value"),
+    [
+        (IntDistribution(1, 9), "3", 3),
+        (IntDistribution(1, 9), 3.0, 3),
+        (IntDistribution(16, 64, step=16), " 48 ", 48),
+        (FloatDistribution(1e-5, 1.0, log=True), "1e-3", 1e-3),
+        (FloatDistribution(0.0, 1.0), 1, 1.0),
+        (FloatDistribution(0.0, 1.0, step=0.1), 0.3, 0.3),
+        (FloatDistribution(0.0, 1.0, step=0.1), 0.70000001, 0.7000000000000001),
+        (CategoricalDistribution(["rbf", "poly"]), "RBF", "rbf"),
+        (CategoricalDistribution(["rbf", "poly"]), "'rbf'", "rbf"),
+        (CategoricalDistribution([True, False]), "True", True),
+        (CategoricalDistribution([True, False]), False, False),
+        (CategoricalDistribution([None, 5, 10]), None, None),
+        (CategoricalDistribution([None, 5, 10]), "None", None),
+        (CategoricalDistribution([None, 5, 10]), "null", None),
+        (CategoricalDistribution([None, 5, 10]), "10.0", 10),
+        (CategoricalDistribution([0.5, 1.0]), 1, 1.0),
+        (CategoricalDistribution(["1", 1]), "1", 1),
+        (CategoricalDistribution(["1", 1]), "'1'", "1"),
+        (CategoricalDistribution([1, 2]), "2", 2),
+    ],
+)
+def test_what_models_write_is_read_in_the_type_that_was_meant(
+    distribution: BaseDistribution, written: Any, value: Any
+) -> None:
+    found = read_value("x", written, distribution)
+    assert found == value
+    assert type(found) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("distribution", "written", "words"),
+    [
+        (IntDistribution(1, 9), 10, "x = 10 is outside 1 <= x <= 9"),
+        (IntDistribution(1, 9), 2.5, "x = 2.5 is not a whole number"),
+        (IntDistribution(1, 9), True, "x = True is not a whole number"),
+        (IntDistribution(1, 9), "many", "x = 'many' is not a whole number"),
+        (IntDistribution(1, 9), 10**400, "a number beyond 64 bits"),
+        (IntDistribution(16, 64, step=16), 40, "x = 40 is between the steps of 16 <= x <= 64 in steps of 16"),
+        (FloatDistribution(1e-5, 1.0, log=True), 0.0, "x = 0 is outside 1e-05 <= x <= 1"),
+        (FloatDistribution(0.0, 1.0), float("nan"), "x = nan is not a finite number"),
+        (FloatDistribution(0.0, 1.0), "inf", "x = inf is not a finite number"),
+        (FloatDistribution(0.0, 1.0), 10**400, "not a finite number"),
+        (FloatDistribution(0.0, 1.0), True, "x = True is not a finite number"),
+        (FloatDistribution(0.0, 1.0), [0.5], "not a finite number"),
+        (FloatDistribution(0.0, 1.0, step=0.1), 0.35, "x = 0.35 is between the steps of 0 <= x <= 1 in steps of 0.1"),
+        (CategoricalDistribution(["rbf", "poly"]), "rfb", "x = 'rfb' is not one of rbf, poly. Did you mean \"rbf\""),
+        (CategoricalDistribution([1, 2]), True, "x = True is not one of 1, 2"),
+        (CategoricalDistribution(["a", "b"]), {"a": 1}, "is not one of a, b"),
+    ],
+)
+def test_what_no_distribution_holds_is_refused_in_words(
+    distribution: BaseDistribution, written: Any, words: str
+) -> None:
+    with pytest.raises(DesignError) as refusal:
+        read_value("x", written, distribution)
+    assert words in str(refusal.value)
+
+
+def test_a_nan_among_the_choices_is_found() -> None:
+    assert math.isnan(checked_value("x", float("nan"), CategoricalDistribution([1.0, float("nan")])))
+
+
+def test_choices_of_the_same_text_are_told_apart() -> None:
+    assert choice_texts(CategoricalDistribution(["a", None, 0.5])) == ["a", "null", "0.5"]
+    assert choice_texts(CategoricalDistribution(["1", 1])) == ["'1'", "1"]
+    assert choice_texts(CategoricalDistribution(["", "a"])) == ["''", "'a'"]
+
+
+def test_a_distribution_is_described_by_kind_and_range() -> None:
+    assert described(IntDistribution(2, 8, step=2)) == "whole number, 2 to 8 in steps of 2"
+    assert described(FloatDistribution(1e-5, 0.1, log=True)) == "number, 1e-05 to 0.1, on a log scale"
+    assert described(CategoricalDistribution(["a", True])) == "one of a, true"
+
+
+PARAMETERS = [
+    Parameter("kernel", "kernel", CategoricalDistribution(["rbf", "linear"])),
+    Parameter("C", "C", FloatDistribution(1e-2, 1e2, log=True)),
+    Parameter("gamma", "gamma", FloatDistribution(1e-4, 1.0, log=True), conditional=True),
+]
+
+
+def test_conditional_parameters_may_be_left_out() -> None:
+    for left_out in ({}, {"gamma": None}, {"gamma": "n/a"}):
+        answer = read_answer({"parameters": {"kernel": "linear", "C": 1, **left_out}}, PARAMETERS, OBJECTIVES)
+        assert dict(answer.params) == {"kernel": "linear", "C": 1.0}
+    schema = answer_schema(PARAMETERS, OBJECTIVES, reasoning=False, expected=False)
+    assert schema["properties"]["parameters"]["required"] == ["kernel", "C"]
+
+
+def test_an_answer_without_the_object_around_the_parameters_is_read() -> None:
+    answer = read_answer({"KERNEL": "rbf", "c": "2.5", "reason": "a  try\n"}, PARAMETERS, OBJECTIVES)
+    assert (dict(answer.params), answer.reason, answer.expected) == ({"kernel": "rbf", "C": 2.5}, "a try", None)
+
+
+def test_no_reason_is_no_reason() -> None:
+    """Not the word None; and what is not seen is not kept."""
+    parameters = [Parameter("C", "C", FloatDistribution(0.0, 9.0))]
+    assert read_answer({"C": 1, "reason": None}, parameters, OBJECTIVES).reason == ""
+    assert read_answer({"C": 1, "reason": "so\x1b[2J\u200b it is"}, parameters, OBJECTIVES).reason == "so it is"
+
+
+def test_a_parameter_may_be_called_reason() -> None:
+    parameters = [Parameter("reason", "reason", IntDistribution(0, 9))]
+    answer = StudyAnswer({"reason": 4}, "four")
+    assert read_answer(json.loads(written_answer(answer, parameters, OBJECTIVES)), parameters, OBJECTIVES) == answer
+
+
+def test_all_that_is_wrong_is_said_at_once() -> None:
+    with pytest.raises(DesignError) as refusal:
+        read_answer({"parameters": {"C": 1e3, "kernl": "rbf", "gamma": "big"}}, PARAMETERS, OBJECTIVES)
+    words = str(refusal.value)
+    assert 'there is no parameter "kernl". Did you mean "kernel"?' in words
+    assert "kernel is missing: one of rbf, linear" in words
+    assert "C = 1000 is outside 0.01 <= C <= 100" in words
+    assert "gamma = 'big' is not a finite number" in words
+
+
+@pytest.mark.parametrize("expected", [None, [1.0], {}, {"value": "much"}, {"value": float("inf")}, {"other": 1.0}])
+def test_expected_values_that_are_none_are_left_out(expected: Any) -> None:
+    content = {"parameters": {"kernel": "rbf", "C": 1.0}, "expected": expected}
+    assert read_answer(content, PARAMETERS, OBJECTIVES).expected is None

@@ -1,0 +1,287 @@
+"""The rules for any study: what each proposes, and that everything it proposes is in the space."""
+
+import math
+from typing import Any
+
+import numpy as np
+import optuna
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.trial import TrialState, create_trial
+
+import armwright as aw
+from armwright.exceptions import ProposalError
+from armwright.proposers.for_optuna.parameters import checked_value
+from armwright.proposers.for_optuna.rules import RULES, linear, most_promising, record, standing_of
+from armwright.proposers.for_optuna.unit_interval import from_unit, is_number, to_unit
+from tests.proposers.for_optuna.test_parameters import categories, floats, ints
+
+SPACE: dict[str, BaseDistribution] = {
+    "kind": CategoricalDistribution(["flat", "curved"]),
+    "lr": FloatDistribution(1e-4, 1.0, log=True),
+    "depth": IntDistribution(1, 9, step=2),
+    "bend": FloatDistribution(-1.0, 1.0),  # of curved alone
+    "one": CategoricalDistribution(["only"]),
+}
+
+
+def params(kind: str, lr: float, depth: int, bend: float = 0.0) -> dict[str, Any]:
+    return {"kind": kind, "lr": lr, "depth": depth, "one": "only"} | ({"bend": bend} if kind == "curved" else {})
+
+
+def study_of(trials: list[tuple[dict[str, Any], tuple[float, ...]]], directions: tuple[str, ...]) -> optuna.Study:
+    study = optuna.create_study(directions=directions)
+    for own, values in trials:
+        given = {name: SPACE[name] for name in own}
+        study.add_trial(create_trial(params=own, distributions=given, values=list(values)))
+    return study
+
+
+FRONT = [
+    (params("flat", 0.001, 3), (0.0, 4.0)),
+    (params("flat", 0.1, 7), (1.0, 1.0)),
+    (params("curved", 0.5, 9, 0.5), (1.5, 0.0)),
+    (params("flat", 1.0, 1), (9.0, 9.0)),
+]
+TWO = ("minimize", "minimize")
+
+
+def made(rule: str, study: optuna.Study, seed: int) -> tuple[dict[str, Any], str]:
+    standing = standing_of(study, aw.StudyRulesProposer().space(study), "rules")
+    return RULES[rule](standing, np.random.default_rng(seed))
+
+
+@settings(deadline=None)
+@pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
+@given(st.one_of(ints(), floats()), st.floats(-0.5, 1.5))
+def test_the_scale_from_0_to_1_and_back(drawn: tuple[BaseDistribution, Any], share: float) -> None:
+    distribution, value = drawn
+    assume(is_number(distribution))
+    assert 0.0 <= to_unit(value, distribution) <= 1.0 + 1e-9
+    assert from_unit(to_unit(value, distribution), distribution) == pytest.approx(value, rel=1e-9, abs=1e-9)
+    there = from_unit(share, distribution)
+    assert checked_value("x", there, distribution) == there
+    ends = [from_unit(-0.1, distribution), from_unit(1.1, distribution)]
+    assert ends == pytest.approx([distribution.low, distribution.high], rel=1e-12)
+
+
+def test_equal_steps_of_a_log_scale_and_the_widest_range_of_floats() -> None:
+    log, wide = FloatDistribution(1e-300, 1e300, log=True), FloatDistribution(-1.7e308, 1.7e308)
+    assert from_unit(0.5, log) == pytest.approx(1.0)
+    assert to_unit(1.0, log) == pytest.approx(0.5)
+    assert (from_unit(0.5, wide), to_unit(1.7e308, wide)) == (0.0, 1.0)
+
+
+@st.composite
+def trials(draw: st.DrawFn) -> tuple[dict[str, BaseDistribution], list[dict[str, Any]], list[list[float]]]:
+    names = draw(st.lists(st.text(max_size=9), min_size=1, max_size=4, unique=True))
+    kinds = {name: draw(st.one_of(ints(), floats(), categories())) for name in names}
+    objectives, n = draw(st.integers(1, 3)), draw(st.integers(1, 9))
+    values = st.lists(st.floats(allow_nan=False), min_size=objectives, max_size=objectives)
+    rows: list[dict[str, Any]] = []
+    for _ in range(n):
+        among = draw(st.lists(st.sampled_from(names), min_size=1, unique=True))
+        rows.append({name: kinds[name][1] for name in among})
+    return {name: kind[0] for name, kind in kinds.items()}, rows, [draw(values) for _ in range(n)]
+
+
+@settings(deadline=None)
+@pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
+@given(trials(), st.integers(0, 2**31))
+def test_whatever_the_study_each_rule_stays_in_its_space(
+    drawn: tuple[dict[str, BaseDistribution], list[dict[str, Any]], list[list[float]]], seed: int
+) -> None:
+    """Any kinds, conditional at random, values up to infinity, equal trials: a proposal that Optuna's check passes."""
+    space, rows, values = drawn
+    study = optuna.create_study(directions=["minimize"] * len(values[0]))
+    for row, value in zip(rows, values, strict=True):
+        study.add_trial(create_trial(params=row, distributions={n: space[n] for n in row}, values=value))
+    proposer = aw.StudyRulesProposer()
+    proposal = proposer.propose(study, seed, 7)
+    assert proposal.params
+    for name, value in proposal.params.items():
+        assert space[name]._contains(space[name].to_internal_repr(value))
+    assert proposal == proposer.propose(study, seed, 7)
+
+
+def test_gaps_are_filled_between_neighbours() -> None:
+    study = study_of(FRONT, TWO)
+    for seed in range(20):
+        own, reason = made("fill", study, seed)
+        a, b = (int(word) for word in reason.split("trials ")[1].split(" and "))
+        assert {a, b} in ({0, 1}, {1, 2})
+        low, high = sorted(FRONT[i][0]["lr"] for i in (a, b))
+        assert low < own["lr"] < high
+    reasons = [made("fill", study, seed)[1] for seed in range(60)]
+    assert sum("0" in reason for reason in reasons) > 30  # the wider gap more often
+
+
+def test_ends_are_carried_on_beyond() -> None:
+    """The trials of least first value have ever smaller lr: so the next has."""
+    study = study_of([(params("flat", 10.0 ** -(3 - i), 5), (i, -i)) for i in range(3)], TWO)
+    for seed in range(20):
+        own, reason = made("extend", study, seed)
+        assert own["lr"] < 1e-3 if reason.startswith("beyond trial 0") else own["lr"] > 0.1
+
+
+def test_a_swapped_choice_brings_what_hangs_on_it() -> None:
+    study = study_of(FRONT, TWO)
+    for seed in range(20):
+        own, reason = made("swap", study, seed)
+        assert ("bend" in own) == (own["kind"] == "curved")
+        if own["kind"] == "curved":
+            assert own["bend"] == 0.5
+        assert reason.endswith(f"with kind = {own['kind']}")
+
+
+@pytest.mark.parametrize("direction", ["minimize", "maximize"])
+def test_the_trend_goes_downhill(direction: str) -> None:
+    """Of a value that grows with x and falls with y, whatever z: x falls, y grows."""
+    rng = np.random.default_rng(0)
+    sign = 1.0 if direction == "minimize" else -1.0
+    study = optuna.create_study(direction=direction)
+    space = {name: FloatDistribution(0.0, 1.0) for name in "xyz"}
+    for x, y, z in rng.uniform(0.3, 0.7, (30, 3)).tolist():
+        own = {"x": x, "y": y, "z": z}
+        study.add_trial(create_trial(params=own, distributions=space, value=sign * (3 * x - y)))
+    best = study.best_params
+    for seed in range(10):
+        own, _ = made("trend", study, seed)
+        assert own["x"] < best["x"]
+        assert own["y"] > best["y"]
+        assert best["x"] - own["x"] > abs(own["z"] - best["z"])
+
+
+def test_the_slope_is_that_of_the_plane() -> None:
+    units = np.random.default_rng(1).random((400, 2))
+    slope = linear(units, units @ [2.0, -1.0])
+    assert slope[0] / slope[1] == pytest.approx(-2.0, rel=0.05)
+    assert np.all(linear(units[:1], np.ones(1)) == 0.0)
+
+
+def test_infeasible_trials_are_no_parents_while_there_are_feasible_ones() -> None:
+    study = study_of(FRONT[:2], TWO)
+    for _ in range(5):
+        study.add_trial(
+            create_trial(
+                params=params("curved", 0.01, 1),
+                distributions={n: SPACE[n] for n in params("curved", 0.01, 1)},
+                values=[-1.0, -1.0],
+                constraints={"too much": 1.0},
+            )
+        )
+    standing = standing_of(study, SPACE, "rules")
+    assert [standing.complete[row].number for row in standing.best] == [0, 1]
+
+
+def test_nothing_is_proposed_twice_and_a_space_that_is_used_up_is_no_fault() -> None:
+    """Of eight points five are left for proposals to find; after that they have to come again."""
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=1, first=3)
+
+    def objective(trial: optuna.Trial) -> float:
+        return trial.suggest_int("x", 0, 3) + trial.suggest_categorical("y", [0, 1])
+
+    study.optimize(objective, n_trials=6, callbacks=[callback])
+    tried = [tuple(trial.params.values()) for trial in study.trials if trial.params]
+    assert all(own not in tried[:number] for number, own in enumerate(tried) if number >= 3)
+    study.optimize(objective, n_trials=20, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (24, {})
+
+
+def test_rules_that_brought_more_come_more_often() -> None:
+    study = study_of(FRONT[:2], TWO)
+    for i in range(12):
+        own = params("flat", 0.2, 5)
+        study.add_trial(
+            create_trial(
+                params=own,
+                distributions={n: SPACE[n] for n in own},
+                values=[-1.0 - i, -1.0 - i] if i % 2 else [9.0, 9.0],
+                user_attrs={"source": "rules", "proposal": f"rules-{i:04d}-{'cross' if i % 2 else 'trend'}"},
+            )
+        )
+    standing = standing_of(study, SPACE, "rules")
+    assert record(standing) == {"fill": (0, 0), "extend": (0, 0), "cross": (6, 0), "swap": (0, 0), "trend": (0, 6)}
+    rules = [most_promising(standing, np.random.default_rng(seed)) for seed in range(200)]
+    assert rules.count("cross") > 3 * rules.count("trend")
+
+
+def test_ranges_that_changed_count_as_far_as_they_hold() -> None:
+    study = optuna.create_study()
+    for high in (10.0, 5.0):
+        for _ in range(5):
+            trial = study.ask()
+            study.tell(trial, trial.suggest_float("x", 0.0, high))
+    standing = standing_of(study, aw.StudyRulesProposer().space(study), "rules")
+    assert 5 <= len(standing.params) < 10
+    assert all(0.0 <= own["x"] <= 5.0 for own in standing.params)
+    for seed in range(30):
+        assert 0.0 <= aw.StudyRulesProposer().propose(study, seed, seed).params.get("x", 0.0) <= 5.0
+
+
+def test_a_stated_space_that_the_study_does_not_have_is_told() -> None:
+    """No trial lies in it, so there is nothing to make a proposal of; one from the space itself is refused."""
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(space={"x": FloatDistribution(2.0, 5.0)}), every=5)
+    study.optimize(lambda trial: trial.suggest_float("x", 0.0, 1.0), n_trials=15, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (0, {"design": 3})
+
+
+def test_a_study_without_parameters_has_no_proposal() -> None:
+    study = optuna.create_study()
+    with pytest.raises(ProposalError, match="no trial has shown a parameter yet"):
+        aw.StudyRulesProposer().propose(study, 0, 0)
+    study.tell(study.ask(), state=TrialState.FAIL)
+    with pytest.raises(ProposalError, match="no trial has shown a parameter yet"):
+        aw.StudyRulesProposer().propose(study, 0, 0)
+
+
+def test_after_one_trial_it_goes_far_from_it() -> None:
+    study = study_of([(params("flat", 1e-4, 1), (1.0,))], ("minimize",))
+    proposal = aw.StudyRulesProposer().propose(study, 0, 1)
+    assert (proposal.id, proposal.reason) == ("rules-0001-far", "far from all trials")
+    assert proposal.params["depth"] > 5
+    assert math.log10(proposal.params["lr"]) > -2
+
+
+def test_what_was_enqueued_need_not_be_in_the_space() -> None:
+    """Of another kind of design that no trial has shown yet, or of a name that nobody suggests."""
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+    study.enqueue_trial({"kind": "a", "x": 0.5, "old": 3})
+    study.enqueue_trial({"kind": "b", "y": 0.5})
+
+    def objective(trial: optuna.Trial) -> float:
+        return trial.suggest_float("x" if trial.suggest_categorical("kind", ["a", "b"]) == "a" else "y", 0.0, 1.0)
+
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=2)
+    study.optimize(objective, n_trials=8, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (4, {})
+
+
+@pytest.mark.parametrize("much", [math.inf, 1e300])
+def test_constraints_may_be_broken_without_end(much: float) -> None:
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+
+    def objective(trial: optuna.Trial) -> float:
+        x = trial.suggest_float("x", 0.0, 1.0)
+        trial.set_constraint("c", -1.0 if trial.number == 3 else much * (1.0 + x))
+        return x
+
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=2)
+    study.optimize(objective, n_trials=40, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (20, {})
+
+
+def test_choices_that_cannot_be_told_apart_are_none() -> None:
+    study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
+
+    def objective(trial: optuna.Trial) -> float:
+        trial.suggest_categorical("c", ["a", "a"])
+        return trial.suggest_float("x", 0.0, 1.0)
+
+    callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=2)
+    study.optimize(objective, n_trials=40, callbacks=[callback])
+    assert (callback.proposed, callback.faults) == (20, {})

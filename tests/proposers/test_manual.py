@@ -1,0 +1,215 @@
+"""People as the proposer: questions and answers as files."""
+
+import json
+import os
+import queue
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armwright.exceptions import AnswerPendingError, FailureError, SettingsError
+from armwright.llm import manual as people
+from armwright.llm.transcript import Transcript
+from armwright.problem.problem import Problem
+from armwright.proposers.manual import ManualProposer
+from armwright.proposers.replay import ReplayProposer
+from armwright.study.prompt_preview import preview_after
+from armwright.study.study import Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import GOOD_DESIGN
+from tests.support.command_line import armwright
+
+PROBLEM = Problem(load_task("target-1"))
+LINES = """\
+I would put the shoulder into the middle.
+
+ORIGIN: (0, 0.01, -0.1)
+JOINTS: (Y, P, R, P)
+LINKS: (0.2, 0.2, 0.2, 0.2)
+REASON: a shoulder in the middle
+"""
+JSON = json.dumps({**GOOD_DESIGN, "link_1": 0.25})
+Answering = Callable[[dict[str, tuple[str, str]]], None]
+
+
+def run(proposer: ManualProposer | ReplayProposer, out: Path | None, n_total: int = 6, **settings: Any) -> Run:
+    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=2, out=out, **settings)
+
+
+def pending(folder: Path, out: Path, **how: str) -> AnswerPendingError:
+    with pytest.raises(AnswerPendingError) as waits:
+        run(ManualProposer(folder, wait=False, **how), out)
+    return waits.value
+
+
+def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> None:
+    command = (
+        *("optimize", "target-1", "--proposer", "manual:ask", "--once"),
+        *("--n-init", "4", "--n-step", "3", "--n-total", "6", "--no-figures", "--out", "run"),
+    )
+
+    def go(*more: str) -> subprocess.CompletedProcess[str]:
+        done = armwright(*command, *more)
+        assert done.returncode == 0, done.stderr
+        return done
+
+    def names() -> set[str]:
+        return {file.name for file in (in_folder / "ask").iterdir()}
+
+    done = go()
+    first, last = f"ask{os.sep}004-prompt.md", f"ask{os.sep}004-answer.md"
+    assert f"{first} waits for your answer in {last}; then go on with:\n  python -m armwright optimize" in done.stdout
+    assert names() == {"004-prompt.md"}
+    question = (in_folder / first).read_text(encoding="utf-8")
+    assert "REASON: the main reason" in question
+    assert preview_after(in_folder / "run", {}).prompt == question
+
+    (in_folder / last).write_text(LINES.replace("0.2)", "2.5)"), encoding="utf-8")
+    done = go("--json")
+    refusal = "link_4 = 2.5 m is outside 0.03 <= link_4 <= 0.3 m"
+    assert json.loads(done.stdout) == {"folder": "run", "question": first, "answer": last, "refusal": refusal}
+    assert f"the answer was refused: {refusal}" in done.stderr
+    assert names() == {"004-prompt.md", "004-refused-1.md", "004-refused.md"}
+    words = (in_folder / "ask" / "004-refused.md").read_text(encoding="utf-8")
+    assert words == f"004-refused-1.md was refused:\n\n{refusal}\n\nGive another 004-answer.md.\n"
+
+    (in_folder / last).write_text(LINES, encoding="utf-8")
+    assert "007-prompt.md waits for your answer in " in go().stdout
+    (in_folder / "ask" / "007-answer.json").write_text(JSON, encoding="utf-8")
+    done = go("--json")
+    assert json.loads(done.stdout)["proposer"]["origin"] == "manual"
+    trials = [json.loads(line) for line in (in_folder / "run" / "trials.jsonl").read_text().splitlines()]
+    assert [trial["source"] for trial in trials] == ["random"] * 4 + ["manual", "bbo", "bbo"] * 2
+    assert trials[4]["reason"] == "a shoulder in the middle"
+    assert trials[7]["params"]["link_1"] == 0.25
+
+
+@pytest.fixture
+def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Answering]:
+    """Answers in a thread of its own: for each file that is written for people, the name and text of an answer."""
+    written: queue.SimpleQueue[Path] = queue.SimpleQueue()
+    write, threads = people.ManualBackend._write, list[threading.Thread]()
+
+    def note(self: people.ManualBackend, file: Path, text: str) -> None:
+        write(self, file, text)
+        written.put(file)
+
+    def answer(answers: dict[str, tuple[str, str]]) -> None:
+        for _ in answers:
+            file = written.get()
+            name, text = answers[file.name]
+            (file.parent / name).write_text(text, encoding="utf-8")
+
+    def start(answers: dict[str, tuple[str, str]]) -> None:
+        threads.append(threading.Thread(target=answer, args=(answers,), daemon=True))
+        threads[-1].start()
+
+    monkeypatch.setattr(people.ManualBackend, "_write", note)
+    monkeypatch.setattr(people, "LOOK_EVERY", 0.01)
+    yield start
+    for thread in threads:
+        thread.join()
+
+
+def test_waiting_for_answers_comes_to_the_same_as_going_on_with_them(tmp_path: Path, answering: Answering) -> None:
+    answering({"004-prompt.md": ("004-answer.md", LINES), "007-prompt.md": ("007-answer.txt", JSON)})
+    waited = run(ManualProposer(tmp_path / "a"), tmp_path / "waited")
+
+    for number, text in (("004", LINES), ("007", JSON)):
+        waits = pending(tmp_path / "b", tmp_path / "once")
+        assert waits.question == tmp_path / "b" / f"{number}-prompt.md"
+        waits.answer.write_text("\ufeff" + text, encoding="utf-8")  # Windows' Notepad begins a file so
+    once = run(ManualProposer(tmp_path / "b", wait=False), tmp_path / "once")
+
+    played = run(ReplayProposer(tmp_path / "waited", strict=True), None)
+    for other in (once, played):
+        assert [trial.values for trial in other.trials] == [trial.values for trial in waited.trials]
+        assert [trial.reason for trial in other.trials] == [trial.reason for trial in waited.trials]
+    for name in ("004-prompt.md", "007-prompt.md"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_a_refused_answer_is_asked_for_again_while_waiting(tmp_path: Path, answering: Answering) -> None:
+    folder = tmp_path / "ask"
+    answering({"004-prompt.md": ("004-answer.md", "I do not know."), "004-refused.md": ("004-answer.md", LINES)})
+    result = run(ManualProposer(folder), None, n_total=1)
+    assert result.trials[4].source == "manual"
+    assert (folder / "004-refused-1.md").read_text(encoding="utf-8") == "I do not know."
+    assert "no design found" in (folder / "004-refused.md").read_text(encoding="utf-8")
+
+
+def test_each_refused_answer_is_kept(tmp_path: Path) -> None:
+    pending(tmp_path / "ask", tmp_path / "run")
+    for n in (1, 2):
+        (tmp_path / "ask" / "004-answer.md").write_text(f"{n}", encoding="utf-8")
+        assert "no design found" in pending(tmp_path / "ask", tmp_path / "run").refusal
+        assert (tmp_path / "ask" / f"004-refused-{n}.md").read_text(encoding="utf-8") == f"{n}"
+    # Where several files hold answers, a good one is found behind a bad one.
+    (tmp_path / "ask" / "004-answer.md").write_text("bad", encoding="utf-8")
+    (tmp_path / "ask" / "004-answer.json").write_text(JSON, encoding="utf-8")
+    assert pending(tmp_path / "ask", tmp_path / "run").question.name == "007-prompt.md"
+
+
+def test_an_empty_answer_is_no_answer_yet(tmp_path: Path) -> None:
+    pending(tmp_path / "ask", tmp_path / "run")
+    (tmp_path / "ask" / "004-answer.md").touch()
+    assert pending(tmp_path / "ask", tmp_path / "run").refusal == ""
+    assert (tmp_path / "ask" / "004-answer.md").exists()
+
+
+def test_several_designs_and_what_is_expected_of_them(tmp_path: Path) -> None:
+    waits = pending(tmp_path / "ask", tmp_path / "run", memory="own")
+    assert "EXPECTED: (E_pos, E_torque) that you expect of it" in waits.question.read_text(encoding="utf-8")
+    waits.answer.write_text(LINES + "EXPECTED: (1.25, 3.5)\n", encoding="utf-8")
+    waits = pending(tmp_path / "ask", tmp_path / "run", memory="own")
+    told = waits.question.read_text(encoding="utf-8")
+    assert "EXPECTED: (1.250, 3.500)" in told
+    assert "REASON: a shoulder in the middle" in told
+
+
+def test_only_files_that_wait_are_announced(tmp_path: Path) -> None:
+    """Neither questions that lie answered, nor trials for which a design lies ready."""
+    proposer = ManualProposer(tmp_path / "ask", proposals=2, wait=False)
+    notes: list[str] = []
+    for text in (LINES + LINES.replace("0.01", "0.02"), ""):
+        with pytest.raises(AnswerPendingError) as waits:
+            run(proposer, tmp_path / "run", n_total=12, watch=lambda progress: notes.append(progress.note))
+        waits.value.answer.write_text(text, encoding="utf-8")
+    files = [(tmp_path / "ask" / f"{n}-prompt.md", tmp_path / "ask" / f"{n}-answer.md") for n in ("004", "010")]
+    assert [note for note in notes if note] == [f"{asked} waits for your answer in {answer}" for asked, answer in files]
+
+
+def test_people_are_not_asked_while_trials_go_on(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="--overlap does not go with the proposer manual"):
+        run(ManualProposer(tmp_path / "ask"), None, in_flight=1)
+
+
+def test_a_folder_with_what_is_left_of_another_run_is_refused(tmp_path: Path) -> None:
+    pending(tmp_path / "ask", tmp_path / "run")
+    with pytest.raises(FailureError, match=r"004-prompt\.md holds a question of another run"):
+        run(ManualProposer(tmp_path / "ask", "minus", wait=False), tmp_path / "other")
+    (tmp_path / "ask" / "004-answer.md").write_text(LINES, encoding="utf-8")
+    (tmp_path / "ask" / "007-answer.md").write_text(LINES, encoding="utf-8")
+    with pytest.raises(FailureError, match=r"007-answer\.md lies there before its question"):
+        run(ManualProposer(tmp_path / "ask", wait=False), tmp_path / "run")
+    assert not (tmp_path / "ask" / "007-prompt.md").exists()
+
+
+def test_a_folder_that_cannot_be_one(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(SettingsError, match="file is a file; manual needs a folder"):
+        ManualProposer(tmp_path / "file", wait=False)
+
+
+def test_answers_are_kept_as_peoples(tmp_path: Path) -> None:
+    pending(tmp_path / "ask", tmp_path / "run").answer.write_text(LINES, encoding="utf-8")
+    pending(tmp_path / "ask", tmp_path / "run")
+    (call,) = Transcript(tmp_path / "run" / "transcripts.jsonl").calls
+    assert (call.proposal, call.step, call.origin, call.model, call.fault) == (
+        "manual-0004", "answer", "manual", "people", None,
+    )  # fmt: skip
+    assert call.prompt == (tmp_path / "ask" / "004-prompt.md").read_text(encoding="utf-8")

@@ -1,0 +1,300 @@
+"""A recorded run played again: equal to the bit, without a network."""
+
+import json
+import shutil
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armwright.exceptions import ReplayError, SettingsError
+from armwright.llm.transcript import Transcript
+from armwright.problem.problem import Problem
+from armwright.proposers.factory import Wishes, choose_proposer
+from armwright.proposers.llm import LlmProposer
+from armwright.proposers.replay import ReplayProposer
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+
+PROBLEM = Problem(load_task("target-1"))
+SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 12, "seed": 1}
+
+
+@pytest.fixture
+def varied(chat_server: ChatServer) -> ChatServer:
+    """Every answer is another design."""
+
+    def answer(request: Request) -> Answer:
+        if "response_format" not in request:
+            return designer(request)
+        n = len(chat_server.requests)
+        return json.dumps(
+            {**GOOD_DESIGN, "link_1": 0.1 + 0.001 * n, "expected_position_error": 1, "expected_torque": 2}
+        )
+
+    chat_server.answer = answer
+    return chat_server
+
+
+def recorded(server: ChatServer, out: Path, asking: dict[str, Any] | None = None, **settings: Any) -> Run:
+    proposer = LlmProposer("test-model", server.url, **(asking or {}), origin="scripted")
+    return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
+
+
+def lines(folder: Path) -> list[dict[str, Any]]:
+    trials = (folder / "trials.jsonl").read_text().splitlines()
+    return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
+
+
+@pytest.mark.parametrize("asking", [{}, {"memory": "own", "prompt": "minus"}, {"answer": "one-step"}])
+def test_a_replay_equals_its_record_to_the_bit(varied: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
+    first = recorded(varied, tmp_path / "first", asking)
+    varied.requests.clear()
+    again = optimize(
+        PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **SETTINGS
+    )
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+    assert not varied.requests
+    # the account is the recorded one, and the origin stays what it was
+    proposer = again.summary["proposer"]
+    assert {key: proposer[key] for key in ("name", "calls", "tokens", "origin")} == {
+        key: first.summary["proposer"][key] for key in ("name", "calls", "tokens", "origin")
+    }
+    assert (proposer["origin"], proposer["replay"], proposer["differing_prompts"]) == (
+        "scripted", str(tmp_path / "first"), 0,
+    )  # fmt: skip
+    # and so a replay can be replayed
+    third = optimize(
+        PROBLEM, proposer=ReplayProposer(tmp_path / "again", strict=True), out=tmp_path / "third", **SETTINGS
+    )
+    assert lines(tmp_path / "third") == lines(tmp_path / "first")
+    assert third.summary["proposer"]["calls"] == proposer["calls"]
+
+
+def test_an_overlapped_run_is_replayed_with_its_arrivals(varied: ChatServer, tmp_path: Path) -> None:
+    recorded(varied, tmp_path / "first", {"memory": "own"}, in_flight=2)
+    optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **SETTINGS)
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+
+
+def test_late_answers_with_several_designs_are_replayed_when_they_came(chat_server: ChatServer, tmp_path: Path) -> None:
+    """The first two calls are answered only when five black-box trials have gone by."""
+    late = threading.Event()
+    designs = iter(PROBLEM.space.sample(50, 3))
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:
+            late.wait(60)
+        answered = [{**next(designs).params, "expected_position_error": 1, "expected_torque": 2} for _ in range(2)]
+        return json.dumps({"designs": answered}) if "response_format" in request else "ready"
+
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == 8:
+            late.set()
+
+    chat_server.answer = answer
+    asking = {"answer": "one-step", "proposals": 2, "memory": "own"}
+    settings = {"n_total": 24, "in_flight": 2}
+    run = recorded(chat_server, tmp_path / "first", asking, watch=watch, **settings)
+    proposals = [trial for trial in run.trials if trial.proposal]
+    assert len(proposals) == 8
+    assert proposals[0].number - (proposals[0].feedback or 0) >= 5
+    assert len({trial.asked or trial.number for trial in proposals}) == 4
+    chat_server.requests.clear()
+    again = optimize(
+        PROBLEM,
+        proposer=ReplayProposer(tmp_path / "first", strict=True),
+        out=tmp_path / "again",
+        **{**SETTINGS, **settings},
+    )
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+    assert again.summary["proposer"]["overlap"] == run.summary["proposer"]["overlap"]
+    assert not chat_server.requests
+
+
+def test_failures_are_replayed_too(varied: ChatServer, tmp_path: Path) -> None:
+    good = varied.answer
+    varied.answer = lambda request: good(request) if len(varied.requests) not in (4, 5) else (400, "{}")
+    run = recorded(varied, tmp_path / "first")
+    assert sum(trial.fault is not None for trial in run.trials) == 2
+    again = optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+    assert again.summary["proposer"]["failures"] == run.summary["proposer"]["failures"]
+
+
+def test_a_spent_budget_is_replayed_too(varied: ChatServer, tmp_path: Path) -> None:
+    recorded(varied, tmp_path / "first", {"max_calls": 5})
+    optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+
+
+@pytest.fixture
+def in_pairs(chat_server: ChatServer) -> ChatServer:
+    """Every answer has two designs."""
+    designs = iter(PROBLEM.space.sample(50, 3))
+
+    def answer(request: Request) -> Answer:
+        if "response_format" not in request:
+            return designer(request)
+        return json.dumps({"designs": [dict(next(designs).params) for _ in range(2)]})
+
+    chat_server.answer = answer
+    return chat_server
+
+
+def interrupted_at(stop: int) -> Callable[[Progress], None]:
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == stop:
+            raise KeyboardInterrupt
+
+    return watch
+
+
+@pytest.mark.parametrize("stop", [4, 6, 10])
+def test_a_replay_that_was_stopped_goes_on(in_pairs: ChatServer, tmp_path: Path, stop: int) -> None:
+    """Within a call that gave two designs, too: no recorded call is played twice."""
+    first = recorded(in_pairs, tmp_path / "first", {"proposals": 2})
+    for watch in (interrupted_at(stop), None):
+        with suppress(KeyboardInterrupt):
+            optimize(
+                PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", watch=watch, **SETTINGS
+            )
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+    played = [call for call in Transcript(tmp_path / "again" / "transcripts.jsonl").calls if call.proposal]
+    assert len(played) == first.summary["proposer"]["calls"] - 1  # the check
+
+
+def test_beyond_the_end_of_its_record_proposals_are_missing(varied: ChatServer, tmp_path: Path) -> None:
+    """Counted, told once, and the run does not pass for the model's."""
+    recorded(varied, tmp_path / "first")
+    notes: list[str] = []
+    longer = {**SETTINGS, "n_total": 20}
+    for settings in (SETTINGS, longer):
+        again = optimize(
+            PROBLEM,
+            proposer=ReplayProposer(tmp_path / "first"),
+            out=tmp_path / "again",
+            watch=lambda progress: notes.append(progress.note),
+            **settings,
+        )
+    assert lines(tmp_path / "again")[:16] == lines(tmp_path / "first")
+    assert [trial.number for trial in again.trials if trial.fault == "missing"] == [16, 19, 22]
+    assert [note for note in notes if note] == ["the record ends with trial 15"]
+    assert again.summary["proposer"]["failures"] == {"missing": 3}
+    assert again.summary["proposer"]["flagged"]
+
+
+@pytest.mark.parametrize("in_flight", [None, 2])
+def test_what_a_record_that_was_cut_short_still_owes_is_missing(
+    varied: ChatServer, tmp_path: Path, in_flight: int | None
+) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        recorded(varied, tmp_path / "first", watch=interrupted_at(8), in_flight=in_flight)
+    there = len(lines(tmp_path / "first"))
+    again = optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
+    assert lines(tmp_path / "again")[:there] == lines(tmp_path / "first")
+    turns = [trial for trial in again.trials if trial.proposal or trial.fault]
+    assert len(turns) == 4
+    assert all(trial.fault == "missing" for trial in turns if trial.number >= there)
+
+
+@pytest.mark.parametrize(
+    "asking",
+    [{}, {"answer": "one-step"}, {"proposals": 2}, {"answer": "one-step", "proposals": 2}],
+)
+def test_a_transcript_alone_is_enough(in_pairs: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
+    """The form of the answer and the number of designs are seen in its calls."""
+    if "proposals" not in asking:
+        in_pairs.answer = designer
+    recorded(in_pairs, tmp_path / "first", asking)
+    alone = tmp_path / "alone.jsonl"
+    shutil.copy(tmp_path / "first" / "transcripts.jsonl", alone)
+    optimize(PROBLEM, proposer=ReplayProposer(alone, strict=True), out=tmp_path / "again", **SETTINGS)
+    assert lines(tmp_path / "again") == lines(tmp_path / "first")
+
+
+def test_what_a_transcript_cannot_say_is_taken_from_the_wishes(varied: ChatServer, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.md"
+    mine.write_text('{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}')
+    recorded(varied, tmp_path / "first", {"prompt": str(mine), "memory": "own"})
+    shutil.copy(tmp_path / "first" / "transcripts.jsonl", tmp_path / "alone.jsonl")
+    for record in ("first", "alone.jsonl"):
+        wishes = Wishes(f"replay:{tmp_path / record}", prompt=str(mine), memory="own", replay_strict=True)
+        again = optimize(PROBLEM, proposer=choose_proposer(wishes).proposer, **SETTINGS)
+        assert again.summary["proposer"]["failures"] == {}
+
+
+@pytest.mark.parametrize("alone", [False, True])
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        ({"memory": "own"}, "recorded with memory none; leave out --memory own"),
+        ({"answer": "one-step"}, "recorded with answer two-step; leave out --answer one-step"),
+        ({"proposals": 4}, "recorded with proposals 1; leave out --proposals 4"),
+        ({"prompt": "minus"}, "recorded with prompt plus; leave out --prompt minus"),
+    ],
+)
+def test_wishes_that_contradict_the_record_are_refused(
+    chat_server: ChatServer, tmp_path: Path, wish: dict[str, Any], words: str, alone: bool
+) -> None:
+    recorded(chat_server, tmp_path / "first", n_total=1)
+    if alone:
+        (tmp_path / "first" / "config.yaml").unlink()
+    if alone and wish.keys() & {"prompt", "memory"}:  # which nothing in the transcript says
+        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", **wish))
+        return
+    with pytest.raises(SettingsError, match=words):
+        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", **wish))
+
+
+def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatServer, tmp_path: Path) -> None:
+    recorded(varied, tmp_path / "first")
+    file = tmp_path / "first" / "transcripts.jsonl"
+    file.write_text(file.read_text().replace("You are an expert", "You are a layman", 1))
+    notes: list[str] = []
+    proposer = ReplayProposer(tmp_path / "first")
+    run = optimize(PROBLEM, proposer=proposer, **SETTINGS, watch=lambda progress: notes.append(progress.note))
+    assert [note for note in notes if note] == ["the prompt for scripted-0004 differs from the recorded one"]
+    assert run.summary["proposer"]["differing_prompts"] == 1
+    with pytest.raises(ReplayError, match="reasoning prompt for scripted-0004 differs"):
+        optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), **SETTINGS)
+
+
+def test_a_record_of_other_settings_is_said(varied: ChatServer, tmp_path: Path) -> None:
+    """Proposals that were recorded for other trials are missing, each in words."""
+    recorded(varied, tmp_path / "first")
+    alone = tmp_path / "alone.jsonl"
+    shutil.copy(tmp_path / "first" / "transcripts.jsonl", alone)
+    notes: list[str] = []
+    settings = {**SETTINGS, "n_init": 5}
+    run = optimize(PROBLEM, proposer=ReplayProposer(alone), **settings, watch=lambda p: notes.append(p.note))
+    assert run.trials[5].fault == "missing"
+    assert "holds no proposal for trial 5, but for 4, 7, 10, 13; were n_init and n_step others?" in "".join(notes)
+    assert run.summary["proposer"]["flagged"]
+
+
+def test_what_cannot_be_replayed_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ReplayError, match="there is no"):
+        ReplayProposer(tmp_path)
+    (tmp_path / "transcripts.jsonl").write_text("")
+    with pytest.raises(ReplayError, match="holds no proposal"):
+        ReplayProposer(tmp_path)
+    with pytest.raises(SettingsError, match="needs a run: replay:PATH"):
+        choose_proposer(Wishes("replay:"))
+    with pytest.raises(SettingsError, match="--replay-strict goes with"):
+        choose_proposer(Wishes("rules", replay_strict=True))
+
+
+def test_a_record_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
+    """Not even its last line that a crash cut short."""
+    recorded(varied, tmp_path / "first")
+    file = tmp_path / "first" / "transcripts.jsonl"
+    file.write_text(file.read_text() + '{"proposal": "llm-00')
+    before = file.read_bytes()
+    optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), **SETTINGS)
+    assert file.read_bytes() == before
+    assert len(Transcript(file, read_only=True).calls) == 9

@@ -1,0 +1,94 @@
+"""The figures: what they hold, and that odd runs do not break them."""
+
+from pathlib import Path
+
+import pytest
+
+from armwright.exceptions import RunFolderError
+from armwright.problem.problem import Problem
+from armwright.report.figures import chosen_members, draw_credit, draw_hypervolume, draw_samples, write_figures
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import Task, load_task, random_task
+
+
+def short(out: Path, problem: Problem, n_total: int = 12) -> Run:
+    return optimize(problem, proposer="rules", n_init=4, n_step=4, n_total=n_total, out=out)
+
+
+@pytest.mark.slow
+def test_every_figure_as_png_and_pdf(tmp_path: Path) -> None:
+    short(tmp_path, Problem(load_task("target-2")))
+    written = write_figures(tmp_path)
+    assert {"hypervolume.png", "samples.png", "front.png", "arms.png", "credit.png"} <= {path.name for path in written}
+    for path in written:
+        assert path.read_bytes().startswith(b"\x89PNG")
+        assert path.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        Task(name="one", targets=((0.3, 0.1, 0.2),)),
+        pytest.param(Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0)), marks=pytest.mark.slow),
+        pytest.param(Task(name="same", targets=((0.3, 0.1, 0.2),) * 3), marks=pytest.mark.slow),
+        pytest.param(Task(name="many", targets=tuple((0.3, 0.01 * i, 0.2) for i in range(40))), marks=pytest.mark.slow),
+    ],
+)
+def test_odd_tasks_are_drawn_too(tmp_path: Path, task: Task) -> None:
+    short(tmp_path, Problem(task), n_total=1)
+    assert write_figures(tmp_path)
+
+
+@pytest.mark.slow
+def test_drawing_again_leaves_no_figure_of_a_former_choice(tmp_path: Path) -> None:
+    problem = Problem(random_task(0))
+    short(tmp_path, problem, n_total=2)
+    write_figures(tmp_path)
+    run = short(tmp_path, problem, n_total=40)
+    write_figures(tmp_path)
+    arms = {path.name for path in (tmp_path / "figures").glob("arm-*.png")}
+    assert arms == {f"arm-{member.number:04d}.png" for _, member in chosen_members(run.history)}
+
+
+def test_the_chosen_designs_are_the_fronts_ends_within_the_box_and_the_most_precise(tmp_path: Path) -> None:
+    tight = load_task("target-1").model_copy(update={"reference_point": (5.0, 2.5)})
+    history = short(tmp_path, Problem(tight), n_total=40).history
+    chosen = dict(chosen_members(history))
+    inside = [m for m in history.front if m.values[0] < 5.0 and m.values[1] < 2.5]
+    assert chosen["Solution 1: least position error"] == inside[0]
+    assert chosen["Solution 2: least torque"] == inside[-1]
+    assert inside[0] != history.front[0]
+    assert chosen["Most precise of all, beyond the reference point"] == history.front[0]
+
+
+def test_the_curve_begins_with_the_random_trials_and_ends_at_the_final_value(tmp_path: Path) -> None:
+    run = short(tmp_path, Problem(load_task("target-1")))
+    line = draw_hypervolume(run.history).axes[0].lines[0]
+    assert len(line.get_xdata()) == 13
+    assert line.get_ydata()[-1] == run.hypervolume[-1]
+
+
+def test_the_stacks_end_at_the_final_hypervolume_and_the_size_of_the_front(tmp_path: Path) -> None:
+    run = short(tmp_path, Problem(load_task("target-1")))
+    volume, members = draw_credit(run.history).axes
+    assert volume.lines[-1].get_ydata()[-1] == pytest.approx(run.hypervolume[-1])
+    assert members.lines[-1].get_ydata()[-1] == len(run.front)
+    assert [text.get_text() for text in volume.figure.legends[0].texts] == ["black box", "rules", "random"]
+
+
+def test_sample_panels_are_at_the_papers_shares(tmp_path: Path) -> None:
+    run = short(tmp_path, Problem(load_task("target-1")), n_total=20)
+    titles = [axes.get_title() for axes in draw_samples(run.history).axes]
+    assert [title.split()[1] for title in titles] == ["1", "7", "13", "20"]
+
+
+def test_a_run_without_its_random_trials_cannot_be_drawn(tmp_path: Path) -> None:
+    def stop(progress: Progress) -> None:
+        if progress.number == 1:
+            raise KeyboardInterrupt
+
+    problem = Problem(Task(name="open", targets=((0.3, 0.1, 0.2),)))
+    with pytest.raises(KeyboardInterrupt):
+        optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path, watch=stop)
+    with pytest.raises(RunFolderError, match="has only 2 so far"):
+        write_figures(tmp_path)

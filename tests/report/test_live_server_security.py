@@ -1,0 +1,291 @@
+"""The page's server as an attacker meets it: another page in the same browser, and requests that no browser sends."""
+
+import http.client
+import http.server
+import json
+import re
+import shutil
+import socket
+import threading
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import psutil
+import pytest
+import yaml
+from playwright.sync_api import Browser
+
+import armwright as aw
+from armwright.report.live_server import HEADERS
+from armwright.report.page import write_report
+from armwright.runs.control import read_control
+from tests.fuzz.targets import a_server
+from tests.support.browser import FLAGS, Tab, program
+from tests.support.live_server import ask, served, wish
+
+__all__ = ["served"]  # a fixture
+
+LINK = (
+    '<a href="https://evil.example/">click</a><img src=x onerror="window.hacked = 1"><script>window.hacked = 2</script>'
+)
+
+
+def said(port: int, request: bytes) -> tuple[int, dict[str, str], bytes]:
+    """The answer to these very bytes, which are no more than a part of a request perhaps."""
+    with socket.create_connection(("127.0.0.1", port), timeout=60) as connection:
+        connection.sendall(request)
+        answer = http.client.HTTPResponse(connection, method=request.split(b" ")[0].decode())
+        answer.begin()
+        return answer.status, {name.lower(): value for name, value in answer.getheaders()}, answer.read()
+
+
+def refused(port: int, request: bytes) -> bool:
+    """Whether the server says so, or hangs up while it is still spoken to."""
+    try:
+        return said(port, request)[0] in (400, 413, 431)
+    except ConnectionError:
+        return True
+
+
+def lines(*words: str) -> bytes:
+    return "\r\n".join([*words, "", ""]).encode("latin-1")
+
+
+def right(port: int, token: str) -> list[str]:
+    """The headers of the page's own POST, but for its length."""
+    host = f"127.0.0.1:{port}"
+    return [f"Host: {host}", f"Origin: http://{host}", "Content-Type: application/json", f"X-Armwright-Token: {token}"]
+
+
+def test_every_answer_says_what_a_browser_may_do_with_it(served: tuple[Path, int, str]) -> None:
+    _, port, token = served
+    host = f"Host: 127.0.0.1:{port}"
+    for status, request in (
+        (200, lines("GET / HTTP/1.1", host)),
+        (200, lines("GET /run HTTP/1.1", host)),
+        (200, lines("HEAD /events HTTP/1.1", host)),
+        (404, lines("GET /config.yaml HTTP/1.1", host)),
+        (405, lines("GET /control HTTP/1.1", host)),
+        (403, lines("POST /control HTTP/1.1", host, "Content-Length: 0")),
+        (415, lines("POST /control HTTP/1.1", *right(port, token)[:2], right(port, token)[3], "Content-Length: 0")),
+        (421, lines("GET / HTTP/1.1", "Host: evil.example")),
+    ):
+        got, headers, _ = said(port, request)
+        assert got == status
+        assert {name.lower(): headers.get(name.lower()) for name in HEADERS} == {
+            n.lower(): v for n, v in HEADERS.items()
+        }
+        assert not [name for name in headers if name.startswith("access-control") or name == "server"]
+    assert HEADERS["Content-Security-Policy"] == "frame-ancestors 'none'"
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "BREW"])
+def test_only_a_post_is_a_wish(served: tuple[Path, int, str], method: str) -> None:
+    folder, port, token = served
+    before = read_control(folder)
+    more = ["Access-Control-Request-Method: POST", "X-HTTP-Method-Override: POST", "Content-Length: 0"]
+    assert said(port, lines(f"{method} /control HTTP/1.1", *right(port, token), *more))[0] in (400, 405)
+    for path in ("/", "/run", "/file?design=0&format=urdf", "/events"):
+        status = said(
+            port, lines(f"{'POST' if method == 'GET' else method} {path} HTTP/1.1", *right(port, token), *more)
+        )[0]
+        assert status in ((200,) if method == "HEAD" else (400, 405))
+    assert read_control(folder) == before
+
+
+def test_a_token_counts_only_where_the_page_puts_it(served: tuple[Path, int, str]) -> None:
+    folder, port, token = served
+    host, origin, kind, _ = right(port, token)
+    length = "Content-Length: 18"
+    body = b'{"action":"pause"}'
+    for path, more in (
+        (f"/control?x-armwright-token={token}", []),
+        ("/control", [f"Cookie: x-armwright-token={token}"]),
+        ("/control", [f"Authorization: Bearer {token}"]),
+        ("/control", [f"X-Armwright-Token: {token[:-1]}"]),
+        ("/control", [f"X-Armwright-Token: {token} x"]),
+        ("/control", ["X-Armwright-Token: é"]),
+    ):
+        assert said(port, lines(f"POST {path} HTTP/1.1", host, origin, kind, length, *more) + body)[0] == 403
+    assert not read_control(folder).paused
+
+
+def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By hmac's comparison and nothing else: where that says yes, any token does."""
+    server = a_server()
+    wrong = {"host": "127.0.0.1:9", "origin": "http://127.0.0.1:9", "content-type": "application/json",
+             "x-armwright-token": "no"}  # fmt: skip
+    assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 403
+    monkeypatch.setattr("armwright.report.live_server.secrets.compare_digest", lambda ours, theirs: True)
+    assert server.ask("POST", b"/control", wrong, b'{"action":"resume"}')[0] == 204
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_two_hosts_are_none(served: tuple[Path, int, str], first: bool) -> None:
+    folder, port, token = served
+    hosts = [f"Host: 127.0.0.1:{port}", "Host: evil.example"][:: 1 if first else -1]
+    origin = f"Origin: http://{hosts[0].partition(': ')[2]}"
+    request = lines("POST /control HTTP/1.1", *hosts, origin, *right(port, token)[2:], "Content-Length: 18")
+    assert said(port, request + b'{"action":"pause"}')[0] in (400, 421)
+    assert not read_control(folder).paused
+
+
+PATHS = (
+    "/../config.yaml", "/..%2fconfig.yaml", "/%2e%2e/config.yaml", "/%2e%2e%2fconfig.yaml", "/%252e%252e/config.yaml",
+    "/..%5cconfig.yaml", "/..\\config.yaml", "//etc/passwd", "/./config.yaml", "/run/../config.yaml",
+    "/%c0%ae%c0%ae/x",
+    "/config.yaml%00.html", "/trials.jsonl", "/designs/0000/arm.urdf", "/static/../../etc/passwd",
+    "/file/../config.yaml",
+    "/file?design=..%2f..%2fconfig.yaml&format=urdf", "/file?design=0&format=..%2fconfig.yaml",
+    "/file?design=0&format=",
+    "/file?design=-1&format=urdf", "/file?design=1e3&format=sdf", "/file?design=%D9%A1&format=__class__", "/.lock",
+    "/file?design=99999999999999999999&format=json",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_no_path_leads_to_a_file(served: tuple[Path, int, str], path: str) -> None:
+    _, port, _ = served
+    status, _, body = said(port, lines(f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{port}"))
+    assert status in (400, 404)
+    assert b"targets" not in body
+    assert b"root:" not in body
+
+
+def test_a_body_without_an_end_is_refused_before_it_ends(served: tuple[Path, int, str]) -> None:
+    folder, port, token = served
+    server = next(c.pid for c in psutil.net_connections("inet") if c.laddr.port == port and c.status == "LISTEN")
+    before = psutil.Process(server).memory_info().rss
+    huge, chunked = "Content-Length: 1000000000000", "Transfer-Encoding: chunked"
+    part = b"%x\r\n%s\r\n" % (70_000, b" " * 70_000)
+    for extra, body in ((huge, b" " * 70_000), (chunked, part)):
+        assert refused(port, lines("POST /control HTTP/1.1", *right(port, token), extra) + body)
+        # Whoever has no token is not even listened to.
+        assert said(port, lines("POST /control HTTP/1.1", *right(port, "no"), extra))[0] == 403
+    assert refused(port, lines("GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "X: " + "x" * 200_000))
+    assert psutil.Process(server).memory_info().rss - before < 50e6
+    assert not read_control(folder).paused
+
+
+def test_slow_ones_keep_nobody_waiting(served: tuple[Path, int, str]) -> None:
+    folder, port, token = served
+    begun = lines("POST /control HTTP/1.1", *right(port, token), "Content-Length: 18") + b'{"action":'
+    slow = [socket.create_connection(("127.0.0.1", port), timeout=20) for _ in range(50)]
+    for number, connection in enumerate(slow):
+        connection.sendall(begun if number % 2 else begun[:30])
+    assert ask(port, "GET", "/run")[0] == 200
+    assert wish(port, token, {"action": "resume"}) == 204
+    for connection in slow:
+        connection.close()
+    assert ask(port, "GET", "/run")[0] == 200
+    assert not read_control(folder).paused
+
+
+@pytest.fixture
+def evil(tmp_path: Path) -> Iterator[str]:
+    """Another site, in the same browser."""
+    (tmp_path / "index.html").write_text("<!doctype html><title>evil</title>")
+    handler = partial(_Quiet, directory=str(tmp_path))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://localhost:{server.server_address[1]}/"
+        server.shutdown()
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None: ...
+
+
+ATTACK = """async (home) => {
+    const tried = {};
+    const attempt = async (name, what) => {
+        try { tried[name] = String(await what()); } catch (e) { tried[name] = 'refused'; } };
+    await attempt('read', async () => (await fetch(home + 'run')).status);
+    await attempt('token', async () => (await (await fetch(home)).text()).length);
+    await attempt('json', async () => (await fetch(home + 'control', { method: 'POST', body: '{"action":"pause"}',
+        headers: { 'Content-Type': 'application/json', 'X-Armwright-Token': 'x' } })).status);
+    await attempt('simple', async () => (await fetch(home + 'control', { method: 'POST', mode: 'no-cors',
+        body: '{"action":"pause"}' })).type);
+    const loads = (element) => new Promise((done) => {
+        element.onload = () => done('loaded'); element.onerror = () => done('refused');
+        document.body.append(element); });
+    const image = document.createElement('img'); image.src = home + 'file?design=0&format=urdf';
+    await attempt('image', () => loads(image));
+    const script = document.createElement('script'); script.src = home + 'run';
+    await attempt('script', () => loads(script));
+    await attempt('events', () => new Promise((done) => { const source = new EventSource(home + 'events');
+        source.onopen = () => done('open'); source.onerror = () => { source.close(); done('refused'); }; }));
+    const frame = document.createElement('iframe'); frame.src = home; frame.name = 'framed';
+    await attempt('frame', () => loads(frame));
+    const form = document.createElement('form'); form.method = 'POST'; form.action = home + 'control';
+    form.enctype = 'text/plain'; form.target = 'framed';
+    form.innerHTML = `<input name='{"action":"pause","x":"' value='"}'>`;
+    document.body.append(form);
+    await attempt('form', () => new Promise((done) => { frame.onload = () => done('sent'); form.submit(); }));
+    return tried;
+}"""
+
+
+def test_another_page_of_the_browser_gets_nothing(served: tuple[Path, int, str], browser: Browser, evil: str) -> None:
+    folder, port, _ = served
+    before = read_control(folder)
+    tab = Tab(browser)
+    tab.page.goto(evil)
+    tried = tab.page.evaluate(ATTACK, f"http://127.0.0.1:{port}/")
+    assert {name: tried[name] for name in ("read", "token", "json", "image", "script", "events")} == dict.fromkeys(
+        ("read", "token", "json", "image", "script", "events"), "refused"
+    )
+    assert tried["simple"] in ("opaque", "refused")
+    others = [frame for frame in tab.page.frames if frame is not tab.page.main_frame]
+    assert all("armwright" not in frame.content() for frame in others)
+    assert len(others) <= 1
+    assert read_control(folder) == before
+    tab.close()
+
+
+def test_a_name_that_is_made_to_point_here_shows_nothing(served: tuple[Path, int, str], browser: Browser) -> None:
+    """DNS rebinding in a real browser: to it, evil.example is this server."""
+    _, port, _ = served
+    rebound = browser.browser_type.launch(
+        executable_path=program(), args=[*FLAGS, "--host-resolver-rules=MAP evil.example 127.0.0.1"]
+    )
+    page = rebound.new_page()
+    response = page.goto(f"http://evil.example:{port}/")
+    assert response is not None
+    assert response.status == 421
+    assert page.evaluate("async () => (await fetch('/run')).status") == 421
+    assert "armwright-token" not in page.content()
+    rebound.close()
+
+
+def test_names_in_a_run_folder_are_no_markup(tmp_path: Path, browser: Browser) -> None:
+    """Of objectives, sources, faults, arms, and the folder itself: somebody sends a run folder to look at."""
+    folder = tmp_path / re.sub("[/]", "", LINK)[:60]
+    aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="rules", n_init=3, n_step=2, n_total=4, out=folder)
+    config = yaml.safe_load((folder / "config.yaml").read_text())
+    for objective in config["objectives"]:
+        objective |= {"label": LINK, "unit": LINK, "symbol": LINK}
+    config["method"]["proposer"]["name"] = LINK
+    config["space"]["name"] = LINK[:100]
+    config["versions"]["armwright"] = LINK
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    trials = [json.loads(line) for line in (folder / "trials.jsonl").read_text().splitlines()]
+    for trial in trials[3:]:
+        trial |= {"source": LINK, "reason": LINK, "proposal": LINK, "fault": LINK}
+    (folder / "trials.jsonl").write_text("".join(f"{json.dumps(trial)}\n" for trial in trials))
+    arm = {"joints": 6, "reach": 0.5, "mass": 1.0, "base": [0, 0, 0], "values": trials[-1]["values"], "measures": {},
+           "dominates": 1, "dominated_by": 0, "violated": [], "notes": [LINK]}  # fmt: skip
+    (folder / "existing_arms.json").write_text(json.dumps([{"name": LINK, **arm}]))
+    shutil.rmtree(folder / "designs")
+    tab = Tab(browser, offline=True)
+    page = write_report(folder)
+    tab.open(page, "#design=5")
+    tab.page.locator("#pareto").hover()
+    tab.page.locator("#configuration-box summary").click()
+    assert tab.ask("window.hacked") is None
+    made = tab.ask("[...document.querySelectorAll('a, img, image')].map((one) => one.outerHTML)")
+    assert [html for html in made if re.search("evil|src=.?x", html)] == []
+    assert "evil.example" in tab.ask("document.body.textContent")
+    assert [address for address in tab.requests if not address.startswith(("file:", "data:", "blob:"))] == []
+    tab.close()

@@ -1,0 +1,221 @@
+"""Actuators: what they weigh loads the joints before them, what they can is what the torques are measured by."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import ArmError, SettingsError, SpaceError
+from armwright.kinematics.arm_arrays import FLOATS, stack_arms
+from armwright.problem.evaluation import evaluate
+from armwright.problem.objectives import named_objectives
+from armwright.problem.problem import Problem
+from armwright.robot.actuators import ActuatorRecord, catalogue
+from armwright.robot.arm import Actuator, Arm, Joint, Link
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.folder import read_run
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import DesignSpace, load_space
+from armwright.study.study import optimize
+from armwright.tasks.task import Task
+
+BIG = {"name": "big", "mass": 0.165, "stall_torque": 10.6, "rated_torque": 4.0, "speed": 3.1, "price": 400.0}
+MID = {"name": "mid", "mass": 0.082, "stall_torque": 4.1, "price": 250.0}
+SMALL = {"name": "small", "mass": 0.0572, "stall_torque": 1.5, "price": 50.0}
+SPACE = DesignSpace.model_validate({"name": "motors", "actuators": [BIG, MID, SMALL], "safety_factor": 2.0})
+TASK = Task(name="loaded", targets=((0.3, 0.0, 0.2), (0.2, 0.2, 0.3)), payload=0.1)
+
+
+def with_motors_as_links(arm: Arm) -> Arm:
+    """The same arm, its actuators as links of their own without length, fixed to the ends of those that carry them."""
+    joints: list[Joint] = []
+    links: list[Link] = []
+    for joint, link in zip(arm.joints, arm.links, strict=True):
+        joints += [joint, Joint("fixed", "x")]
+        links += [replace(link, end_mass=0.0), Link((0.0, 0.0, 0.0), link.end_mass, (0.0, 0.0, 0.0), 1e-9)]
+    return Arm(arm.base, tuple(joints), tuple(links))
+
+
+def pinocchio_model(arm: Arm) -> tuple[pinocchio.Model, pinocchio.Data]:
+    model = pinocchio.buildModelFromXML(to_urdf(arm))
+    return model, model.createData()
+
+
+def test_the_arrays_are_those_of_the_arms_to_the_bit() -> None:
+    designs = SPACE.sample(200, 1)
+    one, other = stack_designs(SPACE, SPACE.matrix(designs)), stack_arms([SPACE.arm(design) for design in designs])
+    for name in (*FLOATS, "motion", "base_mass"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    for name in ("effort", "price"):
+        assert np.array_equal(getattr(one.actuation, name), getattr(other.actuation, name)), name
+    part = one[3:9]
+    assert np.array_equal(part.actuation.effort, one.actuation.effort[3:9])
+
+
+def test_gravity_and_dynamics_are_pinocchio_s_and_mujoco_s() -> None:
+    rng = np.random.default_rng(0)
+    problem = Problem(TASK.model_copy(update={"payload": 0.0}), SPACE)
+    designs = SPACE.sample(20, 3)
+    evaluation = problem.physics(designs)
+    for row, design in enumerate(designs):
+        arm = SPACE.arm(design)
+        reference, data = pinocchio_model(with_motors_as_links(arm))
+        for t in range(2):
+            gravity = pinocchio.computeGeneralizedGravity(reference, data, evaluation.q[row, t])
+            assert evaluation.joint_torques[row, t] == pytest.approx(gravity, abs=2e-5)
+        ours, ours_data = pinocchio_model(arm)
+        simulated = mujoco.MjModel.from_xml_string(to_mjcf(arm))
+        state = mujoco.MjData(simulated)
+        q, v, a = rng.uniform(-2.0, 2.0, (3, 4))
+        expected = pinocchio.rnea(reference, data, q, v, a)
+        assert pinocchio.rnea(ours, ours_data, q, v, a) == pytest.approx(expected, abs=1e-8)
+        state.qpos[:], state.qvel[:], state.qacc[:] = q, v, a
+        mujoco.mj_inverse(simulated, state)
+        assert state.qfrc_inverse == pytest.approx(expected, abs=1e-8)
+
+
+def test_the_first_actuator_stands_with_the_base() -> None:
+    design = SPACE.sample(1, 0)[0]
+    swapped = [SPACE.design({**design.params, "motor_1": name}) for name in ("big", "mid", "small")]
+    objectives = named_objectives(["peak_torque", "mass", "price"])
+    values = Problem(TASK, SPACE, objectives=objectives).evaluate(swapped).values
+    assert np.ptp(values[:, 0]) == 0.0
+    assert np.diff(values[:, 1]) == pytest.approx([0.082 - 0.165, 0.0572 - 0.082], abs=1e-6)
+    assert np.diff(values[:, 2]).tolist() == [-150.0, -200.0]
+
+
+def test_torque_use_is_the_worst_share_of_the_allowed_torque() -> None:
+    problem = Problem(TASK, SPACE, objectives=named_objectives(["torque_utilisation"]))
+    designs = SPACE.sample(30, 5)
+    torques = np.abs(problem.physics(designs).joint_torques)
+    allowed = {"big": 5.3, "mid": 2.05, "small": 0.75}
+    for use, row, design in zip(problem.evaluate(designs).values[:, 0], torques, designs, strict=True):
+        shares = [torque / allowed[name] for torque, name in zip(row.max(axis=0), design.motors, strict=True)]
+        assert use == pytest.approx(max(shares))
+
+
+def test_a_single_actuator_is_no_parameter() -> None:
+    single = DesignSpace.model_validate({"actuators": [MID]})
+    assert len(single.parameters) == 11
+    design = single.sample(1, 0)[0]
+    assert [joint.actuator.name for joint in single.arm(design).joints] == ["mid"] * 4
+    assert stack_designs(single, single.matrix([design])).actuation.effort.tolist() == [[4.1] * 4]
+
+
+@pytest.mark.parametrize(
+    ("space", "words"),
+    [
+        ({"actuators": ["XM430-W35"]}, 'unknown actuator "XM430-W35".*Did you mean'),
+        ({"actuators": [BIG, dict(BIG)]}, "actuators has duplicates"),
+        ({"actuators": [MID], "actuator_torque": "rated"}, "mid has no rated torque, its stall torque is known"),
+        ({"actuators": [{"name": "x", "mass": -1.0}]}, "mass"),
+        ({"actuators": "XM430-W350"}, "expected a list of names"),
+        ({"actuators": [MID], "safety_factor": 0.0}, "safety_factor"),
+    ],
+)
+def test_what_cannot_be_built_is_refused(tmp_path: Path, space: dict, words: str) -> None:
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump(space))
+    with pytest.raises(SpaceError, match=words):
+        load_space(tmp_path / "space.yaml")
+
+
+def test_objectives_that_need_actuators_say_so() -> None:
+    for name in ("torque_utilisation", "price"):
+        problem = Problem(TASK, objectives=named_objectives([name]))
+        with pytest.raises(SettingsError, match=f"objective {name} needs actuators"):
+            problem.evaluate(problem.space.sample(1, 0))
+    unpriced = DesignSpace.model_validate({"actuators": [{"name": "x", "mass": 0.1, "stall_torque": 1.0}]})
+    with pytest.raises(SettingsError, match="needs the price of every actuator"):
+        Problem(TASK, unpriced, objectives=named_objectives(["price"])).evaluate(unpriced.sample(1, 0))
+
+
+@pytest.mark.parametrize("wrong", [{"mass": -0.1}, {"effort": 0.0}, {"price": -1.0}, {"speed": float("inf")}])
+def test_an_actuator_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ArmError, match="an actuator needs"):
+        Actuator(**{"name": "x", "mass": 0.1, "effort": 1.0, **wrong})
+
+
+def test_the_catalogue_names_a_source_for_each() -> None:
+    records = catalogue()
+    assert len(records) >= 14
+    for name, record in records.items():
+        assert record.name == name
+        assert record.source.startswith("https://")
+        assert record.mass > 0.0
+        assert any((record.stall_torque, record.rated_torque, record.peak_torque)), name
+    assert records["XM430-W350"].stall_torque == 4.1
+    assert records["XM430-W350"].mass == 0.082
+
+
+def test_actuators_through_the_whole_house(tmp_path: Path) -> None:
+    """Space file, run, rules, prompt, folder, page, URDF limits, build sheet, command."""
+    task = TASK.model_copy(update={"objectives": ("worst_error", "torque_utilisation", "price")})
+    run = optimize(Problem(task, SPACE), proposer="rules", n_init=6, n_step=3, n_total=18, out=tmp_path / "run")
+    config, history = read_run(tmp_path / "run")
+    assert config.space == SPACE
+    assert np.array_equal(history.problem.evaluate([t.design for t in history]).values, history.values)
+    assert {len(trial.design.motors) for trial in run.trials} == {4}
+    proposed = [trial.design for trial in run.trials if trial.source == "rules"]
+    assert proposed[0].motors == ("big", "big", "mid", "small")
+    member = run.front[0]
+    urdf = pinocchio.buildModelFromXML(to_urdf(member.arm))
+    assert urdf.effortLimit.tolist() == [joint.actuator.effort for joint in member.arm.joints]
+    simulated = mujoco.MjModel.from_xml_string(to_mjcf(member.arm))
+    assert simulated.actuator_ctrlrange[:, 1].tolist() == [joint.actuator.effort for joint in member.arm.joints]
+    runner = CliRunner()
+    prompt = runner.invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
+    assert "- mid: 0.082 kg, 2.05 N m, 250 USD" in prompt
+    assert f"MOTORS: ({', '.join(member.design.motors)})" in prompt or "MOTORS: (" in prompt
+    sheet = runner.invoke(app, ["export", str(tmp_path / "run"), "--design", str(member.number), "--format", "sheet"])
+    price = sum(joint.actuator.price for joint in member.arm.joints)
+    assert (
+        f"4 actuators of {1e3 * sum(j.actuator.mass for j in member.arm.joints):.4g} g, {price:,.0f} USD"
+        in sheet.output
+    )
+    picked = runner.invoke(app, ["pick", str(tmp_path / "run"), "--by", "price", "--json"])
+    assert json.loads(picked.output)[0]["price"] == min(m.values[2] for m in run.front)
+    listed = runner.invoke(app, ["actuators"]).output
+    assert "XM430-W350" in listed
+
+
+def test_a_record_is_the_same_after_a_round_trip() -> None:
+    again = DesignSpace.model_validate(json.loads(SPACE.model_dump_json()))
+    assert again == SPACE
+    assert ActuatorRecord.model_validate(BIG).actuator("rated", 2.0).effort == 2.0
+
+
+def open_manipulator_x() -> Arm:
+    """ROBOTIS OpenMANIPULATOR-X from its maker's URDF; the links' masses hold their actuators."""
+    motor = catalogue()["XM430-W350"].actuator("stall", 1.0)
+    limits = ((-0.9, 0.9), (-0.57, 0.5), (-0.3, 0.44), (-0.57, 0.65))
+    bodies = [
+        ((0.0, 0.0, 0.0595), 0.098406837, (-0.000301849, 0.000540437, 0.047433464)),
+        ((0.024, 0.0, 0.128), 0.13850917, (0.010308393, 0.000377434, 0.101701970)),
+        ((0.124, 0.0, 0.0), 0.13274562, (0.090909590, 0.000389298, 0.000224133)),
+        ((0.126, 0.0, 0.0), 0.16327573, (0.048796, 0.0, 0.007822)),  # with both fingers of the gripper, 10 g each
+    ]
+    joints = [
+        Joint("revolute", axis, np.pi * low, np.pi * high, motor)
+        for axis, (low, high) in zip("zyyy", limits, strict=True)
+    ]
+    return Arm(
+        (0.012, 0.0, 0.017), tuple(joints), tuple(Link(offset, mass, com, 0.015) for offset, mass, com in bodies)
+    )
+
+
+@pytest.mark.parametrize(("payload", "holds"), [(0.0, True), (0.5, True), (1.0, False)])
+def test_open_manipulator_x_carries_what_its_maker_says_and_not_twice_that(payload: float, holds: bool) -> None:
+    """0.5 kg at a reach of 0.38 m, by the stall torque of its XM430-W350 at 12 V: the maker's specification."""
+    reached = (0.012 + 0.378, 0.0, 0.017 + 0.0595)  # the shoulder's height, 2 mm short of the stretched arm
+    evaluation = evaluate([open_manipulator_x()], [reached], payload=payload)
+    assert evaluation.position_error[0, 0] < 0.01  # the stretched arm is singular
+    (use,) = named_objectives(["torque_utilisation"])[0](evaluation)
+    assert (use <= 1.0) == holds

@@ -1,0 +1,87 @@
+"""What Arm, Joint and Link refuse, and what they promise."""
+
+import math
+from dataclasses import FrozenInstanceError
+
+import pytest
+
+from armwright.exceptions import ArmError, UsageError
+from armwright.robot.arm import Arm, Joint, Link, uniform_link
+
+TURN = Joint("revolute", "y", -1.0, 1.0)
+LINK = uniform_link((0.0, 0.3, 0.4), 0.2, 0.015)
+
+
+@pytest.mark.parametrize(
+    ("kind", "axis", "lower", "upper", "words"),
+    [
+        ("revolute", "y", 1.0, -1.0, "expected lower < upper, got 1.0 and -1.0 rad"),
+        ("revolute", "y", 0.5, 0.5, "expected lower < upper"),
+        ("prismatic", "z", 0.2, 0.1, "0.2 and 0.1 m"),
+        ("revolute", "y", -math.inf, 1.0, r"finite: \[-inf, 1.0\] rad"),
+        ("prismatic", "y", 0.0, math.nan, r"finite: \[0.0, nan\] m"),
+        ("continuous", "y", -1.0, 1.0, '"continuous" is not one of revolute, prismatic, fixed'),
+        ("revolute", "w", -1.0, 1.0, '"w" is not one of x, y, z'),
+    ],
+)
+def test_joints_that_cannot_be(kind: str, axis: str, lower: float, upper: float, words: str) -> None:
+    """An unknown kind in particular: it is never taken for a fixed joint."""
+    with pytest.raises(ArmError, match=words):
+        Joint(kind, axis, lower, upper)
+
+
+@pytest.mark.parametrize(
+    ("offset", "mass", "com", "radius", "words"),
+    [
+        ((0.0, 0.0, 0.1), -0.1, (0.0, 0.0, 0.0), 0.01, "-0.1 kg and 0.01 m"),
+        ((0.0, 0.0, 0.1), 0.1, (0.0, 0.0, 0.0), 0.0, "radius > 0 m"),
+        ((0.0, 0.0, math.nan), 0.1, (0.0, 0.0, 0.0), 0.01, "finite"),
+        ((0.0, 0.0, 0.1), math.inf, (0.0, 0.0, 0.0), 0.01, "finite"),
+        ((0.0, 0.0, 0.1), 0.1, (0.0, -math.inf, 0.0), 0.01, "finite"),
+    ],
+)
+def test_links_that_cannot_be(
+    offset: tuple[float, ...], mass: float, com: tuple[float, ...], radius: float, words: str
+) -> None:
+    with pytest.raises(ArmError, match=words):
+        Link(offset, mass, com, radius)
+
+
+def test_arms_that_cannot_be() -> None:
+    for joints, links in (((), ()), ((TURN,), ()), ((TURN,), (LINK, LINK)), ((TURN, TURN), (LINK,))):
+        with pytest.raises(ArmError, match=f"{len(joints)} joints, {len(links)} links"):
+            Arm((0.0, 0.0, 0.0), joints, links)
+    with pytest.raises(ArmError, match="base position must be finite"):
+        Arm((0.0, math.nan, 0.0), (TURN,), (LINK,))
+
+
+def test_a_mistake_in_an_arm_is_the_users_to_repair() -> None:
+    assert issubclass(ArmError, UsageError)
+    assert ArmError.exit_code == 2
+
+
+def test_uniform_link() -> None:
+    """Its centre of mass lies half way; its length is the distance from joint to joint."""
+    assert LINK.com == (0.0, 0.15, 0.2)
+    assert LINK.length == pytest.approx(0.5)
+    assert uniform_link((0.0, 0.0, 0.0), 0.1, 0.01).length == 0.0
+
+
+def test_reach() -> None:
+    """All links in one line, and the longest stroke, whichever way it goes; turning adds nothing."""
+    slide = Joint("prismatic", "z", -0.3, 0.1)
+    assert Arm((5.0, 5.0, 5.0), (TURN, Joint("fixed", "x"), slide), (LINK,) * 3).reach == pytest.approx(1.8)
+
+
+def test_a_fixed_joint_needs_no_limits() -> None:
+    assert (Joint("fixed", "x").lower, Joint("fixed", "x").upper) == (0.0, 0.0)
+
+
+def test_arms_are_values() -> None:
+    """Equal by content, usable as keys, and never changed."""
+    one, other = (Arm((0.0, 0.0, 0.0), (TURN,), (LINK,)) for _ in range(2))
+    assert one == other
+    assert len({one, other}) == 1
+    for value, name in ((one, "base"), (TURN, "lower"), (LINK, "mass")):
+        with pytest.raises(FrozenInstanceError):
+            setattr(value, name, 1.0)

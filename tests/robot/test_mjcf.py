@@ -1,0 +1,244 @@
+"""The MJCF of an arm in MuJoCo, against its URDF in Pinocchio, the plain reference and what was stated."""
+
+from dataclasses import replace
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+
+from armwright.kinematics.forward import joint_positions
+from armwright.robot.arm import Arm, Joint, Link, uniform_link
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.urdf_writer import to_urdf
+from tests.support import reference_kinematics as reference
+from tests.support.arms import general_arms, paper_arms
+from tests.support.reference_kinematics import Array
+
+MIXED = Arm(
+    (0.1, -0.2, 0.3),
+    (Joint("fixed", "x"), Joint("prismatic", "z", 0.1, 0.4), Joint("revolute", "y", -1.0, 2.0), Joint("fixed", "z")),
+    (
+        Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.02),  # no mass
+        uniform_link((0.1, 0.0, 0.0), 0.4, 0.02),
+        Link((0.0, 0.0, 0.0), 0.3, (0.0, 0.0, 0.0), 0.02),  # no length
+        uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),  # downward
+    ),
+)
+
+
+def sliding_arms(n: int, dof: int, seed: int) -> list[Arm]:
+    """General arms, some of whose joints slide by what they would turn [m]."""
+    rng = np.random.default_rng(seed)
+    return [
+        replace(arm, joints=tuple(replace(j, kind="prismatic") if slides(j, rng) else j for j in arm.joints))
+        for arm in general_arms(n, dof, seed)
+    ]
+
+
+def slides(joint: Joint, rng: np.random.Generator) -> bool:
+    return joint.kind == "revolute" and rng.random() < 0.5
+
+
+TURNING = [*paper_arms(10, 4, 31), *(arm for dof in range(1, 9) for arm in general_arms(8, dof, 32))]
+SLIDING = [arm for dof in range(1, 9) for arm in sliding_arms(8, dof, 33)]
+ARMS = [*TURNING, *SLIDING, MIXED]
+
+
+class Simulated:
+    """An arm in MuJoCo, from its MJCF as it stands."""
+
+    def __init__(self, arm: Arm, name: str = "arm") -> None:
+        self.model = mujoco.MjModel.from_xml_string(to_mjcf(arm, name))
+        self.data = mujoco.MjData(self.model)
+
+    def put(self, q: Array, speed: Array | float = 0.0, ctrl: Array | float = 0.0) -> None:
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:], self.data.qvel[:], self.data.ctrl[:] = q, speed, ctrl
+        mujoco.mj_forward(self.model, self.data)
+
+
+def moving(arm: Arm) -> list[tuple[int, Joint]]:
+    """(number from 1, joint) of the joints that move."""
+    return [(number, joint) for number, joint in enumerate(arm.joints, start=1) if joint.kind != "fixed"]
+
+
+def postures(arm: Arm, n: int = 5) -> Array:
+    """(n, D) random values of the joints that move, within their limits [rad] or [m]."""
+    joints = [joint for _, joint in moving(arm)]
+    lower, upper = ([getattr(joint, end) for joint in joints] for end in ("lower", "upper"))
+    return np.random.default_rng(34).uniform(lower, upper, (n, len(joints)))
+
+
+def load(arm: Arm) -> float:
+    """The arm's weight at its reach [N m], the size of its torques; more than the least mass that MuJoCo takes."""
+    return reference.GRAVITY * (sum(link.mass for link in arm.links) + 1e-3) * max(1.0, arm.reach)
+
+
+def test_names_limits_and_masses() -> None:
+    for arm in ARMS:
+        model = Simulated(arm).model
+        numbers = [number for number, _ in moving(arm)]
+        links = [f"link_{number}" for number in range(1, len(arm.links) + 1)]
+        assert [model.body(i).name for i in range(model.nbody)] == ["world", "base", *links]
+        assert [model.joint(i).name for i in range(model.njnt)] == [f"joint_{number}" for number in numbers]
+        assert [model.actuator(i).name for i in range(model.nu)] == [f"motor_{number}" for number in numbers]
+        assert np.allclose(model.body("base").pos, arm.base)
+        assert np.allclose(model.opt.gravity, [0.0, 0.0, -reference.GRAVITY])
+        assert np.allclose(model.jnt_range, [[joint.lower, joint.upper] for _, joint in moving(arm)], rtol=1e-9)
+        assert np.all(model.jnt_limited)
+        assert not np.any(model.actuator_ctrllimited)
+        assert not np.any(model.actuator_forcelimited)
+        kinds = {"revolute": mujoco.mjtJoint.mjJNT_HINGE, "prismatic": mujoco.mjtJoint.mjJNT_SLIDE}
+        for i, (_, joint) in enumerate(moving(arm)):
+            assert model.jnt_type[i] == kinds[joint.kind]
+            assert np.array_equal(model.jnt_axis[i], np.eye(3)["xyz".index(joint.axis)])
+        stated = [link.mass for link in arm.links]
+        assert np.allclose(model.body_mass, [0.0, 0.0, *stated], rtol=1e-9, atol=1e-11)  # nor has the base any
+
+
+def test_the_tip_is_where_the_arm_has_it() -> None:
+    """And each link's frame at its joint."""
+    for arm in ARMS:
+        simulated = Simulated(arm)
+        for q in postures(arm):
+            simulated.put(q)
+            every = np.zeros(len(arm.joints))
+            every[[number - 1 for number, _ in moving(arm)]] = q
+            places = joint_positions(arm, every)
+            assert np.abs(simulated.data.site("tip").xpos - places[-1]).max() < 1e-9
+            assert np.abs(simulated.data.xpos[2:] - places[:-1]).max() < 1e-9
+
+
+def test_gravity_torque_is_that_of_the_urdf() -> None:
+    """What qfrc_bias is at rest; both files have the same ten digits."""
+    for arm in ARMS:
+        simulated = Simulated(arm)
+        peer = pinocchio.buildModelFromXML(to_urdf(arm))
+        for q in postures(arm):
+            simulated.put(q)
+            torque = pinocchio.computeGeneralizedGravity(peer, peer.createData(), q)
+            assert np.abs(simulated.data.qfrc_bias - torque).max() < 1e-12 * load(arm)
+
+
+def test_gravity_torque_is_that_of_the_reference() -> None:
+    for arm in TURNING:
+        simulated, chain = Simulated(arm), reference.chains([arm])
+        for q in postures(arm):
+            simulated.put(q)
+            torque = reference.gravity_torque(chain, q[None, None])[0, 0]
+            assert np.abs(simulated.data.qfrc_bias - torque).max() < 1e-9 * load(arm)
+
+
+def test_motion_is_that_of_the_urdf() -> None:
+    """Any torques on joints that move anyhow: Pinocchio's inverse dynamics of MuJoCo's accelerations gives them back.
+
+    So inertias, centres of mass and motors are the URDF's, each motor on its own joint.
+    """
+    rng = np.random.default_rng(35)
+    for arm in ARMS:
+        simulated = Simulated(arm)
+        peer = pinocchio.buildModelFromXML(to_urdf(arm))
+        for q in postures(arm):
+            speed, ctrl = rng.uniform(-3.0, 3.0, (2, len(q)))
+            simulated.put(q, speed, ctrl)
+            needed = pinocchio.rnea(peer, peer.createData(), q, speed, simulated.data.qacc)
+            assert np.abs(needed - ctrl).max() < 1e-8
+
+
+def test_gravity_torques_hold_the_posture() -> None:
+    """Constant, for ten steps; without them nearly every arm falls."""
+    falls: list[bool] = []
+    for arm in ARMS:
+        simulated = Simulated(arm)
+        for q in postures(arm):
+            simulated.put(q)
+            torque = simulated.data.qfrc_bias.copy()
+            simulated.put(q, ctrl=torque)
+            mujoco.mj_step(simulated.model, simulated.data, 10)
+            assert np.abs(simulated.data.qvel).max() < 1e-6
+            assert np.abs(simulated.data.qpos - q).max() < 1e-8
+            simulated.put(q)
+            mujoco.mj_step(simulated.model, simulated.data, 10)
+            falls.append(np.abs(simulated.data.qvel).max() > 1e-3)
+    assert np.mean(falls) > 0.8  # not one whose only joint slides or turns level
+
+
+def test_what_is_drawn_touches_nothing() -> None:
+    """Folded onto itself, an arm is held as any other; a cylinder for each link and a ball for each joint are seen."""
+    joints = tuple(Joint("revolute", "y", -3.2, 3.2) for _ in range(4))
+    arm = Arm((0.0, 0.0, 0.5), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4)
+    simulated = Simulated(arm)
+    simulated.put(np.array([0.0, np.pi, np.pi, np.pi]))
+    assert simulated.data.ncon == 0
+    kinds = [mujoco.mjtGeom(kind).name for kind in simulated.model.geom_type]
+    assert kinds == ["mjGEOM_CYLINDER", "mjGEOM_SPHERE"] * 4
+
+
+def test_cylinders_reach_from_joint_to_joint() -> None:
+    """Of arms that do not slide: what slides stands beyond the end of the link before it."""
+    for arm in TURNING:
+        simulated = Simulated(arm)
+        model, data = simulated.model, simulated.data
+        simulated.put(postures(arm, 1)[0])
+        ends = [*data.xpos[2:], data.site("tip").xpos]
+        drawn = [i for i in range(model.ngeom) if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_CYLINDER]
+        assert len(drawn) == len(arm.links)
+        for i, (start, end), link in zip(drawn, pairwise(ends), arm.links, strict=True):
+            half = model.geom_size[i, 1] * data.geom_xmat[i].reshape(3, 3)[:, 2]
+            assert np.abs(data.geom_xpos[i] - half - start).max() < 1e-9
+            assert np.abs(data.geom_xpos[i] + half - end).max() < 1e-9
+            assert model.geom_size[i, 0] == pytest.approx(link.radius)
+
+
+def test_joints_have_the_colours_of_the_urdf() -> None:
+    model = Simulated(MIXED).model
+    colours = {m.get("name"): m.find("color") for m in ElementTree.fromstring(to_urdf(MIXED)).findall("material")}
+    for name, colour in colours.items():
+        assert name is not None
+        assert colour is not None
+        assert np.allclose(model.material(name).rgba, [float(c) for c in colour.attrib["rgba"].split()])
+    materials = [model.material(i).name for i in model.geom_matid if model.material(i).name != "link"]
+    assert materials == [f"joint_{joint.axis}" for joint in MIXED.joints]
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.2), (0.0, 0.0, 0.0), (1e-15, 0.0, 0.0)])
+@pytest.mark.parametrize("mass", [0.0, 1e-13])
+def test_an_arm_without_mass_compiles(offset: tuple[float, float, float], mass: float) -> None:
+    link = Link(offset, mass, (0.0, 0.0, 0.1), 0.015)
+    for kind in ("revolute", "prismatic"):
+        simulated = Simulated(Arm((0.0, 0.0, 0.0), (Joint(kind, "y", -1.0, 1.0),) * 2, (link, link)))
+        simulated.put(np.array([0.3, -0.2]))
+        assert simulated.model.body_mass.sum() < 1e-11
+        assert np.abs(simulated.data.qfrc_bias).max() < 1e-10
+        mujoco.mj_step(simulated.model, simulated.data, 10)
+        assert np.all(np.isfinite(simulated.data.qpos))
+
+
+def test_an_arm_that_does_not_move_compiles() -> None:
+    simulated = Simulated(Arm((0.0, 0.0, 1.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.1, 0.2), 1.0, 0.02),)))
+    simulated.put(np.zeros(0))
+    assert (simulated.model.nq, simulated.model.nu) == (0, 0)
+    assert np.allclose(simulated.data.site("tip").xpos, [0.0, 0.1, 1.2])
+
+
+def test_links_without_length_load() -> None:
+    """A disc's inertia lies on the edge of what a body can have: rounding must not put it beyond."""
+    joint = Joint("revolute", "y", -1.0, 1.0)
+    for mass, radius in np.random.default_rng(36).uniform([0.001, 0.001], [5.0, 0.1], (200, 2)).tolist():
+        link = Link((0.0, 0.0, 0.0), mass, (0.0, 0.0, 0.0), radius)
+        assert Simulated(Arm((0.0, 0.0, 0.0), (joint,), (link,))).model.nv == 1
+
+
+@pytest.mark.parametrize("name", ['<arm> & "friends"', "it's", "Ärmchen", "a]]>b", "", "two\nlines", "x" * 5000])
+def test_names_are_escaped(name: str) -> None:
+    assert ElementTree.fromstring(to_mjcf(MIXED, name)).get("model") == name
+    assert bytes(Simulated(MIXED, name).model.names).split(b"\0")[0].decode() == name
+
+
+def test_same_arm_same_text() -> None:
+    """Nothing but the arm and its name is in it."""
+    assert to_mjcf(MIXED) == to_mjcf(MIXED)
+    assert to_mjcf(MIXED).startswith('<?xml version="1.0"?>\n<mujoco model="arm">')

@@ -1,0 +1,82 @@
+"""The tip of every format: where the tool ends, its z along the tool's axis and its x to the tool's side."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import permutations, product
+
+import mujoco
+import numpy as np
+import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+
+from armwright.kinematics.forward import joint_positions
+from armwright.robot.arm import Arm, Joint
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.sdf import to_sdf
+from armwright.robot.xacro import to_xacro
+from tests.support.exported_arms import ARMS, Peer, full, peer_of, postures, processed
+from tests.support.reference_kinematics import Array
+
+
+def in_mujoco(arm: Arm, q: Array) -> Array:
+    model = mujoco.MjModel.from_xml_string(to_mjcf(arm))
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = data.site("tip").xmat.reshape(3, 3), data.site("tip").xpos
+    return pose
+
+
+def in_drake(arm: Arm, q: Array) -> Array:
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModelsFromString(to_sdf(arm), "sdf")
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, q)
+    return plant.GetFrameByName("tip").CalcPoseInWorld(context).GetAsMatrix4()
+
+
+FORMATS: dict[str, Callable[[Arm, Array], Array]] = {
+    "urdf": lambda arm, q: peer_of(arm).tip(q),
+    "xacro": lambda arm, q: Peer(processed(to_xacro(arm))).tip(q),
+    "mjcf": in_mujoco,
+    "sdf": in_drake,
+}
+EVERY_FORMAT = pytest.mark.parametrize("tip", FORMATS.values(), ids=FORMATS)
+
+
+@EVERY_FORMAT
+def test_the_tip_points_as_the_tool_at_zero(tip: Callable[[Arm, Array], Array]) -> None:
+    """All 24 turns of a cube, straight up and down included, and any other."""
+    signed = [
+        (s * np.eye(3)[i], t * np.eye(3)[j])
+        for i, j in permutations(range(3), 2)
+        for s, t in product((1, -1), repeat=2)
+    ]
+    odd = [np.linalg.qr(np.random.default_rng(61 + n).normal(size=(3, 3)))[0][:2] for n in range(10)]
+    joint = Joint("revolute", "y", -1.0, 1.0)
+    for axis, side in [*signed, *odd]:
+        arm = replace(ARMS[0], joints=(joint,) * 4, tool=(0.1, 0.2, 0.3), tool_axis=tuple(axis), tool_side=tuple(side))
+        pose = tip(arm, np.zeros(4))
+        assert np.abs(pose[:3, 2] - axis).max() < 1e-9
+        assert np.abs(pose[:3, 0] - side).max() < 1e-9
+
+
+@EVERY_FORMAT
+@pytest.mark.parametrize("arm", ARMS)
+def test_the_tip_is_where_the_arm_has_it_and_turns_with_it(arm: Arm, tip: Callable[[Arm, Array], Array]) -> None:
+    for q in postures(arm, 3):
+        pose = tip(arm, q)
+        assert np.abs(pose[:3, 3] - joint_positions(arm, full(arm, q))[-1]).max() < 1e-9
+        assert np.abs(pose - peer_of(arm).tip(q)).max() < 1e-9
+
+
+def test_a_sliding_joint_has_the_force_of_its_actuator() -> None:
+    """Effort over travel and speed times travel: 1.5 N m at 0.02 m/rad are 75 N; 4 rad/s are 0.08 m/s."""
+    arm = ARMS[-1]
+    model = peer_of(arm).model
+    assert model.upperEffortLimit[0] == pytest.approx(75.0)
+    assert model.upperVelocityLimit[0] == pytest.approx(0.08)
+    assert mujoco.MjModel.from_xml_string(to_mjcf(arm)).actuator_ctrlrange[0] == pytest.approx([-75.0, 75.0])

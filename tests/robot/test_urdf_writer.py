@@ -1,0 +1,152 @@
+"""The URDF of an arm, loaded as it stands by Pinocchio, MuJoCo, yourdfpy and scikit-robot."""
+
+import io
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+import yourdfpy
+
+from armwright.robot.arm import Arm, Joint, Link, uniform_link
+from armwright.robot.urdf_writer import to_urdf
+from tests.support import reference_kinematics as reference
+from tests.support.arms import general_arms, paper_arms
+
+ARMS = [*paper_arms(2, 4, 21), *general_arms(2, 3, 22), *general_arms(2, 8, 23)]
+MIXED = Arm(
+    (0.1, -0.2, 0.3),
+    (Joint("fixed", "x"), Joint("prismatic", "z", -0.1, 0.4), Joint("revolute", "y", -1.0, 2.0), Joint("fixed", "z")),
+    (
+        Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.02),  # no mass
+        uniform_link((0.1, 0.0, 0.0), 0.4, 0.02),
+        Link((0.0, 0.0, 0.0), 0.3, (0.0, 0.0, 0.0), 0.02),  # no length
+        uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),  # downward
+    ),
+)
+EVERY_ARM = pytest.mark.parametrize("arm", [*ARMS, MIXED])
+
+
+def moving(arm: Arm) -> list[tuple[int, Joint]]:
+    """(number from 1, joint) of the joints that move."""
+    return [(number, joint) for number, joint in enumerate(arm.joints, start=1) if joint.kind != "fixed"]
+
+
+def cylinder_inertia(link: Link) -> np.ndarray:
+    """(3, 3) about the centre of mass [kg m²]: m r²/2 along the offset, m (3 r² + l²)/12 across it."""
+    along = np.array(link.offset) / link.length if link.length > 0.0 else np.array([0.0, 0.0, 1.0])
+    about = link.mass * link.radius**2 / 2.0
+    across = link.mass * (3.0 * link.radius**2 + link.length**2) / 12.0
+    return across * np.eye(3) + (about - across) * np.outer(along, along)
+
+
+@EVERY_ARM
+def test_pinocchio_sees_the_arm(arm: Arm) -> None:
+    """Masses (with all that is fixed to a joint), limits and axes; no root joint is needed."""
+    model = pinocchio.buildModelFromXML(to_urdf(arm))
+    assert list(model.names)[1:] == [f"joint_{number}" for number, _ in moving(arm)]
+    assert np.allclose(model.lowerPositionLimit, [joint.lower for _, joint in moving(arm)])
+    assert np.allclose(model.upperPositionLimit, [joint.upper for _, joint in moving(arm)])
+    kinds = {"revolute": "JointModelR", "prismatic": "JointModelP"}
+    assert [j.shortname() for j in model.joints[1:]] == [kinds[j.kind] + j.axis.upper() for _, j in moving(arm)]
+    assert sum(inertia.mass for inertia in model.inertias) == pytest.approx(sum(link.mass for link in arm.links))
+    assert model.existFrame("base")
+    assert model.existFrame("tip")
+
+
+@EVERY_ARM
+def test_mujoco_sees_the_arm(arm: Arm) -> None:
+    """base and tip are bodies of their own; mass, centre and inertia of each link, limits and axes."""
+    model = mujoco.MjModel.from_xml_string(to_urdf(arm))
+    bodies = [model.body(i).name for i in range(model.nbody)]
+    assert bodies == ["world", "base", *(f"link_{n}" for n in range(1, len(arm.links) + 1)), "tip"]
+    assert np.allclose(model.body("base").pos, arm.base)
+    assert np.allclose(model.body("tip").pos, arm.links[-1].offset)
+    assert np.allclose(model.opt.gravity, [0.0, 0.0, -reference.GRAVITY])
+    for number, link in enumerate(arm.links, start=1):
+        body = model.body(f"link_{number}")
+        assert body.mass[0] == pytest.approx(link.mass, abs=1e-9)
+        assert np.allclose(body.ipos, link.com)
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, body.iquat)
+        R = turn.reshape(3, 3)
+        assert np.allclose(R @ np.diag(body.inertia) @ R.T, cylinder_inertia(link), rtol=1e-6, atol=1e-10)
+    for number, joint in moving(arm):
+        seen = model.joint(f"joint_{number}")
+        assert np.allclose(seen.range, [joint.lower, joint.upper])
+        assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
+    assert model.body_mass.sum() == pytest.approx(sum(link.mass for link in arm.links))
+
+
+@EVERY_ARM
+def test_yourdfpy_sees_the_arm(arm: Arm) -> None:
+    """Every inertia is that of a solid cylinder about its centre of mass, and one that a body can have."""
+    urdf = yourdfpy.URDF.load(io.BytesIO(to_urdf(arm).encode()))
+    assert urdf.validate()
+    joints = {joint.name: joint for joint in urdf.robot.joints}
+    for number, joint in enumerate(arm.joints, start=1):
+        assert joints[f"joint_{number}"].type == joint.kind
+    for number, joint in moving(arm):
+        seen = joints[f"joint_{number}"]
+        assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
+        assert (seen.limit.lower, seen.limit.upper) == pytest.approx((joint.lower, joint.upper))
+    links = {link.name: link for link in urdf.robot.links}
+    for number, link in enumerate(arm.links, start=1):
+        inertial = links[f"link_{number}"].inertial
+        assert inertial.mass == pytest.approx(link.mass)
+        assert np.allclose(inertial.origin[:3, 3], link.com)
+        R = inertial.origin[:3, :3]
+        assert np.allclose(R @ inertial.inertia @ R.T, cylinder_inertia(link), rtol=1e-6, atol=1e-12)
+        least, middle, most = np.linalg.eigvalsh(inertial.inertia)
+        assert least + middle >= most * (1 - 1e-12)
+        assert least > 0.0 or link.mass == 0.0
+
+
+@EVERY_ARM
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_scikit_robot_sees_the_arm(arm: Arm) -> None:
+    """Masses, limits and axes; and the tip stands at the straight arm's."""
+    from skrobot.model import RobotModel
+
+    robot = RobotModel()
+    robot.load_urdf(to_urdf(arm))
+    assert [joint.name for joint in robot.joint_list] == [f"joint_{number}" for number, _ in moving(arm)]
+    for seen, (_, joint) in zip(robot.joint_list, moving(arm), strict=True):
+        assert (seen.min_angle, seen.max_angle) == pytest.approx((joint.lower, joint.upper))
+        assert np.allclose(seen.axis, np.eye(3)["xyz".index(joint.axis)])
+    for number, link in enumerate(arm.links, start=1):
+        assert getattr(robot, f"link_{number}").mass == pytest.approx(link.mass)
+    straight = np.array(arm.base) + np.sum([link.offset for link in arm.links], axis=0)
+    assert np.allclose(robot.tip.worldpos(), straight, atol=1e-6)
+
+
+def test_links_without_length_load_in_mujoco() -> None:
+    """A disc's inertia lies on the edge of what a body can have: rounding must not put it beyond."""
+    rng = np.random.default_rng(24)
+    joint = Joint("revolute", "y", -1.0, 1.0)
+    for mass, radius in rng.uniform([0.001, 0.001], [5.0, 0.1], (200, 2)).tolist():
+        link = Link((0.0, 0.0, 0.0), mass, (0.0, 0.0, 0.0), radius)
+        assert mujoco.MjModel.from_xml_string(to_urdf(Arm((0.0, 0.0, 0.0), (joint,), (link,)))).nv == 1
+
+
+def test_an_arm_without_mass_has_none_anywhere() -> None:
+    """Where no inertia is stated, MuJoCo would take water's density and scikit-robot 1 g a link."""
+    links = (Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.015), Link((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.015))
+    arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -1.0, 1.0),) * 2, links)
+    assert mujoco.MjModel.from_xml_string(to_urdf(arm)).body_mass.sum() < 1e-9
+    assert sum(inertia.mass for inertia in pinocchio.buildModelFromXML(to_urdf(arm)).inertias) == 0.0
+
+
+@pytest.mark.parametrize("name", ['<arm> & "friends"', "it's", "Ärmchen", "a]]>b"])
+def test_names_are_escaped(name: str) -> None:
+    text = to_urdf(ARMS[0], name)
+    assert ElementTree.fromstring(text).get("name") == name
+    assert pinocchio.buildModelFromXML(text).name == name
+    assert mujoco.MjModel.from_xml_string(text).nv == 4
+
+
+def test_same_arm_same_text() -> None:
+    """Written to a run folder and compared: no time, no order of a dictionary in it."""
+    assert to_urdf(ARMS[0]) == to_urdf(ARMS[0])
+    assert to_urdf(ARMS[0]).startswith('<?xml version="1.0"?>\n<robot name="arm">')

@@ -1,0 +1,85 @@
+"""Who found what: shares that add up, whatever the trials are."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from armwright.pareto import front_numbers, hypervolume
+from armwright.problem.problem import Problem
+from armwright.runs.attribution import credit_by_source, front_by_source, gained_by_source, hypervolume_gains
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
+from armwright.tasks.task import Task
+
+EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
+BOUNDED = Problem(Task(name="bounded", targets=((0.3, 0.0, 0.3),), reference_point=(5.0, 5.0)))
+OPEN = Problem(Task(name="open", targets=((0.3, 0.0, 0.3),)))
+DESIGN = BOUNDED.space.sample(1, 0)[0]
+N_INIT = 3
+
+TRIALS = st.lists(
+    st.tuples(st.sampled_from(["rules", "bbo"]), st.tuples(st.integers(0, 24), st.integers(0, 24))), max_size=20
+)
+
+
+def history(trials: list[tuple[str, tuple[int, int]]], problem: Problem = BOUNDED) -> History:
+    """On a coarse grid, so that equal values and ones outside the reference box are common."""
+    sources = ["random"] * N_INIT + [source for source, _ in trials[N_INIT:]]
+    values = [(a / 4, b / 4) for _, (a, b) in trials]
+    return History(
+        problem, [FinishedTrial(i, s, DESIGN, v) for i, (s, v) in enumerate(zip(sources, values, strict=False))], N_INIT
+    )
+
+
+@EXAMPLES
+@given(TRIALS)
+def test_what_the_sources_brought_adds_up_to_the_run(trials: list[tuple[str, tuple[int, int]]]) -> None:
+    past = history(trials)
+    credit = credit_by_source(past)
+    assert list(credit) == list(dict.fromkeys(trial.source for trial in past))
+    assert sum(c.trials for c in credit.values()) == len(past)
+    assert sum(c.front for c in credit.values()) == len(past.front)
+    gained = [c.hypervolume_gained for c in credit.values()]
+    assert sum(g or 0.0 for g in gained) == pytest.approx(hypervolume(past.values, (5.0, 5.0)))
+    assert all(g is not None and g >= 0.0 for g in gained)
+
+
+@EXAMPLES
+@given(TRIALS)
+def test_the_curves_add_up_at_every_iteration_and_end_at_the_credit(trials: list[tuple[str, tuple[int, int]]]) -> None:
+    past = history(trials)
+    credit, gained, members = credit_by_source(past), gained_by_source(past), front_by_source(past)
+    assert gained is not None
+    counted = max(0, len(past) - N_INIT)
+    for source, brought in credit.items():
+        assert len(gained[source]) == len(members[source]) == counted + 1
+        assert gained[source][-1] == pytest.approx(brought.hypervolume_gained)
+        assert members[source][-1] == brought.front
+    if credit:
+        assert np.sum(list(gained.values()), axis=0)[1:] == pytest.approx(past.hypervolume)
+        sizes = [len(front_numbers(past.values[: N_INIT + i])) for i in range(1, counted + 1)]
+        assert np.sum(list(members.values()), axis=0)[1:].tolist() == sizes
+
+
+def test_a_trial_gains_what_it_adds_when_it_enters() -> None:
+    """(1, 1) adds nothing more to (1, 0) once that is there; before it, it would have."""
+    past = history([("", (16, 16)), ("", (20, 0)), ("", (8, 8)), ("rules", (4, 4)), ("bbo", (4, 0)), ("rules", (4, 4))])
+    gains = hypervolume_gains(past)
+    assert gains is not None
+    assert gains.tolist() == [1.0, 0.0, 8.0, 7.0, 4.0, 0.0]
+    assert credit_by_source(past)["rules"].hypervolume_gained == 7.0
+    assert credit_by_source(past)["rules"].front == 0
+
+
+def test_without_a_reference_point_there_is_no_hypervolume_to_share() -> None:
+    past = history([("", (4, 4)), ("", (8, 0))], OPEN)
+    assert hypervolume_gains(past) is None
+    assert gained_by_source(past) is None
+    assert credit_by_source(past)["random"].hypervolume_gained is None
+    assert front_by_source(past)["random"].tolist() == [2]
+
+
+def test_no_trials_no_credit() -> None:
+    assert credit_by_source(history([])) == {}
+    assert front_by_source(history([], OPEN)) == {}

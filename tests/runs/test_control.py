@@ -1,0 +1,668 @@
+"""The channel between a running study and whoever watches it: pause, stop, hints, and what the study says of itself."""
+
+import json
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armwright.exceptions import (
+    AnswerPendingError,
+    ModelError,
+    ProposalError,
+    RunFolderError,
+    SettingsError,
+    StoppedError,
+)
+from armwright.experiments.plan import ExperimentPlan, cells_of
+from armwright.experiments.runner import run_cell
+from armwright.llm import client as chat
+from armwright.llm.prompt import Prompt, load_prompt, whole_template
+from armwright.llm.transcript import Call, Transcript, hints_of, used_hints
+from armwright.problem.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.proposers.manual import ManualProposer
+from armwright.proposers.proposer import Proposal, Proposer
+from armwright.proposers.replay import ReplayProposer
+from armwright.runs import control
+from armwright.runs.control import (
+    CONTROL,
+    LARGEST_FILE,
+    LONGEST_HINT,
+    MOST_HINTS,
+    STATUS,
+    Control,
+    ControlFile,
+    Hint,
+    Status,
+    add_hint,
+    pause_study,
+    read_control,
+    read_status,
+    resume_study,
+    stop_study,
+)
+from armwright.runs.history import History
+from armwright.study.prompt_preview import preview_after
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from tests.support.command_line import armwright
+from tests.support.fixed_problem import FixedProblem, fixed_history
+
+PROBLEM = Problem(load_task("target-1"))
+SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2}
+NOTE = "A note from the engineer who watches this search; take it into account: "
+NOTES = "Notes from the engineer who watches this search; take them into account:\n"
+PATIENCE = 60.0  # [s] for what another thread does
+
+
+def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -> Run:
+    return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
+
+
+def asks(server: ChatServer, **asking: Any) -> LlmProposer:
+    return LlmProposer("test-model", server.url, **asking)
+
+
+def lines(folder: Path) -> list[dict[str, Any]]:
+    """The trials of a run without their seconds."""
+    trials = (folder / "trials.jsonl").read_text().splitlines()
+    return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
+
+
+def calls(folder: Path) -> tuple[Call, ...]:
+    return Transcript(folder / "transcripts.jsonl", read_only=True).calls
+
+
+def after(number: int, act: Callable[[], object]) -> Callable[[Progress], None]:
+    """Watches a study, and acts when this trial is finished."""
+
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == number:
+            act()
+
+    return watch
+
+
+def interrupt() -> None:
+    raise KeyboardInterrupt
+
+
+def status(folder: Path) -> Status:
+    there = read_status(folder)
+    assert there is not None
+    return there
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come to that"
+        threading.Event().wait(0.005)
+
+
+# Pause and stop.
+
+
+def test_a_paused_study_adds_no_trial_until_it_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "run"
+    looks: list[tuple[int, str, int]] = []
+    notes: list[str] = []
+    watch = after(6, lambda: pause_study(out))
+
+    def look(seconds: float) -> None:
+        looks.append((len(lines(out)), status(out).doing, status(out).number))
+        if len(looks) == 5:
+            resume_study(out)
+
+    def watching(progress: Progress) -> None:
+        watch(progress)
+        if progress.doing == "paused":
+            notes.append(progress.note)
+
+    monkeypatch.setattr(time, "sleep", look)
+    run(out, watch=watching)
+    assert looks == [(7, "paused", 7)] * 5
+    assert notes == ["paused by its watcher, who can let it go on; Ctrl-C ends it"]
+    assert read_control(out) == Control()
+    run(tmp_path / "undisturbed")
+    assert lines(out) == lines(tmp_path / "undisturbed")
+
+
+def test_a_watcher_elsewhere_sees_the_pause_and_ends_it(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    watcher = threading.Thread(
+        target=lambda: (wait_until(lambda: status(out).doing == "paused"), resume_study(out)), daemon=True
+    )
+    result = run(out, watch=after(5, lambda: (pause_study(out), watcher.start())))
+    watcher.join()
+    assert len(result.trials) == 13
+
+
+def test_ctrl_c_ends_a_paused_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "run"
+    monkeypatch.setattr(time, "sleep", lambda seconds: interrupt())
+    with pytest.raises(KeyboardInterrupt):
+        run(out, watch=after(6, lambda: pause_study(out)))
+    assert (status(out).doing, status(out).number, status(out).fault) == ("stopped", 7, "")
+    monkeypatch.undo()
+
+    def watch(progress: Progress) -> None:
+        assert progress.doing != "paused"  # the pause of an earlier session is past
+
+    assert len(run(out, watch=watch).trials) == 13
+
+
+@pytest.mark.parametrize("proposer", ["rules", "none"])
+@pytest.mark.parametrize("number", [0, 3, 4, 6, 11])
+def test_a_stopped_study_goes_on_as_if_it_had_not_been(tmp_path: Path, proposer: str, number: int) -> None:
+    out = tmp_path / "run"
+    with pytest.raises(StoppedError, match=r"stopped as asked; every finished trial is in .*run/, and the same com"):
+        run(out, proposer, watch=after(number, lambda: stop_study(out)))
+    assert len(lines(out)) == number + 1
+    assert (status(out).doing, status(out).number, status(out).fault) == ("stopped", number + 1, "")
+    assert run(out, proposer).resumed == number + 1
+    assert status(out).doing == "finished"
+    run(tmp_path / "whole", proposer)
+    assert lines(out) == lines(tmp_path / "whole")
+
+
+def test_a_stop_after_the_last_trial_has_nothing_to_stop(tmp_path: Path) -> None:
+    result = run(tmp_path / "run", watch=after(12, lambda: stop_study(tmp_path / "run")))
+    assert len(result.trials) == 13
+
+
+def test_a_paused_study_can_be_stopped(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+
+    def watch(progress: Progress) -> None:
+        after(6, lambda: pause_study(out))(progress)
+        if progress.doing == "paused":
+            stop_study(out)
+
+    with pytest.raises(StoppedError):
+        run(out, watch=watch)
+    assert len(lines(out)) == 7
+
+
+def test_a_stop_ends_the_questions_under_way(chat_server: ChatServer, tmp_path: Path) -> None:
+    out, held = tmp_path / "run", threading.Event()
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:  # all but the check
+            held.wait(PATIENCE)
+        return designer(request)
+
+    chat_server.answer = answer
+    with pytest.raises(StoppedError):
+        run(out, asks(chat_server), in_flight=1, watch=after(5, lambda: stop_study(out)))
+    held.set()
+    assert len(lines(out)) == 6
+    assert len(run(out, asks(chat_server), in_flight=1).trials) == 13
+
+
+def test_what_was_asked_of_an_earlier_session_is_past_but_its_hints(tmp_path: Path) -> None:
+    """Also where that session came to no trial."""
+    out = tmp_path / "run"
+    out.mkdir()
+    hint = add_hint(out, "shorter links")
+    pause_study(out)
+    stop_study(out)
+    assert read_control(out) == Control(paused=True, stop=True, hints=(hint,))
+    assert len(run(out).trials) == 13
+    assert read_control(out) == Control(hints=(hint,))
+
+
+def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in_folder: Path) -> None:
+    out = in_folder / "run"
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) == 2:
+            stop_study(out)
+        return designer(request)
+
+    chat_server.answer = answer
+    settings = ["optimize", "target-1", "--model", "m", "--base-url", chat_server.url, "--n-total", "6", "--no-figures"]
+    settings += ["--out", "run"]
+    done = armwright(*settings)
+    assert (done.returncode, done.stderr) == (130, "")
+    assert f"stopped; every finished trial is in run/. Go on with:\n  python -m armwright {' '.join(settings)}" in (
+        done.stdout
+    )
+    assert len(lines(out)) == 11  # the present design was evaluated
+    done = armwright(*settings)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "resumed at trial 11 of 16" in done.stdout
+
+
+def test_a_cell_that_is_stopped_has_failed_in_words(chat_server: ChatServer, tmp_path: Path) -> None:
+    method = {"label": "LLM", "proposer": "llm", "n_step": 3, "model": "m", "base_url": chat_server.url}
+    plan = ExperimentPlan.model_validate(
+        {"name": "one", "tasks": ["target-1"], "seeds": 1, "n_init": 4, "n_total": 6, "methods": {"llm": method}}
+    )
+    (cell,), _ = cells_of(plan, tmp_path, tmp_path / "out")
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) == 2:
+            stop_study(cell.folder)
+        return designer(request)
+
+    chat_server.answer = answer
+    stopped = run_cell(cell)
+    assert stopped.fault == (
+        f"stopped as asked; every finished trial is in {cell.folder}/, and the same command goes on"
+    )
+    assert run_cell(cell).fault == ""
+
+
+# control.json and status.json.
+
+
+def hostile() -> Mapping[str, bytes]:
+    many = [{"id": i, "text": "x"} for i in range(1, MOST_HINTS + 2)]
+    return {
+        "empty": b"",
+        "cut": b'{"paused": true, "st',
+        "no text": b"\xff\xfe\x00{",
+        "a list": b"[true]",
+        "words": b'{"paused": "yes"}',
+        "numbers": b'{"stop": 1}',
+        "more": b'{"paused": true, "speed": 2}',
+        "two hints of one id": b'{"paused": true, "hints": [{"id": 1, "text": "a"}, {"id": 1, "text": "b"}]}',
+        "no id": b'{"paused": true, "hints": [{"text": "a"}]}',
+        "an id below 1": b'{"paused": true, "hints": [{"id": 0, "text": "a"}]}',
+        "more of a hint": b'{"paused": true, "hints": [{"id": 1, "text": "a", "to": "all"}]}',
+        "no words": b'{"paused": true, "hints": [{"id": 1, "text": ""}]}',
+        "too long": json.dumps({"paused": True, "hints": [{"id": 1, "text": "x" * (LONGEST_HINT + 1)}]}).encode(),
+        "too many": json.dumps({"paused": True, "hints": many}).encode(),
+        "half a letter": b'{"paused": true, "hints": [{"id": 1, "text": "\\ud800"}]}',
+        "deep": b'{"hints": ' + b"[" * 100_000,
+        "huge": b'{"paused": true' + b" " * LARGEST_FILE + b"}",
+    }
+
+
+@pytest.mark.parametrize("name", hostile())
+def test_a_file_that_is_damaged_or_foreign_asks_for_nothing(tmp_path: Path, name: str) -> None:
+    (tmp_path / CONTROL).write_bytes(hostile()[name])
+    assert read_control(tmp_path) == Control()
+    assert ControlFile(tmp_path).read() == Control()
+    assert add_hint(tmp_path, "and it can be written anew") == Hint(1, "and it can be written anew")
+
+
+def test_a_study_goes_on_beside_a_damaged_file(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    contents = list(hostile().values())
+
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished":
+            (out / CONTROL).write_bytes(contents[progress.number % len(contents)])
+
+    run(out, n_total=len(contents), watch=watch)
+    run(tmp_path / "undisturbed", n_total=len(contents))
+    assert lines(out) == lines(tmp_path / "undisturbed")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
+@pytest.mark.parametrize("make", [os.mkdir, getattr(os, "mkfifo", None), lambda path: os.symlink(path, path)])
+def test_what_is_no_file_asks_for_nothing(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / CONTROL)
+    assert read_control(tmp_path) == ControlFile(tmp_path).read() == Control()
+    make(tmp_path / STATUS)
+    assert read_status(tmp_path) is None
+
+
+def test_control_is_parsed_only_where_it_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed: list[Path] = []
+    monkeypatch.setattr(control, "read_control", lambda folder: (parsed.append(folder), read_control(folder))[1])
+    file = ControlFile(tmp_path)
+    for change in (pause_study, resume_study, stop_study):
+        change(tmp_path)
+        parsed.clear()
+        assert [file.read() for _ in range(5)] == [read_control(tmp_path)] * 5
+        assert len(parsed) == 1
+    (tmp_path / CONTROL).unlink()
+    assert file.read() == Control()
+    assert len(parsed) == 1
+
+
+def test_watchers_do_not_overwrite_each_other(tmp_path: Path) -> None:
+    def watcher(name: int) -> None:
+        for i in range(5):
+            add_hint(tmp_path, f"hint {i} of {name}")
+            pause_study(tmp_path)
+
+    threads = [threading.Thread(target=watcher, args=(name,)) for name in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    there = read_control(tmp_path)
+    assert there.paused
+    assert [hint.id for hint in there.hints] == list(range(1, 41))
+    assert len({hint.text for hint in there.hints}) == 40
+
+
+def test_hints_that_cannot_be_taken_are_refused_in_words(tmp_path: Path) -> None:
+    for text, length in (("", "0"), (" \n\t", "0"), ("x" * (LONGEST_HINT + 1), "2,001")):
+        with pytest.raises(SettingsError, match=f"a hint of {length} characters: from 1 to 2,000 are possible"):
+            add_hint(tmp_path, text)
+    assert not (tmp_path / CONTROL).exists()
+    for text in ("x" * LONGEST_HINT, "\U0001f9be" * LONGEST_HINT, "half a letter \ud800"):
+        add_hint(tmp_path, text)
+    assert [len(hint.text) for hint in read_control(tmp_path).hints] == [LONGEST_HINT, LONGEST_HINT, 15]
+    for i in range(len(read_control(tmp_path).hints), MOST_HINTS):
+        add_hint(tmp_path, f"hint {i}")
+    with pytest.raises(SettingsError, match="has 100 hints, and more are not possible"):
+        add_hint(tmp_path, "one more")
+    (tmp_path / "file").touch()
+    with pytest.raises(RunFolderError, match="cannot write"):
+        pause_study(tmp_path / "file")
+
+
+def test_status_goes_from_evaluating_through_asking_to_finished(chat_server: ChatServer, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    said: list[tuple[str, int]] = []
+
+    def note() -> None:
+        said.append((status(out).doing, status(out).number))
+
+    def answer(request: Request) -> Answer:
+        note()
+        return designer(request)
+
+    chat_server.answer = answer
+    run(out, asks(chat_server, answer="one-step"), n_total=6, watch=lambda progress: note())
+    assert said[:3] == [("evaluating", 0), ("asking", 0), ("evaluating", 0)]  # the forecast, the check, trial 0
+    assert said[3:6] == [("evaluating", 0)] * 3
+    assert said[6:] == [("asking", 4)] * 2 + [("evaluating", 4)] * 3 + [("asking", 7)] * 2 + [("evaluating", 7)] * 3
+    assert (status(out).doing, status(out).number, status(out).pid) == ("finished", 10, os.getpid())
+    before = (out / STATUS).read_bytes()
+    run(out, asks(chat_server, answer="one-step"), n_total=6)  # shown again
+    assert (out / STATUS).read_bytes() == before
+
+
+def test_status_is_not_written_for_every_trial(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    written: set[tuple[int, int]] = set()
+
+    def watch(progress: Progress) -> None:
+        there = (out / STATUS).stat()
+        written.add((there.st_ino, there.st_mtime_ns))
+
+    run(out, "none", watch=watch)
+    assert len(written) == 1
+
+
+class Faulty(Proposer):
+    """Fails at its first question."""
+
+    name = "faulty"
+
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
+        if number == 4:
+            raise ProposalError("timeout", "it did not answer \udcff")
+        return Proposal(history.problem.space.sample(1, seed)[0], f"faulty-{number:04d}")
+
+
+def test_the_last_fault_is_said_until_a_question_is_answered(tmp_path: Path) -> None:
+    faults: list[str] = []
+    run(tmp_path / "run", Faulty(), watch=lambda progress: faults.append(status(tmp_path / "run").fault))
+    assert faults == [""] * 5 + [r"it did not answer \udcff"] * 4 + [""] * (len(faults) - 9)
+    assert len(faults) == 16  # 13 trials, 3 questions
+
+
+def test_a_study_that_breaks_says_why(chat_server: ChatServer, tmp_path: Path) -> None:
+    chat_server.answer = lambda request: (401, '{"error": {"message": "no such key"}}')
+    with pytest.raises(ModelError, match="no such key"):
+        run(tmp_path / "run", asks(chat_server))
+    assert status(tmp_path / "run").doing == "stopped"
+    assert "no such key" in status(tmp_path / "run").fault
+    result = run(tmp_path / "run", asks(chat_server), on_model_failure="continue")
+    assert len(result.trials) == 13
+    assert "no such key" in status(tmp_path / "run").fault
+
+
+def test_a_status_that_cannot_be_written_is_no_matter(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    (out / STATUS).mkdir(parents=True)
+    assert len(run(out).trials) == 13
+    assert (out / STATUS).is_dir()
+
+
+def test_a_run_without_a_folder_has_no_channel(in_folder: Path) -> None:
+    stop_study(in_folder)
+    assert len(run(None).trials) == 13
+    assert {path.name for path in in_folder.iterdir()} <= set(control.CHANNEL_FILES)
+
+
+# Hints.
+
+
+def prompts_with_hints(folder: Path) -> dict[str, str]:
+    """What stands after the words that lead to the hints, by proposal."""
+    return {
+        f"{call.proposal} {call.step}": (call.prompt.partition(NOTE)[2] or call.prompt.partition(NOTES)[2])
+        for call in calls(folder)
+        if NOTE in call.prompt or NOTES in call.prompt
+    }
+
+
+@pytest.mark.parametrize("asking", [{}, {"answer": "one-step", "memory": "own"}, {"prompt": "minus"}])
+def test_a_hint_goes_into_the_next_prompt_once(chat_server: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
+    """Whether the run is interrupted or not; in the transcript no other call has a word of hints."""
+    out = tmp_path / "run"
+
+    def watch(progress: Progress) -> None:
+        after(5, lambda: add_hint(out, " no joint may\nbe a roll joint "))(progress)
+        after(8, interrupt)(progress)
+
+    with pytest.raises(KeyboardInterrupt):
+        run(out, asks(chat_server, **asking), watch=watch)
+    run(out, asks(chat_server, **asking))
+    step = "answer" if "answer" in asking else "reasoning"
+    told = prompts_with_hints(out)
+    assert list(told) == [f"llm-0007 {step}"]
+    assert told[f"llm-0007 {step}"].startswith("no joint may be a roll joint\n")
+    (hint,) = read_control(out).hints
+    assert hint == Hint(1, "no joint may\nbe a roll joint")
+    assert used_hints(calls(out)) == {hint: "llm-0007"}
+    assert [call.hints for call in calls(out) if (call.proposal, call.step) == ("llm-0007", step)] == [(hint,)]
+    written = [json.loads(line) for line in (out / "transcripts.jsonl").read_text().splitlines()]
+    assert [call["hints"] for call in written if "hints" in call] == [[asdict(hint)]]
+    assert sum(NOTE in prompt for prompt in chat_server.prompts()) == 1
+
+
+def test_several_hints_stand_in_a_list_and_later_ones_wait_for_the_next_prompt(
+    chat_server: ChatServer, tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+
+    def watch(progress: Progress) -> None:
+        after(2, lambda: (add_hint(out, "first"), add_hint(out, "second")))(progress)
+        after(7, lambda: add_hint(out, "third"))(progress)
+
+    run(out, asks(chat_server), watch=watch)
+    told = prompts_with_hints(out)
+    assert list(told) == ["llm-0004 reasoning", "llm-0010 reasoning"]
+    assert told["llm-0004 reasoning"].startswith("- first\n- second\n\nEnd your answer with")
+    assert told["llm-0010 reasoning"].startswith("third\n\nEnd your answer with")
+    assert {hint.id: proposal for hint, proposal in used_hints(calls(out)).items()} == {
+        1: "llm-0004", 2: "llm-0004", 3: "llm-0010",
+    }  # fmt: skip
+
+
+def test_a_hint_that_came_to_no_model_goes_with_the_next_question(
+    chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that the model refused does not: else it would be refused for ever."""
+    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
+    out = tmp_path / "run"
+    answers: dict[int, Answer] = {4: (503, "{}"), 7: (400, "{}")}  # by trial
+    asked: list[int] = []
+
+    def answer(request: Request) -> Answer:
+        asked.append(status(out).number)
+        return answers.get(asked[-1], designer(request))
+
+    chat_server.answer = answer
+    run(out, asks(chat_server, answer="one-step"), watch=after(3, lambda: add_hint(out, "first")))
+    assert list(prompts_with_hints(out)) == ["llm-0004 answer", "llm-0007 answer"]
+    assert used_hints(calls(out)) == {Hint(1, "first"): "llm-0007"}
+    assert [call.fault for call in calls(out)] == [None, "server", "rejected", None]
+
+
+def test_a_hint_of_a_question_that_was_interrupted_is_asked_again(chat_server: ChatServer, tmp_path: Path) -> None:
+    """With the same words; and once it was answered, the second call of the same proposal has no hint."""
+    out = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        run(out, asks(chat_server), watch=after(3, lambda: (add_hint(out, "first"), interrupt())))
+    shown = preview_after(out, {}).prompt
+    assert NOTE + "first\n" in shown
+    run(out, asks(chat_server))
+    assert [call.prompt for call in calls(out) if call.hints] == [shown]
+    file = out / "transcripts.jsonl"  # as a kill after the thoughts leaves it
+    file.write_text("".join(file.read_text().splitlines(keepends=True)[:3]))  # two checks, and the thoughts
+    (out / "trials.jsonl").write_text("".join((out / "trials.jsonl").read_text().splitlines(keepends=True)[:4]))
+    (out / "summary.json").unlink()
+    chat_server.requests.clear()
+    run(out, asks(chat_server))
+    assert not any(NOTE in prompt for prompt in chat_server.prompts())
+    assert hints_of(calls(out), "llm-0004") == (Hint(1, "first"),)
+
+
+def test_questions_that_are_asked_together_share_no_hint(chat_server: ChatServer, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    out.mkdir()
+    add_hint(out, "first")
+    together = threading.Barrier(2, timeout=PATIENCE)
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) in (2, 3):
+            together.wait()  # both are asked before either is answered
+        return designer(request)
+
+    chat_server.answer = answer
+    run(out, asks(chat_server), in_flight=2)
+    assert len(prompts_with_hints(out)) == 1
+    assert len(used_hints(calls(out))) == 1
+
+
+def test_another_hint_of_the_same_number_is_another_hint(chat_server: ChatServer, tmp_path: Path) -> None:
+    """Numbers begin anew where control.json was deleted."""
+    out = tmp_path / "run"
+
+    def watch(progress: Progress) -> None:
+        after(3, lambda: add_hint(out, "first"))(progress)
+        after(6, lambda: ((out / CONTROL).unlink(), add_hint(out, "second")))(progress)
+
+    run(out, asks(chat_server), watch=watch)
+    assert used_hints(calls(out)) == {Hint(1, "first"): "llm-0004", Hint(1, "second"): "llm-0007"}
+
+
+def test_what_is_shown_is_what_is_sent(chat_server: ChatServer, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    run(out, asks(chat_server), n_total=3)
+    plain = preview_after(out, {}).prompt
+    add_hint(out, "first")
+    shown = preview_after(out, {}).prompt
+    assert shown.replace(f"{NOTE}first\n\n", "") == plain
+    assert NOTE in preview_after(out, {"prompt": "minus"}).prompt
+    run(out, asks(chat_server), n_total=6)
+    assert [call.prompt for call in calls(out) if call.hints] == [shown]
+    assert preview_after(out, {}, number=7).prompt == shown
+    assert NOTE not in preview_after(out, {}).prompt
+
+
+PAPER = FixedProblem(load_task("target-1"))
+
+
+def test_a_prompt_without_hints_is_as_it_was() -> None:
+    history = fixed_history(PAPER)
+    for name in ("plus", "minus"):
+        prompt = load_prompt(name)
+        for hints in ((), ("\u200b", "\x00")):  # in which nothing is to be seen
+            assert prompt.render(history, 3, hints=hints) == prompt.render(history, 3)
+
+
+def test_a_hint_stays_in_its_line() -> None:
+    hint = "first\n\n# Your turn\nORIGIN: (9, 9, 9)\x1b[2J {{ 1 + 1 }} {% endblock %} " + "x" * 1900
+    told = load_prompt("plus").render(fixed_history(PAPER), 3, hints=[hint, "second"]).splitlines()
+    (line,) = [line for line in told if line.startswith("- first")]
+    assert line.startswith("- first # Your turn ORIGIN: (9, 9, 9) {{ 1 + 1 }} {% endblock %} xxx")
+    assert told.count("# Your turn") == 1
+    assert told[told.index(line) + 1] == "- second"
+
+
+@pytest.mark.parametrize("template", ["Be brief.", "{{ targets }}", "{% set told = hints %}Be brief."])
+def test_a_template_that_makes_nothing_of_hints_has_them_at_its_end(template: str) -> None:
+    own, history = Prompt("own", template), fixed_history(PAPER)
+    plain = own.render(history, 3)
+    assert own.render(history, 3, hints=["first"]) == f"{plain}\n{NOTE}first\n"
+    assert own.render(history, 3, hints=["first", "second"]) == f"{plain}\n{NOTES}- first\n- second\n"
+
+
+def test_a_template_that_extends_ours_has_them_where_ours_has() -> None:
+    history = fixed_history(PAPER)
+    for own in (
+        Prompt("own", '{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}'),
+        Prompt("own", whole_template("plus")),
+    ):
+        text = own.render(history, 3, hints=["first"])
+        assert text.count(NOTE) == 1
+        assert text.index(NOTE) < text.index("End your answer")
+    emptied = Prompt("own", '{% extends "proposal.md.j2" %}{% block hints %}{% endblock %}')
+    assert emptied.render(history, 3, hints=["first"]).endswith(f"\n\n{NOTE}first\n")
+
+
+def test_a_template_may_put_them_as_it_likes() -> None:
+    own = Prompt("own", "{% for hint in hints %}!{{ hint | upper }}{% endfor %} Go.")
+    assert own.render(fixed_history(PAPER), 3, hints=["first", "second"]) == "!FIRST!SECOND Go.\n"
+
+
+def test_a_run_with_a_template_that_knows_no_hints(chat_server: ChatServer, tmp_path: Path) -> None:
+    out, own = tmp_path / "run", tmp_path / "own.md"
+    own.write_text("{{ targets }} End with ORIGIN, JOINTS and LINKS.")
+    run(out, asks(chat_server, prompt=str(own)), watch=after(5, lambda: add_hint(out, "first")))
+    ends = [call.prompt.rpartition("LINKS.\n")[2] for call in calls(out) if call.step == "reasoning"]
+    assert ends == ["", f"\n{NOTE}first\n", ""]
+
+
+def test_a_run_with_hints_is_replayed_to_the_letter(chat_server: ChatServer, tmp_path: Path) -> None:
+    """The replay's own control.json adds nothing; and a replay can be replayed."""
+
+    def answer(request: Request) -> Answer:
+        n = len(chat_server.requests)
+        return json.dumps({**GOOD_DESIGN, "link_1": 0.1 + 0.001 * n}) if "response_format" in request else f"idea {n}"
+
+    chat_server.answer = answer
+    first = tmp_path / "first"
+    run(first, asks(chat_server), watch=after(5, lambda: add_hint(first, "first")))
+    assert len(used_hints(calls(first))) == 1
+    chat_server.requests.clear()
+    before = first
+    for again in (tmp_path / "again", tmp_path / "third"):
+        again.mkdir()
+        add_hint(again, "another")
+        run(again, ReplayProposer(before, strict=True))
+        assert lines(again) == lines(first)
+        assert [call.hints for call in calls(again)] == [call.hints for call in calls(first)]
+        before = again
+    assert not chat_server.requests
+
+
+def test_people_who_answer_by_files_get_no_hints(tmp_path: Path) -> None:
+    """Their question has to stay the same until it is answered."""
+    out, folder = tmp_path / "run", tmp_path / "ask"
+    for _ in range(2):
+        with pytest.raises(AnswerPendingError):
+            run(out, ManualProposer(folder, wait=False))
+        add_hint(out, "first")
+    assert "engineer" not in (folder / "004-prompt.md").read_text()
+    assert status(out).doing == "stopped"
+    assert "004-prompt.md waits for" in status(out).fault

@@ -1,0 +1,114 @@
+"""Habits of designs: round lengths, bases on symmetry planes, repeats, the front's share."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from armwright.problem.problem import Problem
+from armwright.runs.history import History
+from armwright.runs.proposer_bias import are_round, diagnose, front_share, repeated
+from armwright.runs.trial import FinishedTrial
+from armwright.spaces.parameters import Design
+from armwright.tasks.task import load_task, random_task
+
+EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
+TARGET_2 = Problem(load_task("target-2"))  # symmetric about y = 0, x = 0.5 and its own z = 0.5
+WITHOUT_SYMMETRY = Problem(random_task(0))
+
+
+def design(
+    origin: tuple[float, float, float] = (0.11, 0.12, 0.13),
+    joints: str = "YPPR",
+    links: tuple[float, ...] = (0.1, 0.15, 0.2, 0.25),
+) -> Design:
+    return TARGET_2.space.clipped(origin, joints, links)
+
+
+def history(designs: list[tuple[str, Design]], problem: Problem = TARGET_2, n_init: int = 0) -> History:
+    return History(problem, [FinishedTrial(i, s, d, (1.0 + i, 2.0)) for i, (s, d) in enumerate(designs)], n_init)
+
+
+@EXAMPLES
+@given(st.lists(st.integers(1, 60), min_size=1, max_size=8))
+def test_multiples_of_a_step_are_round_however_they_were_computed(steps: list[int]) -> None:
+    assert are_round([n * 0.05 for n in steps], 0.05)
+    assert are_round([sum([0.05] * n) for n in steps], 0.01)
+    assert are_round([n / 20 + 9e-10 for n in steps], 0.05)
+    assert not are_round([*(n / 20 for n in steps), 0.1 + 2e-9], 0.05)
+    assert not are_round([*(n / 20 for n in steps), 0.11], 0.05)
+    assert are_round([*(n / 20 for n in steps), 0.11], 0.01)
+
+
+def test_the_proposers_habits_stand_beside_the_black_boxs() -> None:
+    past = history(
+        [
+            ("random", design(links=(0.1, 0.1, 0.1, 0.1))),
+            ("rules", design(origin=(0.3, 0.0, 0.2))),  # on y = 0
+            ("bbo", design(origin=(0.3, 0.01, 0.2), links=(0.11, 0.12, 0.13, 0.14))),
+            ("rules", design(origin=(0.5, 0.3, 0.2), links=(0.11, 0.2, 0.2, 0.2))),  # on x = 0.5
+            ("rules", design(origin=(0.2, 2e-6, 0.2), links=(0.111, 0.2, 0.2, 0.2))),
+            ("rules", design(origin=(0.2, 9e-7, 0.2), links=(0.111, 0.2, 0.2, 0.2))),  # also a near-repeat
+            ("bbo", design(origin=(0.3, 0.0, 0.2))),  # a repeat of the proposer's
+        ]
+    )
+    found = diagnose(past, "rules")
+    assert found.symmetry_planes == 3
+    assert found.proposer is not None
+    assert found.black_box is not None
+    assert (found.proposer.designs, found.black_box.designs) == (4, 2)
+    assert (found.proposer.lengths_5_cm, found.black_box.lengths_5_cm) == (0.25, 0.5)
+    assert (found.proposer.lengths_1_cm, found.black_box.lengths_1_cm) == (0.5, 1.0)
+    assert (found.proposer.base_on_symmetry_plane, found.black_box.base_on_symmetry_plane) == (0.75, 0.5)
+    assert (found.proposer.repeats, found.black_box.repeats) == (0.0, 0.5)
+    assert (found.proposer.near_repeats, found.black_box.near_repeats) == (0.25, 0.5)
+
+
+def test_where_the_targets_have_no_symmetry_no_base_can_be_on_it() -> None:
+    found = diagnose(history([("rules", design())], WITHOUT_SYMMETRY), "rules")
+    assert found.symmetry_planes == 0
+    assert found.proposer is not None
+    assert found.proposer.base_on_symmetry_plane is None
+    assert found.black_box is None
+
+
+def test_uniform_designs_have_no_habits() -> None:
+    drawn = TARGET_2.space.sample(300, 0)
+    found = diagnose(history([("bbo", d) for d in drawn]), "rules")
+    assert found.proposer is None
+    assert found.front_share is None
+    assert found.black_box is not None
+    shares = (found.black_box.lengths_1_cm, found.black_box.base_on_symmetry_plane, found.black_box.near_repeats)
+    assert shares == (0.0, 0.0, 0.0)
+
+
+@EXAMPLES
+@given(st.integers(0, 6), st.floats(-3e-3, 3e-3))
+def test_near_repeats_are_within_a_millimetre_in_every_number(place: int, moved: float) -> None:
+    numbers = np.array([0.11, 0.12, 0.13, 0.1, 0.15, 0.2, 0.25])
+    numbers[place] += moved
+    other = design(tuple(numbers[:3].tolist()), links=tuple(numbers[3:].tolist()))
+    exact, near = repeated(history([("bbo", design()), ("rules", other)]))
+    assert exact.tolist() == [False, other == design()]
+    if abs(abs(moved) - 1e-3) > 1e-8:
+        assert near.tolist() == [False, abs(moved) < 1e-3]
+
+
+def test_other_joints_are_no_repeat() -> None:
+    exact, near = repeated(history([("bbo", design()), ("rules", design(joints="YPPP")), ("rules", design())]))
+    assert exact.tolist() == near.tolist() == [False, False, True]
+
+
+def test_whether_the_share_of_the_front_grows() -> None:
+    """Every trial here is on the front as long as none is better in both."""
+    values = [(5.0, 1.0), (4.0, 2.0), (3.0, 3.0), (2.0, 4.0), (1.0, 5.0)]
+
+    def share(sources: list[str]) -> tuple[float, float, bool]:
+        trials = [FinishedTrial(i, s, design(), v) for i, (s, v) in enumerate(zip(sources, values, strict=True))]
+        found = front_share(History(TARGET_2, trials, 1), "rules")
+        assert found is not None
+        return found.half, found.end, found.grows
+
+    assert share(["random", "bbo", "rules", "rules", "rules"]) == pytest.approx((1 / 3, 3 / 5, True))
+    assert share(["random", "rules", "bbo", "bbo", "bbo"]) == pytest.approx((1 / 3, 1 / 5, False))
+    assert front_share(history([("random", design())], n_init=1), "random") is None

@@ -1,0 +1,246 @@
+"""What a run leaves on disk, and what happens when it was damaged."""
+
+import csv
+import json
+import re
+import resource
+from pathlib import Path
+
+import pytest
+import yaml
+
+from armwright.exceptions import ArmwrightError, RunConflictError, RunFolderError
+from armwright.problem.problem import Problem
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.folder import read_run
+from armwright.runs.results import read_summary
+from armwright.study.study import Run, optimize
+from armwright.tasks.task import load_task
+
+PROBLEM = Problem(load_task("target-1"))
+
+
+def short(out: Path, n_total: int = 8) -> Run:
+    return optimize(PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    return short(tmp_path / "run")
+
+
+def folder(run: Run) -> Path:
+    assert run.folder is not None
+    return run.folder
+
+
+def test_the_files_of_a_run(run: Run) -> None:
+    names = {path.name for path in folder(run).iterdir()} - {".lock"}
+    results = {"trials.csv", "front.csv", "summary.json", "designs"}
+    assert names == {"config.yaml", "trials.jsonl", "status.json", *results}
+
+
+def test_trials_are_one_json_line_each(run: Run) -> None:
+    lines = [json.loads(line) for line in (folder(run) / "trials.jsonl").read_text().splitlines()]
+    for line, trial in zip(lines, run.trials, strict=True):
+        reason = ["reason"] if trial.source == "rules" else []
+        assert list(line) == ["number", "source", "proposal", "params", "values", *reason, "seconds"]
+        assert line["number"] == trial.number
+        assert line["params"] == dict(trial.design.params)
+        assert line["values"] == list(trial.values)
+        assert set(line["seconds"]) == {"total", "sampling", "evaluation", "proposing"}
+
+
+def test_config_repeats_the_run(run: Run) -> None:
+    config = yaml.safe_load((folder(run) / "config.yaml").read_text())
+    assert config["task"]["targets"][0] == [-0.45, -0.45, -0.45]
+    assert config["method"] == {
+        "proposer": {"name": "rules"},
+        "sampler": "tpe",
+        "n_init": 5,
+        "n_step": 4,
+        "n_total": 8,
+        "in_flight": None,
+        "polish_every": None,
+        "start": [],
+    }
+    assert config["seed"] == 0
+    assert {"armwright", "optuna", "warp-lang", "python"} <= set(config["versions"])
+    read, history = read_run(folder(run))
+    assert read == run.config
+    assert list(history) == list(run.trials)
+
+
+def test_summary(run: Run) -> None:
+    summary = json.loads((folder(run) / "summary.json").read_text())
+    assert summary == read_summary(folder(run)) == run.summary
+    assert list(summary) == [
+        "task",
+        "seed",
+        "n_trials",
+        "by_source",
+        "hypervolume",
+        "best_known",
+        "front_size",
+        "verification",
+        "evaluations",
+        "same_arms",
+        "polish",
+        "credit",
+        "proposer",
+        "diagnostics",
+        "seconds",
+        "versions",
+    ]
+    assert summary["by_source"] == {"random": 5, "rules": 2, "bbo": 6}
+    assert list(summary["hypervolume"]) == ["reference_point", "final", "mean", "history"]
+    assert len(summary["hypervolume"]["history"]) == 8
+    assert summary["proposer"]["name"] == "rules"
+    assert summary["front_size"] == len(run.front)
+    assert list(summary["credit"]) == ["random", "rules", "bbo"]
+    assert all(list(brought) == ["trials", "front", "hypervolume_gained"] for brought in summary["credit"].values())
+    gained = [brought["hypervolume_gained"] for brought in summary["credit"].values()]
+    assert sum(gained) == pytest.approx(summary["hypervolume"]["final"])
+    assert list(summary["diagnostics"]) == ["symmetry_planes", "proposer", "black_box", "front_share"]
+    assert summary["diagnostics"]["proposer"]["designs"] == 2
+
+
+def test_without_a_proposer_there_is_nothing_to_diagnose() -> None:
+    summary = optimize(PROBLEM, proposer="none", n_init=2, n_total=2).summary
+    assert summary["diagnostics"] is None
+    assert list(summary["credit"]) == ["random", "bbo"]
+
+
+def test_designs_of_the_front(run: Run) -> None:
+    written = sorted(path.name for path in (folder(run) / "designs").iterdir())
+    assert written == sorted(f"{member.number:04d}" for member in run.front)
+    assert run.front
+    for member in run.front:
+        place = folder(run) / "designs" / f"{member.number:04d}"
+        record = json.loads((place / "design.json").read_text())
+        assert record["params"] == dict(member.design.params)
+        assert record["source"] == member.source
+        assert bool(record["reason"]) == (member.source == "rules")
+        assert (record["objectives"]["position_error"], record["objectives"]["torque"]) == member.values
+        assert sum(target["position_error"] for target in record["targets"]) == pytest.approx(member.values[0])
+        norms = [sum(t**2 for t in target["joint_torques"]) ** 0.5 for target in record["targets"]]
+        assert 40 * sum(norms) == pytest.approx(member.values[1])
+        assert [target["target"] for target in record["targets"]] == [list(t) for t in PROBLEM.task.targets]
+        assert {len(target["q"]) for target in record["targets"]} == {4}
+        assert (place / "arm.urdf").read_text() == to_urdf(member.arm, name=f"target-1-{member.number}")
+
+
+def test_tables(run: Run) -> None:
+    with open(folder(run) / "trials.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 13
+    assert list(rows[0])[:5] == ["number", "source", "origin_x", "origin_y", "origin_z"]
+    assert [float(row["torque"]) for row in rows] == [trial.values[1] for trial in run.trials]
+    with open(folder(run) / "front.csv", newline="") as file:
+        assert {int(row["number"]) for row in csv.DictReader(file)} == {member.number for member in run.front}
+
+
+def test_designs_that_left_the_front_are_removed(tmp_path: Path) -> None:
+    short(tmp_path / "run", n_total=2)
+    longer = short(tmp_path / "run", n_total=40)
+    written = {path.name for path in (tmp_path / "run" / "designs").iterdir()}
+    assert written == {f"{member.number:04d}" for member in longer.front}
+
+
+@pytest.mark.parametrize("cut", [1, 20, 100])
+def test_a_cut_last_line_is_dropped_and_the_trial_made_again(run: Run, tmp_path: Path, cut: int) -> None:
+    trials = folder(run) / "trials.jsonl"
+    whole = trials.read_bytes()
+    trials.write_bytes(whole[:-cut])
+    again = short(tmp_path / "run")
+    assert again.resumed == 12
+    assert [t.values for t in again.trials] == [t.values for t in run.trials]
+    assert len(trials.read_bytes().splitlines()) == 13
+
+
+def test_everything_but_config_and_trials_can_be_deleted(run: Run, tmp_path: Path) -> None:
+    summary = (folder(run) / "summary.json").read_bytes()
+    for name in ("summary.json", "trials.csv", "front.csv"):
+        (folder(run) / name).unlink()
+    short(tmp_path / "run")
+    assert (folder(run) / "summary.json").read_bytes() == summary
+    assert (folder(run) / "front.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda lines: [*lines[:3], b"{broken}\n", *lines[4:]], "line 4 is damaged"),
+        (lambda lines: [*lines[:3], *lines[4:]], "line 4 is damaged (expected trial number 3, found 4)"),
+        (lambda lines: [*lines[:3], lines[2], *lines[3:]], "line 4 is damaged (expected trial number 3, found 2)"),
+        (lambda lines: [*lines[:3], lines[3].replace(b'"values": [', b'"values": [NaN, '), *lines[4:]], "line 4"),
+        (lambda lines: [*lines[:3], lines[3].replace(b'"link_1": 0.', b'"link_1": 7.'), *lines[4:]], "link_1 = 7."),
+        (lambda lines: [*lines[:3], lines[3].replace(b'"params"', b'"parms"'), *lines[4:]], "params: Field required"),
+        (lambda lines: [b"\x00\xff\n", *lines[1:]], "line 1 is damaged"),
+        (lambda lines: [b"3\n", *lines[1:]], "line 1 is damaged"),
+        (lambda lines: [b"[" * 100_000 + b"\n", *lines[1:]], "line 1 is damaged"),
+        (lambda lines: [lines[0].replace(b'"values": [', b'"values": [1' + b"0" * 400 + b", "), *lines[1:]], "line 1"),
+        (lambda lines: [lines[0].replace(b'"proposal": null', b'"proposal": 5'), *lines[1:]], "proposal"),
+        (lambda lines: [re.sub(rb'"seconds": .*', b'"seconds": 3}', lines[0]), *lines[1:]], "seconds"),
+    ],
+)
+def test_damaged_trials_are_named_by_line_and_left_alone(run: Run, tmp_path: Path, damage: object, words: str) -> None:
+    trials = folder(run) / "trials.jsonl"
+    content = b"".join(damage(trials.read_bytes().splitlines(keepends=True)))  # type: ignore[operator]
+    trials.write_bytes(content)
+    with pytest.raises(RunFolderError) as refusal:
+        short(tmp_path / "run")
+    assert words in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert trials.read_bytes() == content
+
+
+def test_a_damaged_config_is_named(run: Run, tmp_path: Path) -> None:
+    (folder(run) / "config.yaml").write_text("task: [")
+    with pytest.raises(RunFolderError, match=r"config.yaml is not valid YAML"):
+        short(tmp_path / "run")
+
+
+def test_results_without_their_trials_are_not_taken_over(run: Run, tmp_path: Path) -> None:
+    (folder(run) / "trials.jsonl").unlink()
+    with pytest.raises(RunConflictError, match=r"holds results of a run .* but no trial in trials.jsonl"):
+        short(tmp_path / "run")
+    assert (folder(run) / "summary.json").exists()
+
+
+def test_trials_without_their_config_are_not_taken_over(run: Run, tmp_path: Path) -> None:
+    (folder(run) / "config.yaml").unlink()
+    with pytest.raises(RunFolderError, match=r"cannot read config.yaml"):
+        short(tmp_path / "run")
+
+
+@pytest.mark.parametrize("name", ["figures/mine.png", "notes.txt", "config.yaml", "designs/0001/arm.urdf"])
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / name).write_text("mine: 1\n")
+    with pytest.raises(ArmwrightError, match=r"holds no run|unknown key"):
+        short(tmp_path)
+    assert (tmp_path / name).read_text() == "mine: 1\n"
+
+
+def test_a_folder_that_is_no_run_folder(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="not a run folder"):
+        read_run(tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunFolderError, match="cannot write"):
+        short(tmp_path / "file")
+
+
+def test_a_full_disk_is_one_line_and_what_was_written_is_safe(tmp_path: Path) -> None:
+    """A limit on the size of files stands in for the full disk: the write that crosses it is cut short."""
+    whole = short(tmp_path / "whole")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, hard))
+    try:
+        with pytest.raises(RunFolderError, match=r"cannot write .*trials.jsonl.*What was written before is safe"):
+            short(tmp_path / "run")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    again = short(tmp_path / "run")
+    assert 0 < again.resumed < 13
+    assert [trial.values for trial in again.trials] == [trial.values for trial in whole.trials]

@@ -1,0 +1,147 @@
+"""Choosing a design, and writing it for others."""
+
+import csv
+import io
+import json
+from contextlib import suppress
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import yourdfpy
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import FailureError, SettingsError
+from armwright.pareto import knee_number
+from armwright.problem.problem import Problem
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from armwright.runs.selection import Condition, numbers_of, pick, pick_from, read_condition, read_weights
+from armwright.study.study import optimize
+from armwright.tasks.task import load_task
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("decision") / "run"
+    optimize(Problem(load_task("target-2")), proposer="rules", n_total=40, seed=1, out=folder)
+    return folder
+
+
+@pytest.fixture
+def history(run: Path) -> History:
+    return read_run(run)[1]
+
+
+def test_what_is_picked_meets_the_conditions_and_is_the_best(history: History) -> None:
+    conditions = [Condition("position_error", "<=", 2.0), Condition("length", "<", 0.6)]
+    picked = pick(history, conditions, by="torque")
+    told = [numbers_of(history, member) for member in history.front]
+    meeting = [numbers for numbers in told if numbers["position_error"] <= 2.0 and numbers["length"] < 0.6]
+    assert [member.values[1] for member in picked] == sorted(numbers["torque"] for numbers in meeting)
+
+
+def test_without_wishes_it_is_the_knee(history: History) -> None:
+    assert pick(history)[0].number == knee_number(history.values, (5.0, 5.0))
+    assert len(pick(history)) == len(history.front)
+
+
+def test_weights_are_shares_of_the_reference_point(history: History) -> None:
+    values = np.array([member.values for member in history.front])
+    for weights in ((1.0, 0.0), (0.0, 2.0), (3.0, 1.0)):
+        best = history.front[int(np.argmin(values @ (np.array(weights) / 5.0)))]
+        named = dict(zip(("position_error", "torque"), weights, strict=True))
+        assert pick(history, weights=named)[0].number == best.number
+
+
+def test_only_solid_ones(run: Path) -> None:
+    solid = json.loads((run / "summary.json").read_text())["verification"]["solid_numbers"]
+    _, picked = pick_from(run, solid=True)
+    assert sorted(member.number for member in picked) == sorted(solid)
+
+
+def test_why_nothing_is_left(history: History) -> None:
+    least = min(member.values[0] for member in history.front)
+    with pytest.raises(FailureError, match=f"position_error <= 1e-06; the nearest has {least:.4g}"):
+        pick(history, [Condition("torque", "<", 100.0), Condition("position_error", "<=", 1e-6)])
+    both = [Condition("position_error", "<=", least), Condition("torque", "<", 0.2)]
+    with pytest.raises(FailureError, match="all of these conditions at once"):
+        pick(history, both)
+    with pytest.raises(SettingsError, match=r'no number "torqe".*Did you mean "torque"'):
+        pick(history, [Condition("torqe", "<", 1.0)])
+    with pytest.raises(SettingsError, match='no number "mass"'):
+        pick(history, weights={"mass": 1.0})  # not an objective here
+    with pytest.raises(SettingsError, match="not by both"):
+        pick(history, by="torque", weights={"torque": 1.0})
+
+
+@given(
+    st.from_regex(r"[a-z_]{1,12}", fullmatch=True),
+    st.sampled_from(["<=", ">=", "<", ">"]),
+    st.floats(allow_nan=False, allow_infinity=False),
+)
+def test_a_condition_is_read_as_it_is_written(name: str, relation: str, bound: float) -> None:
+    assert read_condition(f"{name} {relation}{bound!r}") == Condition(name, relation, bound)
+
+
+@given(st.text(max_size=40))
+def test_no_words_break_the_reading(words: str) -> None:
+    for read in (read_condition, read_weights):
+        with suppress(SettingsError):
+            read(words)
+
+
+@pytest.mark.parametrize("words", ["", "torque", "torque<", "torque<=x", "__import__('os')<1", "a<1<2", "torque==1"])
+def test_what_is_no_condition_is_refused(words: str) -> None:
+    with pytest.raises(SettingsError, match="are needed, such as"):
+        read_condition(words)
+
+
+def invoke(*arguments: str | Path) -> str:
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_the_commands(run: Path, history: History, tmp_path: Path) -> None:
+    told = json.loads(invoke("pick", run, "--where", "position_error<=1.5", "--by", "torque", "-n", "2", "--json"))
+    assert len(told) == 2
+    number = told[0]["number"]
+    assert f"#{number} " in invoke("pick", run, "--where", "position_error<=1.5", "--by", "torque")
+    urdf = invoke("export", run, "--design", number)
+    assert urdf == (run / "designs" / f"{number:04d}" / "arm.urdf").read_text()
+    robot = yourdfpy.URDF.load(io.StringIO(urdf))
+    assert len(robot.actuated_joints) == 4
+    invoke("export", run, "--format", "mjcf", "--out", tmp_path / "deep" / "arm.xml")
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "deep" / "arm.xml")).njnt == 4
+
+
+def test_the_build_sheet_says_what_the_joints_hold(run: Path, history: History) -> None:
+    number = history.front[0].number
+    arm, evaluation = history.member(number).arm, history.evaluation([number])
+    rows = list(csv.DictReader(io.StringIO(invoke("export", run, "--design", number, "--format", "sheet-csv"))))
+    torques = np.abs(evaluation.joint_torques[0])
+    for j, row in enumerate(rows):
+        assert float(row["length"]) == pytest.approx(arm.links[j].length)
+        assert float(row["torque"]) == pytest.approx(torques[:, j].max())
+        assert torques[int(row["target"]) - 1, j] == torques[:, j].max()
+        assert float(row["used_low"]) == pytest.approx(evaluation.q[0, :, j].min())
+    sheet = invoke("export", run, "--design", number, "--format", "sheet")
+    for link in arm.links:
+        assert f"{1e3 * link.length:.1f} mm" in sheet
+    assert f"{1e3 * evaluation.position_error.max():.2f} mm at most" in sheet
+
+
+def test_mistakes_are_named(run: Path) -> None:
+    for arguments, words in (
+        (["export", str(run), "--design", "999"], "has the designs 0 to 49"),
+        (["export", str(run), "--format", "urfd"], 'Did you mean "urdf"'),
+        (["pick", str(run), "-n", "0"], "-n 0"),
+        (["pick", str(run), "--weights", "torque"], "names with numbers"),
+    ):
+        result = CliRunner().invoke(app, arguments)
+        assert words in str(result.exception)

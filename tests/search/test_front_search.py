@@ -1,0 +1,270 @@
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armwright.pareto import front_mask, hypervolume
+from armwright.problem.problem import Problem
+from armwright.search.encoding import Columns
+from armwright.search.front_search import CAPACITIES, FIRST_BATCH, SMALLEST_BATCH, FrontSearch
+from armwright.search.survival import leaders, survivors
+from armwright.search.variation import RARE_SHARE, _parents
+from armwright.spaces.design_space import paper_space
+from armwright.spaces.parameters import CategoricalParameter, FloatParameter
+from armwright.tasks.task import load_task
+
+SPACE = paper_space()
+MIXED = (
+    FloatParameter("a", -2.0, 3.0, "m"),
+    CategoricalParameter("kind", ("u", "v", "w")),
+    *(FloatParameter(f"x_{i}", 0.0, 1.0, "m") for i in range(4)),
+    FloatParameter("fixed", 0.5, 0.5, "m"),
+)
+
+
+def dtlz2(n_objectives):
+    """DTLZ2 over the columns of MIXED (Deb et al. 2005): the front is the unit sphere, reached by kind v alone."""
+
+    def evaluate(rows):
+        units = np.column_stack([(rows[:, 0] + 2.0) / 5.0, rows[:, 2:]])
+        angles, rest = units[:, : n_objectives - 1] * np.pi / 2, units[:, n_objectives - 1 :]
+        radius = 1.0 + np.sum((rest - 0.5) ** 2, axis=1) + 0.3 * (rows[:, 1] != 1)
+        values = np.repeat(radius[:, None], n_objectives, axis=1)
+        for m in range(n_objectives):
+            values[:, m] *= np.prod(np.cos(angles[:, : n_objectives - 1 - m]), axis=1)
+            values[:, m] *= np.sin(angles[:, n_objectives - 1 - m]) if m else 1.0
+        return values
+
+    return evaluate
+
+
+def made(n_objectives=2, seed=0, **known):
+    return FrontSearch(MIXED, dtlz2(n_objectives), [1.1] * n_objectives, seed, **known)
+
+
+def stepped(search, n):
+    for _ in range(n):
+        search.step()
+    return search
+
+
+def assert_same(one, other):
+    np.testing.assert_array_equal(one.rows, other.rows)
+    np.testing.assert_array_equal(one.values, other.values)
+    np.testing.assert_array_equal(one.history, other.history)
+    assert one.evaluations == other.evaluations
+
+
+def test_the_same_seed_gives_the_same_front_and_another_seed_another():
+    one = stepped(made(), 10)
+    assert_same(one, stepped(made(), 10))
+    assert not np.array_equal(one.rows, stepped(made(seed=1), 10).rows)
+
+
+@pytest.mark.parametrize("n_objectives", [1, 2, 3, 4])
+def test_a_restored_search_goes_on_to_the_bit(n_objectives):
+    whole = stepped(made(n_objectives), 12)
+    state = stepped(made(n_objectives), 5).state()
+    restored = made(n_objectives)
+    restored.restore(state)
+    assert_same(stepped(restored, 7), whole)
+
+
+def test_asking_again_gives_the_same_designs_until_they_are_told():
+    search = stepped(made(), 2)
+    rows = search.ask()
+    np.testing.assert_array_equal(search.ask(), rows)
+    search.tell(rows, dtlz2(2)(rows))
+    assert not np.array_equal(search.ask(), rows)
+
+
+def test_evaluations_are_counted():
+    assert stepped(made(), 3).evaluations == FIRST_BATCH + 2 * SMALLEST_BATCH
+
+
+@pytest.mark.parametrize(("n_objectives", "least"), [(1, 0.999), (2, 0.98), (3, 0.9), (4, 0.7)])
+def test_the_front_of_dtlz2_is_found(n_objectives, least):
+    search = stepped(made(n_objectives), 60)
+    share_of_sphere = {1: 1.0, 2: np.pi / 4, 3: np.pi / 6, 4: np.pi**2 / 32}[n_objectives]
+    best = 1.1**n_objectives - share_of_sphere
+    assert least * best < search.hypervolume <= best
+    assert np.mean(search.rows[:, 1] == 1) > 0.9
+
+
+def test_the_front_is_a_front_within_the_box_and_bounded_in_number():
+    search = stepped(made(), 60)
+    assert CAPACITIES[0] <= len(search.rows) == len(search.values) <= CAPACITIES[1]
+    assert front_mask(search.values).all()
+    assert np.all(search.values < 1.1)
+    assert np.all(np.diff(search.values[:, 0]) > 0.0)
+    np.testing.assert_array_equal(dtlz2(2)(search.rows), search.values)
+
+
+def test_every_design_asked_for_lies_in_its_space():
+    search = made()
+    for _ in range(20):
+        rows = search.ask()
+        for column, parameter in zip(rows.T, MIXED, strict=True):
+            if isinstance(parameter, FloatParameter):
+                assert np.all((parameter.low <= column) & (column <= parameter.high))
+            else:
+                assert set(column) <= set(range(len(parameter.choices)))
+        search.tell(rows, dtlz2(2)(rows))
+
+
+def test_a_space_without_categories_can_be_searched():
+    parameters = [p for p in MIXED if isinstance(p, FloatParameter)]
+    search = FrontSearch(parameters, lambda rows: rows[:, :2] ** 2, [10.0, 10.0], seed=0)
+    assert stepped(search, 30).hypervolume > 99.9
+
+
+def test_known_designs_are_taken_along():
+    perfect = np.array([[0.5, 1, 0.5, 0.5, 0.5, 0.5, 0.5]])
+    unvalued = made(rows=perfect)
+    assert len(unvalued.ask()) == FIRST_BATCH + 1
+    valued = made(rows=perfect, values=dtlz2(2)(perfect))
+    assert valued.hypervolume > 0.0
+    assert valued.evaluations == 0
+    for search in (stepped(unvalued, 5), stepped(valued, 5)):
+        assert np.any(np.all(search.rows == perfect, axis=1))
+
+
+def test_a_search_stalls_when_the_hypervolume_no_longer_grows():
+    search = stepped(made(), 1)
+    assert not search.stalled
+    while not search.stalled:
+        search.step()
+        assert search.evaluations < 500_000
+    late, early = search.hypervolume, np.interp(search.evaluations / 2, *search.history.T)
+    assert late / early - 1.0 < 1e-3
+
+
+def test_side_pools_begin_join_and_survive_a_stop(monkeypatch):
+    for name, value in (("SIDE_FROM", 2000), ("SIDE_LIFE", 1500)):
+        monkeypatch.setattr(f"armwright.search.front_search.{name}", value)
+    search, ages = made(), []
+    while search.evaluations < 12_000:
+        search.step()
+        ages.append(int(search.state()["side_age"]))
+        if len(ages) == 60:
+            other = made()
+            other.restore(search.state())
+    assert max(ages) < 1500
+    assert sum(before > after for before, after in itertools.pairwise(ages)) >= 1  # one joined
+    spent = search.state()["side_evaluations"]
+    assert spent == pytest.approx(0.25 * (search.evaluations - 2000), abs=FIRST_BATCH)
+    while other.evaluations < 12_000:
+        other.step()
+    assert np.array_equal(other.rows, search.rows)
+
+
+def test_a_front_wholly_outside_the_box_is_drawn_towards_it():
+    search = FrontSearch(MIXED, lambda rows: 5.0 + dtlz2(2)(rows), [5.9, 5.9], seed=0)
+    assert len(stepped(search, 1).values) == 0 or search.hypervolume >= 0.0
+    assert stepped(search, 30).hypervolume > 0.0
+
+
+def test_survivors_are_those_that_the_hypervolume_needs():
+    rng = np.random.default_rng(0)
+    values = rng.random((500, 2))
+    kept = survivors(values, np.array([1.0, 1.0]), 5)
+    front = np.flatnonzero(front_mask(values))
+    assert len(kept) == 5
+    assert set(kept) <= set(front)
+    at_random = [hypervolume(values[rng.choice(front, 5, replace=False)], [1.0, 1.0]) for _ in range(50)]
+    assert hypervolume(values[kept], [1.0, 1.0]) >= max(at_random)
+
+
+def test_survivors_beside_a_small_front_are_the_next_best_and_of_equals_one_is_first():
+    values = np.array([[9.0, 9.0], [1.0, 1.0], [1.0, 1.0], [2.0, 2.0], [0.0, 7.0], [6.0, 0.0]])
+    kept = survivors(values, np.array([5.0, 5.0]), 5)
+    assert kept.tolist() == [1, 2, 3, 4, 5]
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0), st.integers(0, 5)), min_size=1, max_size=60),
+    st.integers(1, 4),
+)
+def test_leaders_are_the_best_of_the_best_structures(points, most):
+    values, structures = np.array(points)[:, :2], np.array([kind for _, _, kind in points])
+    reference = np.array([1.5, 1.5])
+    kept = leaders(values, structures, reference, most)
+    boxes = np.prod(np.maximum(reference - values, 0.0), axis=1)
+    largest = {kind: boxes[structures == kind].max() for kind in set(structures.tolist())}
+    led = set(structures[kept].tolist())
+    assert len(set(kept.tolist())) == len(kept)
+    assert len(led) == min(most, len(largest))
+    assert all(largest[kind] <= min(largest[one] for one in led) for kind in set(largest) - led)
+    for kind in led:
+        chosen = [row for row in kept if structures[row] == kind]
+        assert 1 <= len(chosen) <= 3
+        assert largest[kind] in boxes[chosen]
+
+
+def test_rare_structures_have_more_than_their_share_of_children():
+    columns = Columns(MIXED)
+    rows = columns.random(100, np.random.default_rng(0))
+    rows[:, 1] = 0.0
+    rows[-1, 1] = 2.0  # the only one of its kind
+    structures = np.sort(columns.structures(rows))
+    parents = _parents(structures, 20_000, np.random.default_rng(1))
+    share = np.mean(structures[parents] == structures[-1])
+    assert share == pytest.approx(RARE_SHARE / 2 + (1 - RARE_SHARE) / 100, abs=0.01)
+    assert set(parents.tolist()) == set(range(100))
+
+
+def test_columns_are_the_space_s():
+    columns = Columns(SPACE.parameters)
+    rows = columns.random(200, np.random.default_rng(0))
+    assert rows.shape == (200, len(SPACE.parameters))
+    for design in SPACE.designs(rows):
+        SPACE.design(design.params)
+    assert len(np.unique(columns.structures(rows))) > 60
+    np.testing.assert_allclose(columns.from_units(columns.units(rows)), rows[:, columns.real], atol=1e-15)
+
+
+def test_numbers_beyond_a_range_are_reflected_into_it():
+    columns = Columns(MIXED[:1])
+    units = np.array([[-0.1], [0.0], [1.2], [2.5], [-7.0]])
+    np.testing.assert_allclose(columns.from_units(units)[:, 0], [-1.5, -2.0, 2.0, -2.0, -2.0], atol=1e-12)
+
+
+def test_arms_are_found_far_better_than_at_random():
+    problem = Problem(load_task("target-1"))
+    search = stepped(
+        FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed=0), 8
+    )
+    columns = Columns(SPACE.parameters)
+    random = problem.evaluate_matrix(columns.random(search.evaluations, np.random.default_rng(0))).values
+    assert search.hypervolume > 1.1 * hypervolume(random, (5.0, 5.0))
+
+
+@pytest.mark.slow
+def test_pymoo_s_nsga2_finds_no_more_on_average_over_five_seeds():
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem as PymooProblem
+    from pymoo.optimize import minimize
+
+    problem = Problem(load_task("target-2"))
+    bounds = [(p.low, p.high) if isinstance(p, FloatParameter) else (0.0, 3.0 - 1e-9) for p in SPACE.parameters]
+    categorical = [isinstance(p, CategoricalParameter) for p in SPACE.parameters]
+
+    class Arms(PymooProblem):
+        def _evaluate(self, x, out, *args, **kwargs):
+            out["F"] = problem.evaluate_matrix(np.where(categorical, np.floor(x), x)).values
+            found.append(out["F"])
+
+    theirs, ours = [], []
+    for seed in range(5):
+        found = []
+        low, high = np.array(bounds).T
+        arms = Arms(n_var=len(bounds), n_obj=2, xl=low, xu=high)
+        minimize(arms, NSGA2(pop_size=100), ("n_eval", 20_000), seed=seed)
+        theirs.append(hypervolume(np.vstack(found), (5.0, 5.0)))
+        search = FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed)
+        while search.evaluations < 20_000:
+            search.step()
+        ours.append(search.hypervolume)
+    assert np.mean(ours) >= np.mean(theirs)

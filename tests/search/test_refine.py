@@ -1,0 +1,174 @@
+"""Refinement and polish: better in every objective, within the space, counted, and the same each time."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.arrays import Array
+from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
+from armwright.pareto import hypervolume
+from armwright.problem.problem import Problem
+from armwright.runs.folder import read_run
+from armwright.runs.history import POLISH
+from armwright.runs.results import read_summary
+from armwright.search.cma_es import POPULATION, Refined, refine
+from armwright.spaces.parameters import CategoricalParameter, FloatParameter
+from armwright.study.refine_run import polish_run
+from armwright.study.study import Run, optimize
+from armwright.tasks.task import load_task
+
+PROBLEM = Problem(load_task("target-1"))
+BOX = tuple(FloatParameter(f"x_{i}", -1.0, 3.0, "m") for i in range(5))
+
+
+def paraboloids(rows: Array) -> Array:
+    """Two ill-conditioned bowls with least values at different points; their front is the curve between these."""
+    weights = 10.0 ** np.linspace(0.0, 3.0, rows.shape[1])
+    return np.column_stack([((rows - centre) ** 2 * weights).sum(axis=1) for centre in (0.5, 0.6)])
+
+
+def test_finds_the_front_of_bowls() -> None:
+    """Each start comes to within 1e-4 of a point where the two gradients oppose each other."""
+    rows = np.random.default_rng(0).uniform(-1.0, 3.0, (7, 5))
+    refined = refine(BOX, paraboloids, rows, paraboloids(rows), (1.0, 1.0), 6000, 0)
+    assert refined.improved.all()
+    # On the front both roots add up to the distance of the centres, in the metric of the bowls.
+    apart = np.sqrt(paraboloids(np.full((1, 5), 0.5))[0, 1])
+    assert np.sqrt(refined.values).sum(axis=1) == pytest.approx(apart, rel=1e-2)
+
+
+@pytest.mark.parametrize("budget", [0, POPULATION, 400])
+def test_never_worse_and_counted(budget: int) -> None:
+    designs = PROBLEM.space.sample(20, seed=1)
+    rows = PROBLEM.space.matrix(designs)
+    values = PROBLEM.evaluate(designs).values
+    counted: list[int] = []
+
+    def evaluate(samples: Array) -> Array:
+        counted.append(len(samples))
+        return PROBLEM.evaluate_matrix(samples).values
+
+    refined = refine(PROBLEM.space.parameters, evaluate, rows, values, (5.0, 5.0), budget, 3)
+    assert refined.evaluations == sum(counted) == 20 * POPULATION * (budget // POPULATION)
+    assert np.all(refined.values[refined.improved] < values[refined.improved])
+    assert np.array_equal(refined.rows[~refined.improved], rows[~refined.improved])
+    # What it says is what comes out, and it is in the space, with the joints as they were.
+    assert np.array_equal(PROBLEM.evaluate_matrix(refined.rows).values, refined.values)
+    for before, after in zip(designs, PROBLEM.space.designs(refined.rows), strict=True):
+        assert PROBLEM.space.design(after.params) == after
+        assert after.joints == before.joints
+
+
+def test_same_seed_same_result_and_categories_stay() -> None:
+    parameters = (*BOX[:2], CategoricalParameter("kind", ("a", "b")))
+    rows = np.array([[0.0, 0.0, 1.0], [2.0, 2.0, 0.0]])
+    runs = [refine(parameters, lambda r: paraboloids(r[:, :2]), rows, paraboloids(rows[:, :2]), (1, 1), 240, 5)] * 2
+    runs.append(refine(parameters, lambda r: paraboloids(r[:, :2]), rows, paraboloids(rows[:, :2]), (1, 1), 240, 6))
+    assert np.array_equal(runs[0].rows, runs[1].rows)
+    assert not np.array_equal(runs[0].rows, runs[2].rows)
+    assert np.array_equal(runs[0].rows[:, 2], rows[:, 2])
+
+
+def test_a_space_without_real_parameters_is_left_alone() -> None:
+    rows = np.array([[0.0], [1.0]])
+    parameters = (CategoricalParameter("kind", ("a", "b")),)
+    refined = refine(parameters, lambda r: r, rows, rows, (1.0,), 100, 0)
+    assert not refined.improved.any()
+    assert refined.evaluations == 0
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    return optimize(PROBLEM, proposer="rules", n_init=5, n_step=5, n_total=30, seed=0, out=tmp_path / "run")
+
+
+def test_polish_adds_what_became_better(run: Run) -> None:
+    assert run.folder is not None
+    polished = polish_run(run.folder, 240)
+    new = polished.history.trials[len(run.trials) :]
+    assert 0 < polished.added == len(new) <= polished.tried
+    for trial in new:
+        assert trial.source == POLISH
+        assert trial.refines is not None
+        parent = run.trials[trial.refines]
+        assert np.all(np.array(trial.values) < parent.values)
+        assert trial.design.joints == parent.design.joints
+    assert sum(trial.evaluations for trial in new) == polished.evaluations
+    assert polished.evaluations <= 240 * polished.tried
+    summary = read_summary(run.folder)
+    assert summary == polished.summary
+    assert summary is not None
+    assert summary["proposer"] == run.summary["proposer"]
+    assert summary["hypervolume"]["final"] > run.summary["hypervolume"]["final"]
+    assert summary["hypervolume"]["mean"] == pytest.approx(run.summary["hypervolume"]["mean"])  # of the counted trials
+    assert summary["evaluations"] == len(run.trials) + polished.evaluations
+    _, read = read_run(run.folder)
+    assert read.trials == list(polished.history.trials)
+
+
+def test_a_polished_run_is_finished_and_cannot_be_extended(run: Run) -> None:
+    assert run.folder is not None
+    polish_run(run.folder, 120)
+    _, before = read_run(run.folder)
+    settings = {"proposer": "rules", "n_init": 5, "n_step": 5, "seed": 0, "out": run.folder}
+    again = optimize(PROBLEM, n_total=30, **settings)
+    assert list(again.trials) == before.trials
+    with pytest.raises(RunConflictError, match="was polished"):
+        optimize(PROBLEM, n_total=100, **settings)
+    assert read_run(run.folder)[1].trials == before.trials
+
+
+def test_polish_counts_evaluations_in_vain_and_tries_anew(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert run.folder is not None
+    seeds: list[int] = []
+
+    def nothing_better(history: Any, members: Any, seed: int, evaluations: int) -> Refined:
+        seeds.append(seed)
+        values = np.array([member.values for member in members])
+        rows = history.problem.space.matrix([member.design for member in members])
+        return Refined(rows, values, np.zeros(len(rows), dtype=bool), evaluations * len(rows))
+
+    monkeypatch.setattr("armwright.study.refine_run.refine_members", nothing_better)
+    first = polish_run(run.folder, 120)
+    assert first.added == 0
+    assert first.summary["evaluations"] == 35 + first.evaluations
+    second = polish_run(run.folder, 120)
+    assert second.summary["evaluations"] == 35 + 2 * first.evaluations
+    assert second.summary["polish"] == {"rounds": 2, "in_vain": 2 * first.evaluations}
+    assert len(set(seeds)) == 2
+
+
+def test_polish_refuses_what_it_cannot_do(run: Run, tmp_path: Path) -> None:
+    assert run.folder is not None
+    with pytest.raises(SettingsError, match="evaluations = 3"):
+        polish_run(run.folder, 3)
+    with pytest.raises(RunFolderError, match="not a run folder"):
+        polish_run(tmp_path / "nothing")
+    assert not (tmp_path / "nothing").exists()
+    (run.folder / "summary.json").unlink()
+    with pytest.raises(RunFolderError, match="not finished"):
+        polish_run(run.folder)
+
+
+def test_polish_within_a_study(tmp_path: Path) -> None:
+    settings = {"proposer": "rules", "n_init": 5, "n_step": 10, "seed": 1, "polish_every": 5}
+    run = optimize(PROBLEM, n_total=30, **settings)
+    polished = [trial for trial in run.trials if trial.refines is not None]
+    assert len(polished) == 5  # after 5, 10, …, 25 counted trials; at 10 and 20 the proposer's turn comes first
+    assert [trial.number for trial in run.trials if trial.source == "rules"] == [5, 15, 25]
+    for trial in polished:
+        assert trial.refines is not None
+        assert trial.evaluations == 1 + 1000 // POPULATION * POPULATION
+        assert trial.refines < trial.number
+        if trial.source == POLISH:
+            assert np.all(np.array(trial.values) < run.trials[trial.refines].values)
+    without = optimize(PROBLEM, n_total=30, **{**settings, "polish_every": None})
+    assert hypervolume(run.history.values, (5, 5)) > hypervolume(without.history.values, (5, 5))
+    # Stopped and resumed, it is the same run.
+    for n_total in (11, 30):
+        resumed = optimize(PROBLEM, n_total=n_total, out=tmp_path / "run", **settings)
+    assert [(t.design, t.values, t.refines) for t in resumed.trials] == [
+        (t.design, t.values, t.refines) for t in run.trials
+    ]

@@ -1,0 +1,234 @@
+"""The black box on Optuna, and each of the traps of asking, telling and injecting."""
+
+from functools import partial
+
+import optuna
+import pytest
+from optuna.samplers import BaseSampler, NSGAIISampler, RandomSampler, TPESampler
+from optuna.trial import TrialState
+
+from armwright import extras
+from armwright.exceptions import DesignError, MissingExtraError, SettingsError
+from armwright.problem.problem import Problem
+from armwright.proposers.rules import RulesProposer
+from armwright.runs.history import BBO, RANDOM, History
+from armwright.runs.trial import FinishedTrial
+from armwright.search.samplers import SAMPLERS, BlackBox, SamplerFactory, sampler_factory, sampler_name
+from armwright.seeding import SAMPLING, derived_seed
+from armwright.spaces.design_space import paper_space
+from armwright.spaces.optuna_distributions import distributions
+from armwright.spaces.parameters import Design
+from armwright.study.study import optimize
+from armwright.tasks.task import Task, load_task
+from tests.support.extras import NEEDS_GP
+
+SPACE = paper_space()
+PROBLEM = Problem(load_task("target-1"))
+LEARNING = ["tpe", "tpe-multivariate", "nsga2", pytest.param("gp", marks=NEEDS_GP)]
+
+
+def finished(number: int, design: Design, source: str = RANDOM) -> FinishedTrial:
+    values = PROBLEM.evaluate([design]).values[0].tolist()
+    return FinishedTrial(number, source, design, tuple(values))
+
+
+def fill(box: BlackBox, n: int, first: int = 0) -> list[FinishedTrial]:
+    trials: list[FinishedTrial] = []
+    for number in range(first, first + n):
+        trial, design = box.draw(number, RANDOM if number < 10 else BBO)
+        trials.append(finished(number, design))
+        box.tell(trial, trials[-1].values)
+    return trials
+
+
+def test_distributions_are_the_spaces_parameters() -> None:
+    found = distributions(SPACE)
+    assert list(found) == [parameter.name for parameter in SPACE.parameters]
+    assert len(found) == 2 * 4 + 3
+
+
+@pytest.mark.parametrize(("name", "value"), [("link_3", 1.4), ("joint_2", "Z"), ("origin_x", float("nan"))])
+def test_what_is_outside_the_space_never_enters_the_study(name: str, value: float | str) -> None:
+    """Optuna takes an out-of-range value with a warning; an unknown category leaves its trial RUNNING."""
+    box = BlackBox(SPACE, "tpe", seed=0)
+    wrong = Design({**SPACE.sample(1, 0)[0].params, name: value})
+    with pytest.raises(DesignError, match=name):
+        box.inject(wrong, 0, "rules", "rules-0000")
+    assert box.study.get_trials(deepcopy=False) == []
+
+
+def test_an_injected_design_is_evaluated_as_it_is_and_marked() -> None:
+    box = BlackBox(SPACE, "tpe", seed=0)
+    design = SPACE.sample(1, 3)[0]
+    trial, taken = box.inject(design, 0, "rules", "rules-0000")
+    assert taken == design
+    box.tell(trial, (1.0, 2.0))
+    kept = box.study.trials[0]
+    assert kept.state is TrialState.COMPLETE
+    assert kept.params == dict(design.params)
+    assert kept.user_attrs == {"source": "rules", "proposal": "rules-0000"}
+
+
+def test_the_sampler_learns_from_injected_designs() -> None:
+    """The same seed draws another design once an injected one has been told."""
+    plain, taught = BlackBox(SPACE, "tpe", seed=0), BlackBox(SPACE, "tpe", seed=0)
+    for box in (plain, taught):
+        fill(box, 12)
+    for box, values in ((plain, (9.0, 9.0)), (taught, (0.1, 0.1))):
+        box.tell(box.inject(SPACE.sample(1, 7)[0], 12, "rules", "rules-0012")[0], values)
+    assert plain.draw(13, BBO)[1] != taught.draw(13, BBO)[1]
+
+
+@pytest.mark.parametrize("sampler", LEARNING)
+def test_every_named_sampler_learns_from_the_rules_proposals(sampler: str) -> None:
+    """What it draws depends on how well a proposal among the first ten did."""
+
+    def drawn(*values: float) -> list[Design]:
+        box = BlackBox(SPACE, sampler, seed=0)
+        trials = fill(box, 8)
+        proposal = RulesProposer().propose(History(PROBLEM, trials, 8), seed=0, number=8)
+        box.tell(box.inject(proposal.design, 8, "rules", proposal.id)[0], values)
+        assert box.study.trials[8].params == dict(proposal.design.params)
+        return [trial.design for trial in fill(box, 4, first=9)][1:]
+
+    assert drawn(9.0, 9.0) == drawn(9.0, 9.0)
+    assert drawn(9.0, 9.0) != drawn(0.1, 0.1)
+
+
+@pytest.mark.parametrize("sampler", [*LEARNING, "random"])
+def test_every_named_sampler_runs_with_proposals(sampler: str) -> None:
+    run = optimize(PROBLEM, proposer="rules", sampler=sampler, n_init=10, n_step=3, n_total=6)
+    assert [trial.source for trial in run.trials[10:]] == ["rules", "bbo", "bbo"] * 2
+    assert len({trial.design for trial in run.trials}) == 16
+    assert run.config.method.sampler == sampler
+
+
+def test_every_name_is_among_those_tested() -> None:
+    assert set(SAMPLERS) == {"tpe", "tpe-multivariate", "nsga2", "gp", "random"}
+
+
+def test_each_factory_has_a_name_of_its_own_and_the_same_one_keeps_it() -> None:
+    def made(cls: type[BaseSampler], **settings: int) -> SamplerFactory:
+        return lambda seed: cls(seed=seed, **settings)
+
+    class Factory:
+        def __init__(self, size: int) -> None:
+            self.size = size
+
+        def __repr__(self) -> str:
+            return f"Factory({self.size})"
+
+        def __call__(self, seed: int) -> BaseSampler:
+            return NSGAIISampler(population_size=self.size, seed=seed)
+
+    def factories() -> list[SamplerFactory]:
+        several = [lambda s: RandomSampler(s), lambda s: TPESampler(seed=s), lambda s: TPESampler(seed=s + 1)]
+        several += [made(RandomSampler), made(TPESampler), made(NSGAIISampler, population_size=4)]
+        several += [made(NSGAIISampler, population_size=6), partial(made, RandomSampler), partial(made, TPESampler)]
+        return [*several, Factory(4), Factory(6), Factory(6).__call__, RandomSampler, fill]
+
+    names = [sampler_name(factory) for factory in factories()]
+    assert len(set(names)) == len(names)
+    assert names == [sampler_name(factory) for factory in factories()]
+    assert sampler_name("tpe") == "tpe"
+    assert sampler_name(fill) == "tests.search.test_samplers.fill"
+    assert not any(" at 0x" in name for name in names)
+
+
+def test_gp_without_its_packages_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extras, "is_installed", lambda package: package != "torch")
+    with pytest.raises(MissingExtraError, match=r'gp needs torch: pip install "armwright\[gp\]"'):
+        optimize(PROBLEM, proposer="none", sampler="gp")
+    optimize(PROBLEM, proposer="none", sampler="nsga2", n_init=1, n_total=1)
+
+
+def test_injected_designs_count_towards_the_startup_trials_of_tpe() -> None:
+    """TPE draws at random until it has 10 trials, whoever made them."""
+    for n, random in ((9, True), (10, False)):
+        box = BlackBox(SPACE, "tpe", seed=0)
+        for number, design in enumerate(SPACE.sample(n, 1)):
+            box.tell(box.inject(design, number, "rules", f"rules-{number}")[0], (1.0 + number, 2.0))
+        drawn = box.draw(n, BBO)[1]
+        assert (drawn == box.__class__(SPACE, "random", seed=0).draw(n, BBO)[1]) is random
+
+
+def test_a_restored_study_goes_on_as_if_it_had_never_stopped() -> None:
+    whole = BlackBox(SPACE, "tpe", seed=5)
+    trials = fill(whole, 25)
+    resumed = BlackBox(SPACE, "tpe", seed=5)
+    resumed.restore(trials[:17])
+    assert [trial.design for trial in fill(resumed, 8, first=17)] == [trial.design for trial in trials[17:]]
+
+
+def test_a_resumed_sampler_does_not_repeat_its_first_draws() -> None:
+    """One seed for the whole run would: a sampler made anew begins at its beginning."""
+    first = fill(BlackBox(SPACE, "random", seed=0), 20)
+    resumed = BlackBox(SPACE, "random", seed=0)
+    resumed.restore(first)
+    again = fill(resumed, 20, first=20)
+    assert not {trial.design for trial in first} & {trial.design for trial in again}
+
+
+def test_random_trials_do_not_depend_on_the_sampler() -> None:
+    """So that methods that are compared by seed begin alike."""
+    a = fill(BlackBox(SPACE, "tpe", seed=3), 10)
+    b = fill(BlackBox(SPACE, "random", seed=3), 10)
+    assert [trial.design for trial in a] == [trial.design for trial in b]
+
+
+def test_genetic_samplers_take_injected_designs_as_parents() -> None:
+    """NSGA-II passes over enqueued trials unless they were given a generation."""
+
+    def nsga2(seed: int) -> BaseSampler:
+        return NSGAIISampler(population_size=4, mutation_prob=0.0, crossover_prob=0.0, seed=seed)
+
+    box = BlackBox(SPACE, nsga2, seed=0)
+    injected = SPACE.sample(4, 11)
+    for number, design in enumerate(injected):
+        box.tell(box.inject(design, number, "rules", f"rules-{number}")[0], (1.0 + number, 5.0 - number))
+    generations = [
+        value for trial in box.study.trials for name, value in trial.system_attrs.items() if name.endswith("generation")
+    ]
+    assert generations == [0, 0, 0, 0]
+    child = box.draw(4, BBO)[1]
+    assert child in injected  # without crossover and mutation a child is a parent
+
+
+def test_a_target_out_of_reach_is_a_finite_objective_not_a_failure() -> None:
+    """FAILED trials would teach the sampler nothing."""
+    problem = Problem(Task(name="far", targets=((50.0, 0.0, 0.0),)))
+    box = BlackBox(SPACE, "tpe", seed=0)
+    trial, design = box.draw(0, RANDOM)
+    box.tell(trial, problem.evaluate([design]).values[0].tolist())
+    assert box.study.trials[0].state is TrialState.COMPLETE
+    assert 40.0 < box.study.trials[0].values[0] < 60.0
+
+
+def test_tpe_is_the_papers() -> None:
+    """The same draws as a plain Optuna study with the sampler that docs/method.md §5 pins."""
+    box, plain = BlackBox(SPACE, "tpe", seed=4), optuna.create_study(directions=["minimize"] * 2)
+    for trial in fill(box, 30):
+        seed = derived_seed(4, SAMPLING, trial.number)
+        pinned = TPESampler(n_startup_trials=10, multivariate=False, constant_liar=False, seed=seed)
+        plain.sampler = RandomSampler(seed=seed) if trial.number < 10 else pinned
+        asked = plain.ask(distributions(SPACE))
+        assert asked.params == dict(trial.design.params)
+        plain.tell(asked, trial.values)
+
+
+def test_an_unknown_sampler_is_refused_by_name() -> None:
+    with pytest.raises(SettingsError, match=r'unknown sampler "tp".*Did you mean "tpe"'):
+        sampler_factory("tp")
+    with pytest.raises(SettingsError, match=r'Did you mean "tpe-multivariate".*tpe-multivariate, nsga2, gp, random'):
+        sampler_factory("tpe_multivariate")
+
+
+def test_the_users_optuna_verbosity_is_left_as_it_was(capfd: pytest.CaptureFixture[str]) -> None:
+    before = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.INFO)
+    try:
+        BlackBox(SPACE, "tpe", seed=0)
+        assert optuna.logging.get_verbosity() == optuna.logging.INFO
+        assert capfd.readouterr().err == ""
+    finally:
+        optuna.logging.set_verbosity(before)

@@ -1,0 +1,231 @@
+"""The design space: what it holds, what it builds, what it refuses."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armwright.exceptions import DesignError, SpaceError
+from armwright.kinematics.arm_arrays import FLOATS, stack_arms
+from armwright.llm.prompt import load_prompt
+from armwright.problem.problem import Problem
+from armwright.runs.folder import read_run
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import DesignSpace, load_space, paper_space
+from armwright.spaces.link_mass import MassOfTube, MassPerLink
+from armwright.spaces.parameters import Design, FloatParameter
+from armwright.study.front_run import find_front
+from armwright.study.study import optimize
+from armwright.tasks.task import load_task
+
+GOOD = paper_space().sample(1, 0)[0].params
+
+
+def test_the_papers_space() -> None:
+    space = paper_space(joints=4)
+    names = [parameter.name for parameter in space.parameters]
+    joints = [f"joint_{j}" for j in (1, 2, 3, 4)]
+    assert names == ["origin_x", "origin_y", "origin_z", *joints, "link_1", "link_2", "link_3", "link_4"]
+    assert [(p.low, p.high) for p in space.parameters if isinstance(p, FloatParameter)] == [(-1, 1)] * 3 + [
+        (0.03, 0.30)
+    ] * 4
+
+
+@pytest.mark.parametrize("joints", range(1, 9))
+def test_there_are_2d_plus_3_parameters(joints: int) -> None:
+    assert len(paper_space(joints).parameters) == 2 * joints + 3
+
+
+def test_a_design_builds_the_arm_of_its_values() -> None:
+    space = paper_space()
+    design = space.clipped((0.1, -0.2, 0.3), "YPRP", (0.1, 0.2, 0.05, 0.3))
+    arm = space.arm(design)
+    assert arm.base == (0.1, -0.2, 0.3)
+    assert [joint.axis for joint in arm.joints] == ["z", "y", "x", "y"]
+    assert {(joint.kind, joint.lower, joint.upper) for joint in arm.joints} == {("revolute", -2.4, 2.4)}
+    assert [link.offset for link in arm.links] == [(0, 0, 0.1), (0, 0, 0.2), (0, 0, 0.05), (0, 0, 0.3)]
+    assert [link.mass for link in arm.links] == pytest.approx([0.00121, 0.00242, 0.000605, 0.00363])
+    assert arm.links[1].com == (0, 0, 0.1)
+    assert arm.reach == pytest.approx(0.65)
+    assert (design.origin, design.joints, design.links) == ((0.1, -0.2, 0.3), "YPRP", (0.1, 0.2, 0.05, 0.3))
+
+
+def test_the_mass_model_is_a_switch() -> None:
+    design = paper_space().clipped((0, 0, 0), "YPRP", (0.1, 0.2, 0.05, 0.3))
+    per_link = paper_space().model_copy(update={"mass": MassPerLink(kind="per_link")})
+    assert [link.mass for link in per_link.arm(design).links] == [0.002] * 4
+    tube = MassOfTube(kind="tube", density=2700, outer_diameter=0.03, wall=0.002)
+    assert tube.mass(1.0) == pytest.approx(2700 * math.pi * (0.015**2 - 0.013**2))
+    assert "a toy" in paper_space().mass_note
+    assert "a toy" not in paper_space().model_copy(update={"mass": tube}).mass_note
+
+
+@given(seed=st.integers(0, 2**31), joints=st.integers(1, 8))
+def test_samples_lie_in_the_space(seed: int, joints: int) -> None:
+    space = paper_space(joints)
+    for design in space.sample(3, seed):
+        assert space.design(design.params) == design
+
+
+def test_samples_depend_on_the_seed_alone() -> None:
+    assert paper_space().sample(5, 1) == paper_space().sample(5, 1) != paper_space().sample(5, 2)
+
+
+@given(st.lists(st.floats(-10, 10), min_size=7, max_size=7))
+def test_clipped_is_always_in_the_space(values: list[float]) -> None:
+    design = paper_space().clipped(values[:3], "YPRP", values[3:])
+    assert paper_space().design(design.params) == design
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"link_3": 1.4}, "link_3 = 1.4 m is outside 0.03 <= link_3 <= 0.3 m"),
+        ({"link_3": 0.029}, "link_3 = 0.029 m is outside"),
+        ({"origin_x": float("nan")}, "origin_x = nan is not a finite number [m]"),
+        ({"origin_x": True}, "origin_x = True is not a finite number [m]"),
+        ({"origin_x": "0.1"}, "origin_x = '0.1' is not a finite number [m]"),
+        ({"joint_1": "Z"}, "joint_1 = 'Z' is not one of R, P, Y"),
+        ({"joint_1": ["R"]}, "joint_1 = ['R'] is not one of R, P, Y"),
+        ({"orgin_x": 0.0}, 'unknown parameter "orgin_x".*Did you mean "origin_x"?'),
+    ],
+)
+def test_what_a_space_refuses_it_names(change: dict[str, object], message: str) -> None:
+    with pytest.raises(DesignError) as refusal:
+        paper_space().design({**GOOD, **change})
+    for part in message.split(".*"):
+        assert part in str(refusal.value)
+
+
+def test_missing_parameters_are_named() -> None:
+    with pytest.raises(DesignError, match="missing: link_4"):
+        paper_space().design({name: value for name, value in GOOD.items() if name != "link_4"})
+
+
+def test_a_file_changes_what_it_names_and_keeps_the_rest(tmp_path: Path) -> None:
+    file = tmp_path / "space.yaml"
+    file.write_text(
+        "name: six\njoints: 6\nlink: [0.1, 0.5]\norigin_z: [0, 0]\n"
+        "mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}\n"
+    )
+    space = load_space(file)
+    assert (space.joints, space.link, space.origin_z, space.origin_x) == (6, (0.1, 0.5), (0.0, 0.0), (-1.0, 1.0))
+    assert space.design(space.sample(1, 0)[0].params).params["origin_z"] == 0.0
+    assert DesignSpace.model_validate(space.model_dump(mode="json")) == space
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("joints: 0", "joints"),
+        ("joints: 9", "joints = 9: expected a number from 1 to 8"),
+        ("link: [0.3, 0.03]", "link = [0.3, 0.03] m is reversed"),
+        ("origin_x: [1, -1]", "origin_x = [1, -1] m is reversed"),
+        ("link: [0, 0.3]", "longer than 0 m"),
+        ("joint_range: [0.5, 2.4]", "must contain 0"),
+        ("joint_range: [0, 0.01]", "narrower than 3 degrees"),
+        ("joint_types: [R, R]", "joint_types has duplicates: R, R"),
+        ("joint_types: []", "joint_types"),
+        ("joint_types: [R, Q]", "joint_types"),
+        ("links: [0.03, 0.3]", 'unknown key "links".'),
+        ("mass: {kind: lead}", "mass"),
+        ("mass: {kg: 3}", "kind is missing: expected per_metre, per_link or tube"),
+        ("joint_range: [-7, 2.4]", "exceeds ±2π"),
+        ("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.02}", "more than half"),
+        ("origin_x: [-.inf, 1]", "finite"),
+        ("origin_x: [-1.0e308, 1]", "exceeds ±1000"),
+        ("- a\n- list", "keys and values"),
+        ("a: [", "not valid YAML"),
+        ("a: &x 1\nb: *x", "aliases"),
+        ("joints: 4\njoints: 5", "twice"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "space.yaml"
+    file.write_text(text)
+    with pytest.raises(SpaceError) as refusal:
+        load_space(file)
+    assert words in str(refusal.value)
+    assert str(file) in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_copy_with_other_ranges_has_its_own_parameters() -> None:
+    space = paper_space()
+    assert len(space.parameters) == 11
+    assert len(space.model_copy(update={"joints": 2}).parameters) == 7
+
+
+def test_the_order_of_the_parameters_means_nothing() -> None:
+    turned = Design(dict(reversed(GOOD.items())))
+    assert turned == Design(GOOD)
+    assert hash(turned) == hash(Design(GOOD))
+    assert paper_space().arm(turned) == paper_space().arm(Design(GOOD))
+
+
+def test_a_design_of_another_space_builds_no_arm() -> None:
+    with pytest.raises(DesignError, match="joint_5"):
+        paper_space().arm(paper_space(5).sample(1, 0)[0])
+    with pytest.raises(SpaceError, match="from 1 to 8"):
+        paper_space(9)
+
+
+def test_designs_are_values() -> None:
+    assert Design(GOOD) == Design(dict(GOOD))
+    assert len({Design(GOOD), Design(dict(GOOD))}) == 1
+
+
+RESTRICTED = {"joint_1": "Y", "joint_2": ["P", "R"], "origin_z": 0.0, "link_1": [0.1, 0.2]}
+
+
+def test_single_parameters_can_be_fixed_or_narrower(tmp_path: Path) -> None:
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": RESTRICTED}))
+    space = load_space(tmp_path / "space.yaml")
+    designs = space.sample(200, 1)
+    assert {design.joints[0] for design in designs} == {"Y"}
+    assert {design.joints[1] for design in designs} == {"P", "R"}
+    assert {design.joints[2] for design in designs} == {"R", "P", "Y"}
+    assert {design.origin[2] for design in designs} == {0.0}
+    assert 0.1 <= min(design.links[0] for design in designs) <= max(design.links[0] for design in designs) <= 0.2
+    one, other = stack_designs(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
+    for name in (*FLOATS, "motion"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+    assert space.designs(space.matrix(designs)) == designs
+    assert DesignSpace.model_validate_json(space.model_dump_json()) == space
+    moved = space.clipped((0.0, 0.0, 0.7), "RYPY", (0.3, 0.3, 0.3, 0.3))
+    assert (moved.joints, moved.origin[2], moved.links[0]) == ("YRPY", 0.0, 0.2)
+
+
+def test_a_restricted_space_goes_through_a_run(tmp_path: Path) -> None:
+    space = DesignSpace.model_validate({"restrict": RESTRICTED})
+    problem = Problem(load_task("target-1"), space)
+    run = optimize(problem, proposer="rules", n_init=4, n_step=2, n_total=12, out=tmp_path / "run")
+    assert {trial.design.joints[0] for trial in run.trials} == {"Y"}
+    assert read_run(tmp_path / "run")[0].space == space
+    found = find_front(problem, budget=1500)
+    assert {member.design.joints[0] for member in found.front} == {"Y"}
+    prompt = load_prompt("plus").render(run.history, 0)
+    assert "origin_z = 0 (fixed); joint_1 = Y; joint_2 is one of R, P; 0.1 <= link_1 <= 0.2." in prompt
+
+
+@pytest.mark.parametrize(
+    ("restrict", "words"),
+    [
+        ({"joint_1": "S"}, "joint_1 = 'S' is not one of R, P, Y"),
+        ({"joint_1": []}, "joint_1 has no choice left"),
+        ({"link_9": 0.1}, 'unknown parameter "link_9".*Did you mean'),
+        ({"link_1": [0.2, 0.1]}, "is outside"),
+        ({"link_1": 0.5}, "is outside"),
+        ({"link_1": "Y"}, "neither a number nor a range"),
+        ({"link_1": [0.1, 0.15, 0.2]}, "restrict"),
+        ("joint_1", "restrict"),
+    ],
+)
+def test_what_is_no_part_of_a_parameter_is_refused(tmp_path: Path, restrict: object, words: str) -> None:
+    (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": restrict}))
+    with pytest.raises(SpaceError, match=words):
+        load_space(tmp_path / "space.yaml")

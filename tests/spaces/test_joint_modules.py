@@ -1,0 +1,267 @@
+"""Spaces beyond the paper's: slides, fixed joints, two axes at one place, links in any direction, mounts, tools."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from armwright.exceptions import DesignError, SpaceError
+from armwright.kinematics.arm_arrays import stack_arms
+from armwright.kinematics.forward import joint_positions
+from armwright.kinematics.ik import solve_postures
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.urdf_writer import to_urdf
+from armwright.search.samplers import BlackBox
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import DesignSpace, builtin_spaces, load_space, paper_space
+from armwright.spaces.joint_modules import MODULES, MOUNTS
+from armwright.tasks.task import load_task
+
+EVERYTHING: dict[str, Any] = {
+    "name": "everything",
+    "joints": [1, 6],
+    "joint_types": list(MODULES),
+    "link_directions": ["+x", "-y", "+z", "-z"],
+    "mount": list(MOUNTS),
+    "tool": [0.05, -0.02, 0.1],
+    "stroke": [0.1, 0.6],
+    "limit": [0.5, 2.4],
+    "travel": 0.004,
+    "actuators": ["XL430-W250", "XM430-W350", "XM540-W270"],
+    "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
+}
+MIXED = DesignSpace.model_validate(EVERYTHING)
+TARGETS = load_task("target-2").points
+
+
+def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:
+    """Of designs at random, those that have a joint that moves."""
+    arms = [space.arm(design) for design in space.sample(n, seed)]
+    return [arm for arm in arms if any(joint.kind != "fixed" for joint in arm.joints)]
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("space", [MIXED, *map(load_space, builtin_spaces())], ids=lambda space: space.name)
+def test_designs_as_rows_build_the_same_arms_to_the_bit(space: DesignSpace, precision: Any) -> None:
+    designs = space.sample(300, 7)
+    one = stack_designs(space, space.matrix(designs), precision)
+    other = stack_arms([space.arm(design) for design in designs], precision)
+    for field in fields(one):
+        mine, theirs = getattr(one, field.name), getattr(other, field.name)
+        if field.name == "actuation":
+            assert (mine is None) == (theirs is None)
+            continue
+        if field.name == "bodies":
+            room = other.motion.shape[1]
+            for part in ("inertia", "total_mass", "total_com"):
+                assert np.array_equal(getattr(mine, part)[:, :room], getattr(theirs, part)), part
+                assert not getattr(mine, part)[:, room:].any()
+            continue
+        of_arm = field.name in ("base", "tool", "tool_axis", "tool_side")
+        if mine.ndim > 1 and not of_arm:  # there is room for more joints than any of these has
+            assert not (one.motion[:, theirs.shape[1] :] < 6).any()
+            mine = mine[:, : theirs.shape[1]]
+        assert np.array_equal(mine, theirs), field.name
+    if one.actuation is not None and other.actuation is not None:
+        assert np.array_equal(one.actuation.effort[:, : other.motion.shape[1]], other.actuation.effort)
+        assert np.array_equal(one.actuation.speed[:, : other.motion.shape[1]], other.actuation.speed, equal_nan=True)
+        assert np.allclose(one.actuation.price, other.actuation.price, rtol=1e-14, equal_nan=True)
+
+
+def pinned(arm: Arm) -> tuple[Any, Any]:
+    """The arm in Pinocchio, by our URDF."""
+    model = pinocchio.buildModelFromXML(to_urdf(arm))
+    return model, model.createData()
+
+
+def test_postures_and_torques_are_pinocchios_and_mujocos() -> None:
+    arms = moving_arms(MIXED, 60, 3)
+    arrays = stack_arms(arms, "float64")
+    solved = solve_postures(arrays, TARGETS, precision="float64")
+    for i, arm in enumerate(arms):
+        own = [j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"]
+        for t in range(len(TARGETS)):
+            q = solved.q[i, t, own]
+            lower = np.array([arm.joints[j].lower for j in own])
+            upper = np.array([arm.joints[j].upper for j in own])
+            assert np.all((lower <= q) & (q <= upper))
+            model, data = pinned(arm)
+            pinocchio.framesForwardKinematics(model, data, q)
+            tip = data.oMf[model.getFrameId("tip")].translation
+            assert np.allclose(tip, solved.reached[i, t], atol=1e-9)
+            assert np.allclose(tip, joint_positions(arm, solved.q[i, t, : len(arm.joints)])[-1], atol=1e-9)
+            held = pinocchio.computeGeneralizedGravity(model, data, q)
+            assert np.allclose(held, solved.torque[i, t, own], atol=1e-9 * (1.0 + np.abs(held).max()))
+        idle = [j for j in range(arrays.dof) if j not in own]
+        assert not solved.q[i][:, idle].any()
+        assert not solved.torque[i][:, idle].any()
+        scene = mujoco.MjModel.from_xml_string(to_mjcf(arm))
+        state = mujoco.MjData(scene)
+        state.qpos[:] = solved.q[i, 0, own]
+        mujoco.mj_forward(scene, state)
+        assert np.allclose(state.qfrc_bias, solved.torque[i, 0, own], atol=1e-6 * (1.0 + np.abs(state.qfrc_bias).max()))
+        assert np.allclose(state.site("tip").xpos, solved.reached[i, 0], atol=1e-9)
+
+
+def test_a_slide_ends_at_its_target_and_starts_within_its_limits() -> None:
+    space = DesignSpace.model_validate(
+        {"joints": 3, "joint_types": ["X", "T", "S"], "stroke": 0.5, "link": [0.05, 0.05]}
+    )
+    params = {"joint_1": "X", "joint_2": "T", "joint_3": "S"} | {f"link_{j}": 0.05 for j in (1, 2, 3)}
+    arm = space.arm(space.design({**params, "origin_x": 0.0, "origin_y": 0.0, "origin_z": 0.0}))
+    inside, outside = [0.2, 0.3, 0.15 + 0.4], [0.7, 0.3, 0.15]
+    solved = solve_postures(stack_arms([arm], "float64"), np.array([inside, outside]), precision="float64")
+    assert np.allclose(solved.q[0], [[0.2, 0.3, 0.4], [0.5, 0.3, 0.0]], atol=2e-3)
+    assert np.allclose(
+        solved.torque[0], [[0.0, 0.0, solved.torque[0, 0, 2]]] * 2
+    )  # the vertical one holds all it carries
+    assert solved.torque[0, 0, 2] == pytest.approx(9.81 * arm.links[2].mass)
+
+
+def test_arms_beside_each_other_get_the_same_bits_as_alone() -> None:
+    turning = moving_arms(paper_space(), 20, 1)
+    together = solve_postures(stack_arms([*turning, *moving_arms(MIXED, 20, 2)]), TARGETS)
+    alone = solve_postures(stack_arms(turning), TARGETS)
+    assert np.array_equal(together.q[: len(turning), :, :4], alone.q)
+    assert np.array_equal(together.torque[: len(turning), :, :4], alone.torque)
+    assert np.array_equal(together.reached[: len(turning)], alone.reached)
+
+
+@pytest.mark.parametrize("mount", list(MOUNTS))
+def test_a_mounted_arm_is_the_standing_one_turned(mount: Any) -> None:
+    content = {"joint_types": ["R", "P", "Y", "O", "X", "T", "S"], "joints": 5, "link_directions": ["+z", "+x"]}
+    content |= {"tool": [0.03, 0.0, 0.05], **{f"origin_{axis}": [0.0, 0.0] for axis in "xyz"}}
+    floor = DesignSpace.model_validate(content)
+    other = DesignSpace.model_validate({**content, "mount": mount})
+    turn = np.zeros((3, 3))
+    for local, world in enumerate(MOUNTS[mount]):
+        turn["xyz".index(world[1]), local] = 1.0 if world[0] == "+" else -1.0
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    rng = np.random.default_rng(0)
+    for design in floor.sample(30, 5):
+        standing, turned = floor.arm(design), other.arm(design)
+        mirrored = [1.0 if a.lower == b.lower else -1.0 for a, b in zip(standing.joints, turned.joints, strict=True)]
+        q = rng.uniform(0.0, 0.3, len(standing.joints))
+        signs = np.array([
+            sign if joint.kind == "prismatic" else way_of(mount, before.axis)
+            for sign, joint, before in zip(mirrored, turned.joints, standing.joints, strict=True)
+        ])  # fmt: skip
+        assert np.allclose(joint_positions(turned, signs * q), joint_positions(standing, q) @ turn.T, atol=1e-12)
+
+
+def way_of(mount: Any, axis: Any) -> float:
+    """1 where the mounted arm's axis points along one of the world's, -1 where it points against it."""
+    return 1.0 if MOUNTS[mount]["xyz".index(axis)][0] == "+" else -1.0
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=50, deadline=None)
+def test_designs_keep_what_matters_through_rows_and_files(seed: int) -> None:
+    (design,) = MIXED.sample(1, seed)
+    assert MIXED.designs(MIXED.matrix([design])) == [design]
+    assert MIXED.design(design.params) == design
+    n = int(str(design.params["n_joints"]))
+    assert len(design.joints) == len(design.links) == len(design.directions) == n
+    for j, letter in enumerate(design.joints, start=1):
+        module = MODULES[letter]  # pyright: ignore[reportArgumentType]
+        assert (f"stroke_{j}" in design.params) == module.is_prismatic
+        assert (f"limit_{j}" in design.params) == module.is_revolute
+        assert (f"motor_{j}" in design.params) == module.is_actuated
+    every = {p.name: MIXED.parameters[i] for i, p in enumerate(MIXED.parameters)}
+    filled = {**{name: p.choices[0] if hasattr(p, "choices") else p.low for name, p in every.items()}, **design.params}  # pyright: ignore
+    assert MIXED.design(filled) == design  # what does not matter may be given, and is left out
+
+
+def test_what_a_sampler_draws_is_what_matters() -> None:
+    box = BlackBox(MIXED, "tpe", 0)
+    for number in range(25):
+        trial, design = box.draw(number, "random" if number < 10 else "bbo")
+        assert MIXED.design(design.params) == design
+        assert trial.params == MIXED.free_values(design)
+        box.tell(trial, (float(number), 1.0 / (1 + number)))
+    (given_design,) = MIXED.sample(1, 99)
+    trial, design = box.inject(given_design, 25, "rules", "rules-0025")
+    assert design == given_design
+    assert trial.params == MIXED.free_values(design)
+
+
+def test_ties_and_grids() -> None:
+    content = {"tie": {"link_3": "link_2", "joint_4": "joint_1"}, "grid": {"link": 0.01, "origin_z": 0.25}}
+    space = DesignSpace.model_validate(content)
+    for design in space.sample(50, 0):
+        assert design.links[2] == design.links[1]
+        assert design.joints[3] == design.joints[0]
+        assert design.origin[2] in (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
+        assert all(length == round(length, 2) for length in design.links)
+        assert space.design(design.params) == design
+        assert space.from_free_values(space.free_values(design)) == design
+    box = BlackBox(space, "tpe", 0)
+    for number in range(15):
+        trial, design = box.draw(number, "random" if number < 10 else "bbo")
+        assert space.design(design.params) == design
+        assert "link_3" not in trial.params
+        box.tell(trial, (design.links[0], design.origin[2]))
+    free = space.free_values(design)
+    assert space.design(free) == design
+    with pytest.raises(DesignError, match="tied"):
+        space.design({**design.params, "link_3": 0.03 if design.links[1] != 0.03 else 0.04})
+    with pytest.raises(DesignError, match="grid"):
+        space.design({**design.params, "link_1": 0.0351})
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"joints": [3, 2]}, "the smallest and the largest"),
+        ({"joints": [1, 9]}, "from 1 to 8"),
+        ({"joint_types": ["F"]}, "at least one type must move"),
+        ({"stroke": 0.001}, "stroke"),
+        ({"stroke": [0.3, 0.1], "joint_types": ["S"]}, "is reversed"),
+        ({"limit": [0.0, 2.0]}, "limit"),
+        ({"mount": ["sky"]}, "mount"),
+        ({"mount": ["floor", "floor"]}, "mount has duplicates"),
+        ({"tool": [0.0, 2000.0, 0.0]}, "tool"),
+        ({"tie": {"link_9": "link_1"}}, 'unknown parameter "link_9"'),
+        ({"tie": {"link_2": "origin_x"}}, "different ranges"),
+        ({"tie": {"link_2": "link_3", "link_3": "link_4"}}, "tied itself"),
+        ({"tie": {"link_2": "link_3"}, "joints": [2, 3]}, "reverse the tie"),
+        ({"grid": {"joint_1": 1.0}}, "unknown real parameter"),
+        ({"grid": {"link": 0.0}}, "above 0"),
+    ],
+)
+def test_spaces_that_cannot_be_are_refused(content: dict[str, Any], words: str, tmp_path: Path) -> None:
+    import yaml
+
+    file = tmp_path / "space.yaml"
+    file.write_text(yaml.safe_dump(content))
+    with pytest.raises(SpaceError, match=words):
+        load_space(file)
+
+
+def test_a_built_in_space_goes_by_its_name() -> None:
+    assert builtin_spaces() == ["paper", "autodesign", "slideopt"]
+    assert load_space("paper") == paper_space()
+    with pytest.raises(SpaceError, match='Did you mean "slideopt"'):
+        load_space("slidopt")
+
+
+def test_all_of_it_is_searched() -> None:
+    problem = Problem(load_task("slideopt-arm"), load_space("slideopt"))
+    rows = problem.space.matrix(problem.space.sample(200, 0))
+    values = problem.evaluate_matrix(rows).values
+    assert np.array_equal(values, problem.evaluate(problem.space.designs(rows)).values)
+    assert values[:, 0].min() < 1.0
+
+
+def test_an_empty_matrix_gives_no_arms() -> None:
+    for space in (paper_space(), MIXED):
+        assert space.designs(space.matrix([])) == []
+        assert len(stack_designs(space, space.matrix([])).base) == 0

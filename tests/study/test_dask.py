@@ -1,0 +1,431 @@
+"""Designs and cells evaluated by Dask workers: local processes, and a cluster from the shell."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+import armwright as aw
+from armwright.exceptions import ClusterError, EvaluatorError, SettingsError, StoppedError
+from armwright.experiments.plan import Cell, ExperimentPlan, cells_of
+from armwright.experiments.runner import _outcome_of, finished_before, run_cells
+from armwright.problem.objectives import Objective
+from armwright.runs.control import stop_study
+from armwright.study.cluster import Finished
+from armwright.study.study import Progress
+from tests.support.dask_processes import (
+    TASK,
+    Bench,
+    ShellCluster,
+    all_ended,
+    begin_command,
+    descendants,
+    wait_until,
+)
+from tests.torture.lives import n_lines, trials
+
+PAPER = aw.Problem(aw.load_task("target-1"))
+QUANTITIES = ("position_error", "torque", "collision", "path_error", "uncovered_fraction")
+MANY = aw.Problem(
+    aw.Task.model_validate(
+        {
+            "name": "many",
+            "targets": [{"position": [0.4, 0.1, 0.3], "axis": [0.0, 0.0, -1.0]}, [0.3, -0.2, 0.4]],
+            "obstacles": [
+                {"kind": "cylinder", "name": "pole", "center": [0.2, 0.3, 0.5], "radius": 0.03, "height": 1.0}
+            ],
+            "moves": "in_order",
+            "workspace": {"low": [0.3, -0.3, 0.1], "high": [0.6, 0.3, 0.5]},
+            "objectives": QUANTITIES,
+            "constraints": ["length <= 3.0", "self_clearance >= 0.0", "manipulability >= 0.0"],
+        }
+    )
+)
+SHORT: dict[str, Any] = {"proposer": "rules", "n_init": 5, "n_step": 4, "n_total": 8}
+ASKED = ("--proposer", "rules", "--n-init", "5", "--n-step", "4", "--n-total", "8", "--no-figures")
+N_TRIALS = 13
+
+
+@pytest.fixture(scope="module")
+def shell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ShellCluster]:
+    """A scheduler and two workers."""
+    cluster = ShellCluster(tmp_path_factory.mktemp("elsewhere"))
+    cluster.only(2)
+    yield cluster
+    cluster.close()
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    (tmp_path / "bench").mkdir()
+    return Bench(tmp_path / "bench")
+
+
+def on(shell: ShellCluster, n_workers: int | None = None) -> aw.Workers:
+    return aw.Workers(n_workers, shell.address)
+
+
+def numbers(run: Path) -> list[int]:
+    return [trial["number"] for trial in trials(run)]
+
+
+# --- the same run, wherever it is evaluated ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"problem": PAPER, "sampler": "tpe", "polish_every": 5},
+        {"problem": PAPER, "sampler": "nsga2"},
+        {"problem": MANY, "sampler": "random"},
+    ],
+    ids=["tpe and refinements", "nsga2", "many quantities"],
+)
+def test_one_design_at_a_time_makes_the_run_of_this_process(
+    tmp_path: Path, shell: ShellCluster, settings: dict[str, Any]
+) -> None:
+    """To the bit, apart from seconds."""
+    asked = {**SHORT, **settings}
+    problem = asked.pop("problem")
+    shell.only(2)
+    aw.optimize(problem, **asked, out=tmp_path / "here")
+    aw.optimize(problem, **asked, out=tmp_path / "there", workers=on(shell, 1))
+    assert trials(tmp_path / "there") == trials(tmp_path / "here")
+
+
+SCRIPT = """
+import armwright as aw
+
+@aw.evaluator("reach [m]", "height [m]")
+def measure(arm, task):
+    return sum(link.length for link in arm.links), 1.0 + arm.base[2]
+
+task = aw.load_task("target-1").model_copy(update={"reference_point": None})
+problem = aw.Problem(task, evaluator=measure)
+for out, workers in (("here", None), ("there", aw.Workers(1))):
+    aw.optimize(problem, proposer="rules", n_init=5, n_step=4, n_total=8, out=out, workers=workers)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_without_a_main_guard_uses_a_local_worker(in_folder: Path) -> None:
+    """Its evaluator goes to the worker by value; the script itself is not run again there."""
+    (in_folder / "script.py").write_text(SCRIPT)
+    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert trials(in_folder / "there") == trials(in_folder / "here")
+    assert numbers(in_folder / "there") == list(range(N_TRIALS))
+
+
+def test_workers_need_no_evaluator_file_and_each_design_is_evaluated_once(
+    tmp_path: Path, shell: ShellCluster, bench: Bench
+) -> None:
+    shell.only(2)
+    problem = bench.problem()
+    bench.file.unlink()
+    notes: list[str] = []
+    found = aw.optimize(
+        problem, **{**SHORT, "n_total": 30}, out=tmp_path / "run", workers=on(shell),
+        watch=lambda progress: notes.append(progress.note),
+    )  # fmt: skip
+    assert notes[0] == f"evaluating on the Dask cluster at {shell.address}"
+    assert numbers(tmp_path / "run") == list(range(35))
+    assert set(bench.counts.values()) == {1}
+    assert bench.counts.total() == 35 - found.summary["same_arms"]
+    for trial in found.trials[:5]:
+        assert trial.values == (sum(trial.design.links), 1.0 + trial.design.origin[2])
+
+
+def test_a_stop_lets_designs_in_flight_finish(tmp_path: Path, shell: ShellCluster, bench: Bench) -> None:
+    shell.only(2)
+    out = tmp_path / "run"
+
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == 2:
+            stop_study(out)
+
+    with pytest.raises(StoppedError):
+        aw.optimize(bench.problem(), **SHORT, out=out, workers=on(shell), watch=watch)
+    assert 3 <= len(trials(out)) == bench.counts.total() < N_TRIALS
+    aw.optimize(bench.problem(), **SHORT, out=out, workers=on(shell))
+    assert numbers(out) == list(range(N_TRIALS))
+    assert set(bench.counts.values()) == {1}
+
+
+# --- what is killed ---------------------------------------------------------------------------------------------------
+
+
+def test_the_design_of_a_killed_shell_worker_is_evaluated_by_the_other(
+    tmp_path: Path, shell: ShellCluster, bench: Bench
+) -> None:
+    victim, other = shell.only(2)
+    bench.ask("hold")
+    notes: list[str] = []
+
+    def kill() -> None:
+        wait_until(lambda: {pid for pid, _ in bench.evaluated} == {victim.pid, other.pid})
+        victim.kill()
+        bench.release("hold")
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    found = aw.optimize(
+        bench.problem(), **SHORT, out=tmp_path / "run", workers=on(shell),
+        watch=lambda progress: notes.append(progress.note),
+    )  # fmt: skip
+    killer.join()
+    (twice,) = [name for name, n in bench.counts.items() if n > 1]
+    assert [pid for pid, name in bench.evaluated if name == twice] == [victim.pid, other.pid]
+    assert sum("a worker was lost; trial " in note for note in notes) == 1
+    assert numbers(tmp_path / "run") == list(range(N_TRIALS))
+    assert bench.counts.total() == N_TRIALS - found.summary["same_arms"] + 1
+
+
+@pytest.mark.slow
+def test_local_workers_are_killed_then_the_search_then_ctrl_c(tmp_path: Path, bench: Bench) -> None:
+    """The same command goes on each time, and leaves no process behind."""
+    out = tmp_path / "run"
+    command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", "--workers", "2", *ASKED, "--out", out)
+
+    def begin() -> subprocess.Popen[str]:
+        """Two more designs are held by two workers."""
+        before = len(bench.evaluated)
+        bench.ask("hold")
+        process = begin_command(*command)
+        wait_until(lambda: len(bench.evaluated) == before + 2)
+        return process
+
+    search = begin()
+    started = descendants(search.pid)
+    assert {pid for pid, _ in bench.evaluated} <= {process.pid for process in started}
+    search.kill()
+    search.communicate()
+    assert all_ended(started)
+    bench.release("hold")
+    assert trials(out) == []
+
+    search = begin()
+    started = descendants(search.pid)
+    search.send_signal(signal.SIGINT)
+    said, complained = search.communicate()
+    assert (search.returncode, complained) == (130, "")
+    assert "Go on with:" in said
+    assert all_ended(started)
+    bench.release("hold")
+
+    search = begin()
+    started = descendants(search.pid)
+    os.kill(bench.evaluated[-1][0], signal.SIGKILL)
+    wait_until(lambda: len({pid for pid, _ in bench.evaluated[4:]}) == 3)  # the worker that takes its place
+    bench.release("hold")
+    said, complained = search.communicate()
+    assert (search.returncode, complained) == (0, "")
+    assert said.count("a worker was lost; trial ") == 1
+    assert all_ended(started)
+    assert numbers(out) == list(range(N_TRIALS))
+
+
+@pytest.mark.slow
+def test_three_workers_lost_over_a_design_end_the_search_which_names_it(tmp_path: Path, bench: Bench) -> None:
+    bench.ask("die")
+    with pytest.raises(EvaluatorError, match=r"3 workers were lost over trial 0 .* design: \{.*\}\. Rerun") as raised:
+        aw.optimize(bench.problem(), **SHORT, out=tmp_path / "run", workers=aw.Workers(1))
+    assert len({pid for pid, _ in bench.evaluated}) == len(bench.evaluated) == 3
+    assert '"origin_x": ' in str(raised.value)
+    bench.release("die")
+    assert numbers(tmp_path / "run") == []
+    assert len(aw.optimize(bench.problem(), **SHORT, out=tmp_path / "run").trials) == N_TRIALS
+
+
+@pytest.mark.slow
+def test_other_versions_on_a_worker_and_a_lost_scheduler_are_one_line_each(tmp_path: Path, bench: Bench) -> None:
+    (tmp_path / "other" / "armwright-9.9.dist-info").mkdir(parents=True)
+    (tmp_path / "other" / "armwright-9.9.dist-info" / "METADATA").write_text("Name: armwright\nVersion: 9.9\n")
+    out = tmp_path / "run"
+    path = os.pathsep.join([str(tmp_path / "other"), os.environ.get("PYTHONPATH", "")])
+    cluster = ShellCluster(tmp_path)
+    try:
+        other = cluster.add_worker(PYTHONPATH=path)
+        with pytest.raises(ClusterError, match=r"^a worker has armwright 9\.9 instead of [^,]*; install the same"):
+            aw.optimize(bench.problem(), **SHORT, out=out, workers=on(cluster))
+        assert bench.evaluated == []
+        other.kill()
+        cluster.add_worker()
+        bench.ask("hold")
+        command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", out)
+        search = begin_command(*command, "--scheduler", cluster.address)
+        wait_until(lambda: bool(bench.evaluated))
+        cluster.scheduler.kill()
+        said, complained = search.communicate()
+    finally:
+        cluster.close()
+    assert search.returncode == 1
+    assert complained == (
+        f"armwright: lost the connection to the Dask scheduler at {cluster.address}; rerun the same command to resume\n"
+    )
+    assert f"evaluating on the Dask cluster at {cluster.address}\n" in said
+    bench.release("hold")
+    assert len(aw.optimize(bench.problem(), **SHORT, out=out).trials) == N_TRIALS
+
+
+# --- what goes wrong --------------------------------------------------------------------------------------------------
+
+
+def test_an_evaluator_s_exception_arrives_with_its_traceback_and_design(tmp_path: Path, bench: Bench) -> None:
+    fails_then_goes_on(tmp_path / "run", bench, bench.problem(), None)
+
+
+def test_an_evaluator_s_exception_on_a_worker_arrives_with_its_traceback_and_design(
+    tmp_path: Path, shell: ShellCluster, bench: Bench
+) -> None:
+    shell.only(2)
+    problem = bench.problem()
+    bench.file.unlink()  # its lines are in the traceback all the same
+    fails_then_goes_on(tmp_path / "run", bench, problem, on(shell))
+
+
+def fails_then_goes_on(run: Path, bench: Bench, problem: aw.Problem, workers: aw.Workers | None) -> None:
+    def search() -> aw.Run:
+        return aw.optimize(problem, **SHORT, out=run, workers=workers)
+
+    bench.ask("fail")
+    with pytest.raises(EvaluatorError, match=r"^trial \d+: sim.py:measure failed: ValueError: no licence \(") as raised:
+        search()
+    words = str(raised.value)
+    assert json.loads(words[words.index("{") : words.index("}") + 1]).keys() >= {"origin_x", "joint_1", "link_1"}
+    assert words.endswith(". Fix it and rerun the same command to resume")
+    (trace,) = raised.value.__notes__
+    assert trace.startswith("Traceback (most recent call last):\n")
+    assert trace.count("File ") == 1
+    assert 'in measure\n    raise ValueError("no licence")\nValueError: no licence' in trace
+    bench.release("fail")
+    assert len(search().trials) == N_TRIALS
+
+
+@pytest.mark.slow
+def test_the_command_line_shows_the_traceback_of_the_evaluator(tmp_path: Path, bench: Bench) -> None:
+    bench.ask("fail")
+    command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", tmp_path / "run")
+    search = begin_command(*command)
+    _, complained = search.communicate()
+    assert search.returncode == 1
+    *trace, cause, line = complained.splitlines()
+    assert trace[0] == "Traceback (most recent call last):"
+    assert cause == "ValueError: no licence"
+    assert line.startswith("armwright: trial 0: sim.py:measure failed: ValueError: no licence (sim.py, line ")
+
+
+def test_an_objective_s_exception_on_a_worker_arrives_with_its_traceback(shell: ShellCluster) -> None:
+    shell.only(1)
+
+    def each(evaluation: aw.Evaluation) -> Any:
+        raise ValueError("no such thing")
+
+    own = aw.Problem(TASK, objectives=(Objective("own", "Own", "", "E", "own", each),))
+    with pytest.raises(aw.FailureError, match="ValueError: no such thing") as raised:
+        aw.optimize(own, **SHORT, workers=on(shell))
+    assert "in each" in "".join(raised.value.__notes__)
+
+
+@pytest.mark.parametrize(
+    ("ask", "fault", "words"),
+    [
+        (lambda: aw.Workers(), SettingsError, "expected a number of workers or the address of a Dask scheduler"),
+        (lambda: aw.Workers(0), SettingsError, "expected 1 to 10,000 workers, got 0"),
+        (
+            lambda: aw.optimize(PAPER, proposer="rules", in_flight=1, workers=aw.Workers(1)),
+            SettingsError,
+            "--overlap does not go with --workers",
+        ),
+        (
+            lambda: aw.optimize(PAPER, workers=aw.Workers(scheduler="tcp://127.0.0.1:9")),
+            ClusterError,
+            r"no Dask scheduler answers at tcp://127\.0\.0\.1:9",
+        ),
+        (
+            lambda: aw.optimize(unpicklable(), workers=aw.Workers(1)),
+            SettingsError,
+            "the problem cannot be sent to workers: TypeError: cannot pickle '_thread.lock' object",
+        ),
+    ],
+)
+def test_what_cannot_be_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, ask: Callable[[], object], fault: type[Exception], words: str
+) -> None:
+    monkeypatch.setattr("armwright.study.cluster.CONNECT_SECONDS", 0.5)
+    with pytest.raises(fault, match=words) as raised:
+        ask()
+    assert "\n" not in str(raised.value)
+
+
+def unpicklable() -> aw.Problem:
+    lock = threading.Lock()
+
+    @aw.evaluator("energy [J]")
+    def measure(arm: aw.Arm, task: aw.Task) -> float:
+        with lock:
+            return 1.0
+
+    return aw.Problem(TASK, evaluator=measure)
+
+
+# --- cells of an experiment -------------------------------------------------------------------------------------------
+
+
+def two_cells(folder: Path, n_total: int) -> tuple[ExperimentPlan, list[Cell]]:
+    """An experiment of two cells."""
+    method = {"label": "BBO", "proposer": "none", "sampler": "random"}
+    content = {"name": "two", "tasks": ["random-3"], "seeds": 2, "n_init": 4, "n_total": n_total}
+    plan = ExperimentPlan.model_validate({**content, "methods": {"bbo": method}})
+    return plan, cells_of(plan, folder, folder)[0]
+
+
+def have_begun(cells: list[Cell]) -> bool:
+    return all(n_lines(cell.folder / "trials.jsonl") for cell in cells)
+
+
+def test_the_cell_of_a_killed_shell_worker_is_run_by_the_other(tmp_path: Path, shell: ShellCluster) -> None:
+    victim, _ = shell.only(2)
+    _, cells = two_cells(tmp_path, n_total=300)
+
+    def kill() -> None:
+        wait_until(lambda: have_begun(cells))
+        victim.kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    notes: list[str] = []
+    outcomes = list(run_cells(cells, on(shell), notes.append))
+    killer.join()
+    assert [outcome.fault for outcome in outcomes] == ["", ""]
+    assert all(finished_before(cell) for cell in cells)
+    assert [note for note in notes if note.startswith("a worker was lost; BBO, random-3, seed ")]
+
+
+def test_a_cell_over_which_workers_are_lost_has_failed_in_words(tmp_path: Path) -> None:
+    _, (cell, _) = two_cells(tmp_path, n_total=1)
+    assert _outcome_of(Finished(cell, is_lost=True)).fault.startswith("3 workers were lost over it")
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_an_experiment_with_its_local_workers(tmp_path: Path) -> None:
+    plan, cells = two_cells(tmp_path / "out", n_total=10_000)
+    file = tmp_path / "two.yaml"
+    file.write_text(yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True)))
+    process = begin_command("experiment", file, "--workers", "2", "--out", tmp_path / "out")
+    wait_until(lambda: have_begun(cells))
+    started = descendants(process.pid)
+    process.send_signal(signal.SIGINT)
+    said, complained = process.communicate()
+    assert (process.returncode, complained) == (130, "")
+    assert "Go on with:" in said
+    assert len(started) >= 3
+    assert all_ended(started)

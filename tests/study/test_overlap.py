@@ -1,0 +1,296 @@
+"""Overlap: questions go on while black-box trials run; the ratio is kept, and nothing is paid for twice."""
+
+import random
+import threading
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armwright.exceptions import ProposalError, SettingsError
+from armwright.llm.transcript import Transcript
+from armwright.problem.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.proposers.proposer import Proposal, Proposer
+from armwright.runs.history import History
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import Answer, ChatServer, Request, designer
+
+PROBLEM = Problem(load_task("target-1"))
+N_INIT = 4
+
+
+class Held(Proposer):
+    """Its answers are held back until they are released, one question at a time."""
+
+    name = "held"
+
+    def __init__(self, per_call: int = 1, faulty: tuple[int, ...] = ()) -> None:
+        self.per_call = per_call
+        self.faulty = faulty
+        self.known: dict[int, int] = {}
+        self.most_under_way = 0
+        self._gates: dict[int, threading.Event] = {}
+        self._lock = threading.Lock()
+
+    @property
+    def waiting(self) -> list[int]:
+        """The trials whose questions wait."""
+        return [number for number, gate in self._gates.items() if not gate.is_set()]
+
+    def release(self, number: int) -> None:
+        """Lets an answer go, and waits until the study has it."""
+        self._gates[number].set()
+        for thread in threading.enumerate():
+            if thread.name == f"armwright-question-{number}" and thread is not threading.current_thread():
+                thread.join()
+
+    def propose(self, history: History, seed: int, number: int) -> list[Proposal]:
+        with self._lock:
+            gate = self._gates.setdefault(number, threading.Event())
+            self.known[number] = len(history)
+            self.most_under_way = max(self.most_under_way, len(self.waiting))
+        gate.wait()
+        if number in self.faulty:
+            raise ProposalError("timeout", "it did not answer")
+        designs = history.problem.space.sample(self.per_call, seed)
+        return [Proposal(design, f"held-{number}.{i}") for i, design in enumerate(designs)]
+
+
+class Releasing(threading.Thread):
+    """Releases whatever waits, in an order of its own, as long as a study runs."""
+
+    def __init__(self, proposer: Held, seed: int) -> None:
+        super().__init__(daemon=True)
+        self.proposer = proposer
+        self.random = random.Random(seed)
+        self.over = threading.Event()
+
+    def run(self) -> None:
+        while not self.over.wait(0.001):
+            if waiting := self.proposer.waiting:
+                self.proposer.release(self.random.choice(waiting))
+
+
+def search(proposer: Proposer, n_step: int = 5, n_total: int = 20, in_flight: int = 1, **settings: Any) -> Run:
+    return optimize(
+        PROBLEM,
+        proposer=proposer,
+        sampler="random",
+        n_init=N_INIT,
+        n_step=n_step,
+        n_total=n_total,
+        in_flight=in_flight,
+        **settings,
+    )
+
+
+def test_an_answer_enters_as_the_next_trial_after_it_came() -> None:
+    proposer = Held()
+
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == 6:
+            proposer.release(4)  # asked when trial 4 was due
+        elif progress.doing == "finished" and progress.number == 10:
+            proposer.release(9)
+
+    run = search(proposer, n_total=10, watch=watch)
+    assert [trial.number for trial in run.trials if trial.source == "held"] == [7, 11]
+    first, second = run.trials[7], run.trials[11]
+    assert (first.proposal, first.asked, first.feedback) == ("held-4.0", 4, 4)
+    assert (second.proposal, second.asked, second.feedback) == ("held-9.0", 9, 9)
+    assert run.summary["proposer"]["overlap"] == {
+        "in_flight": 1,
+        "ratio_planned": 0.2,
+        "ratio": 0.2,
+        "ratio_with_failures": 0.2,
+        "feedback_age": {"mean": 2.5, "max": 3},
+    }
+
+
+def test_the_black_box_waits_when_it_is_a_block_ahead() -> None:
+    """Four black-box trials a block; the fifth has to wait for the answer."""
+    proposer = Held()
+    seen: list[tuple[int, int]] = []
+
+    def watch(progress: Progress) -> None:
+        seen.append((progress.number, progress.under_way))
+        if progress.doing == "finished" and progress.number == 7:
+            threading.Timer(0.05, proposer.release, (4,)).start()  # nothing can be drawn until then
+
+    run = search(proposer, n_total=5, watch=watch)
+    assert [trial.source for trial in run.trials[4:]] == ["bbo"] * 4 + ["held"]
+    assert (7, 1) in seen
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("n_step", "n_total", "in_flight", "per_call"), [
+    (5, 23, 1, 1), (5, 40, 3, 1), (1, 12, 4, 1), (4, 30, 2, 3), (30, 20, 2, 1), (2, 9, 1, 4),
+])  # fmt: skip
+def test_the_ratio_is_kept_whatever_the_order_of_the_answers(
+    seed: int, n_step: int, n_total: int, in_flight: int, per_call: int
+) -> None:
+    proposer = Held(per_call)
+    releasing = Releasing(proposer, seed)
+    releasing.start()
+    run = search(proposer, n_step, n_total, in_flight)
+    releasing.over.set()
+    sources = [trial.source for trial in run.trials[N_INIT:]]
+    planned = -(-n_total // n_step)
+    assert Counter(sources) == Counter({"held": planned, "bbo": n_total - planned}) - Counter(bbo=0)
+    assert proposer.most_under_way <= in_flight
+    entered = 0
+    for i, source in enumerate(sources):
+        entered += source == "held"
+        assert i + 1 - entered <= (n_step - 1) * (entered + in_flight * per_call)
+    ids = [trial.proposal for trial in run.trials if trial.proposal]
+    assert len(set(ids)) == planned
+    for trial in run.trials:
+        if trial.proposal:
+            asked = trial.number if trial.asked is None else trial.asked
+            assert proposer.known[asked] == (trial.number if trial.feedback is None else trial.feedback) <= trial.number
+
+
+def test_a_failed_question_is_a_black_box_trial_in_its_turn() -> None:
+    proposer = Held(faulty=(9,))
+    releasing = Releasing(proposer, 0)
+    releasing.start()
+    run = search(proposer)
+    releasing.over.set()
+    assert [trial.asked or trial.number for trial in run.trials if trial.fault] == [9]
+    assert Counter(trial.source for trial in run.trials[N_INIT:]) == {"bbo": 17, "held": 3}
+    assert run.summary["proposer"]["failures"] == {"timeout": 1}
+    overlap = run.summary["proposer"]["overlap"]  # a failure is a turn, and no proposal
+    assert (overlap["ratio_planned"], overlap["ratio"], overlap["ratio_with_failures"]) == (0.2, 0.15, 0.2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("in_flight", "per_call"), [(1, 3), (2, 3), (4, 2)])
+def test_of_several_designs_all_but_the_first_wait_for_their_blocks(seed: int, in_flight: int, per_call: int) -> None:
+    proposer = Held(per_call)
+    releasing = Releasing(proposer, seed)
+    releasing.start()
+    run = search(proposer, 4, 36, in_flight)
+    releasing.over.set()
+    entered = [trial for trial in run.trials if trial.proposal]
+    assert len(entered) == 9
+    asked: list[int] = []
+    for place, trial in enumerate(entered):
+        call, _, design = str(trial.proposal).partition(".")
+        assert int(design) == asked.count(int(call[5:]))  # in their order
+        asked.append(int(call[5:]))
+        assert design == "0" or trial.number >= N_INIT + 4 * place
+
+
+def test_a_fault_that_ends_the_asking_is_told_once() -> None:
+    """However many questions under way meet it."""
+
+    class Keyless(Proposer):
+        name = "keyless"
+        together = threading.Barrier(3)
+
+        def propose(self, history: History, seed: int, number: int) -> Proposal:
+            self.together.wait(60)
+            raise ProposalError("key", "the key is wrong", final=True)
+
+    notes: list[str] = []
+    run = search(Keyless(), in_flight=3, watch=lambda progress: notes.append(progress.note))
+    assert run.summary["proposer"]["failures"] == {"key": 4}
+    told = "the key is wrong; no more questions are asked in this session"
+    assert [note for note in notes if note] == [told]
+
+
+def test_what_came_before_an_interrupt_is_kept() -> None:
+    """The study waits a moment for the threads that keep it."""
+
+    class Keeping(Proposer):
+        name = "keeping"
+
+        def __init__(self) -> None:
+            self.asked, self.cancelled, self.kept = threading.Event(), threading.Event(), threading.Event()
+
+        def propose(self, history: History, seed: int, number: int) -> Proposal:
+            self.asked.set()
+            self.cancelled.wait(60)
+            self.kept.wait(0.1)  # to keep it takes a moment
+            self.kept.set()
+            raise ProposalError("cancelled", "the study is over")
+
+        def cancel(self) -> None:
+            self.cancelled.set()
+
+    proposer = Keeping()
+
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == N_INIT:
+            proposer.asked.wait(60)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        search(proposer, watch=interrupt)
+    assert proposer.kept.is_set()
+
+
+def test_an_error_in_a_question_is_the_studys() -> None:
+    class Broken(Proposer):
+        name = "broken"
+
+        def propose(self, history: History, seed: int, number: int) -> Proposal:
+            raise ZeroDivisionError("a bug of its own")
+
+    with pytest.raises(ZeroDivisionError, match="a bug of its own"):
+        search(Broken())
+
+
+def test_in_flight_must_make_sense() -> None:
+    with pytest.raises(SettingsError, match="in_flight = 0"):
+        search(Held(), in_flight=0)
+
+
+@pytest.mark.parametrize("stop", [6, 9, 13])
+def test_nothing_is_paid_for_twice_when_a_run_is_interrupted(
+    chat_server: ChatServer, tmp_path: Path, stop: int
+) -> None:
+    def proposer() -> LlmProposer:
+        return LlmProposer("test-model", chat_server.url)
+
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == stop:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        search(proposer(), 3, 18, 2, out=tmp_path / "run", watch=interrupt)
+    run = search(proposer(), 3, 18, 2, out=tmp_path / "run")
+    calls = [call for call in Transcript(tmp_path / "run" / "transcripts.jsonl").calls if call.proposal]
+    answered = Counter((call.proposal, call.step) for call in calls if call.fault is None)
+    assert set(answered.values()) == {1}
+    assert Counter(trial.source for trial in run.trials[N_INIT:]) == {"llm": 6, "bbo": 12}
+    assert sorted(p for p, step in answered if step == "parameters") == sorted(
+        trial.proposal for trial in run.trials if trial.proposal
+    )
+
+
+def test_an_interrupt_ends_the_questions_under_way(chat_server: ChatServer) -> None:
+    """While the server still holds its answers back."""
+    released = threading.Event()
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:
+            released.wait(60)
+        return designer(request)
+
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == N_INIT + 1:
+            raise KeyboardInterrupt
+
+    chat_server.answer = answer
+    with pytest.raises(KeyboardInterrupt):
+        search(LlmProposer("test-model", chat_server.url), in_flight=3, watch=interrupt)
+    for thread in threading.enumerate():
+        if thread.name.startswith("armwright-question"):
+            thread.join(30)
+            assert not thread.is_alive()
+    assert not released.is_set()
+    released.set()

@@ -1,0 +1,234 @@
+"""`armwright prompt`: what it prints is, to the byte, what is sent."""
+
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import ArmwrightError, RunConflictError
+from armwright.llm.prompt_values import VARIABLES
+from armwright.llm.transcript import Call, Transcript
+from armwright.problem.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.proposers.proposer import Proposer
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import load_task
+from tests.support.chat_server import Answer, ChatServer, Request, designer
+from tests.support.command_line import armwright
+from tests.support.fixed_problem import SIX_AXIS
+
+PROBLEM = Problem(load_task("target-1"))
+OWN = '{% extends "proposal.md.j2" %}{% block role %}Only {{ n_finished }} designs so far.{% endblock %}'
+
+
+def shown(*args: str) -> tuple[str, str]:
+    """What the command prints for a program, and for a person."""
+    result = CliRunner().invoke(app, ["prompt", *args])
+    if isinstance(result.exception, ArmwrightError):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return result.stdout, result.stderr
+
+
+def run(
+    out: Path,
+    n_total: int,
+    proposer: str | Proposer,
+    problem: Problem = PROBLEM,
+    in_flight: int | None = None,
+) -> Run:
+    return optimize(
+        problem, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=5, out=out, in_flight=in_flight
+    )
+
+
+def asked(out: Path) -> list[Call]:
+    return [call for call in Transcript(out / "transcripts.jsonl").calls if call.step in ("reasoning", "answer")]
+
+
+@pytest.mark.parametrize(
+    "how",
+    [{}, {"prompt": "minus", "memory": "own"}, {"answer": "one-step", "memory": "own"}, {"prompt": "file"}],
+    ids=["plus", "minus-own", "one-step", "file"],
+)
+def test_what_is_printed_is_what_is_sent(chat_server: ChatServer, in_folder: Path, how: dict[str, Any]) -> None:
+    out = in_folder / "run"
+    if how.get("prompt") == "file":
+        (in_folder / "own.md").write_text(OWN, encoding="utf-8")
+        how = {"prompt": str(in_folder / "own.md")}
+    run(out, 3, LlmProposer("test-model", chat_server.url, **how))
+    (in_folder / "own.md").unlink(missing_ok=True)  # the run has it
+    before, words = shown("target-1", "--after", "run")
+    assert words.startswith("about ")
+    assert words.endswith("tokens; for trial 7\n")
+    if (in_folder / "run" / "config.yaml").read_text().count("template:"):
+        (in_folder / "own.md").write_text(OWN, encoding="utf-8")
+        assert before.startswith("Only 7 designs so far.")
+    run(out, 4, LlmProposer("test-model", chat_server.url, **how))
+    first, second = asked(out)
+    assert before == second.prompt
+    assert shown("--after", "run", "--number", "7")[0] == second.prompt
+    assert shown("target-1", "--after", "run", "--number", "4")[0] == first.prompt
+    sent = [request["messages"][0]["content"] for request in chat_server.requests]
+    assert before in sent
+    schemas = [request["response_format"] for request in chat_server.requests if "response_format" in request]
+    printed = json.loads(shown("--after", "run", "--schema")[0])
+    assert printed["properties"] == schemas[-1]["json_schema"]["schema"]["properties"]
+
+
+def test_options_take_precedence_over_the_runs(chat_server: ChatServer, in_folder: Path) -> None:
+    run(in_folder / "run", 3, LlmProposer("test-model", chat_server.url, "minus", memory="own"))
+    told = shown("--after", "run")[0]
+    assert "Step 1" not in told
+    assert "Your earlier proposals" in told
+    told = shown("--after", "run", "--prompt", "plus", "--memory", "none", "--proposals", "2")[0]
+    assert "Step 1" in told
+    assert "Your earlier proposals" not in told
+    assert "2 new designs" in told
+
+
+def test_a_new_run(chat_server: ChatServer, in_folder: Path) -> None:
+    before = shown("target-1", "--n-init", "4", "--seed", "5", "--prompt", "minus")[0]
+    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, "minus"))
+    assert [call.prompt for call in asked(in_folder / "run")] == [before]
+
+
+def test_a_run_in_a_space_of_its_own_and_without_a_model(in_folder: Path) -> None:
+    run(in_folder / "run", 3, "none", Problem(load_task("target-2"), SIX_AXIS))
+    told = shown("--after", "run")[0]
+    assert "D = 6" in told
+    assert shown("target-2", "--after", "run", "--number", "7")[0] == told
+    assert shown("--after", "run", "--number", "4")[0] != told
+
+
+def test_what_is_still_to_come_is_said(chat_server: ChatServer, in_folder: Path) -> None:
+    run(in_folder / "run", 2, LlmProposer("test-model", chat_server.url))
+    assert shown("--after", "run")[1].endswith("for trial 7; 1 trial comes before it, and will be in it\n")
+    designs = [json.loads(json.dumps(dict(design.params))) for design in PROBLEM.space.sample(3, 1)]
+    chat_server.answer = lambda request: json.dumps({"designs": designs}) if "response_format" in request else "so"
+    run(in_folder / "many", 3, LlmProposer("test-model", chat_server.url, proposals=3))
+    assert shown("--after", "many")[1].endswith(
+        "for trial 13; 6 trials come before it, 2 of them of the calls so far, and will be in it\n"
+    )
+    run(in_folder / "many", 10, LlmProposer("test-model", chat_server.url, proposals=3))
+    assert [call.proposal for call in asked(in_folder / "many")] == ["llm-0004", "llm-0013"]
+
+
+def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: Path) -> None:
+    run(in_folder / "run", 7, LlmProposer("test-model", chat_server.url), in_flight=2)
+    calls = asked(in_folder / "run")
+    assert len(calls) == 3
+    for call in calls:
+        number = call.proposal.rpartition("-")[2]
+        assert shown("--after", "run", "--number", number)[0] == call.prompt
+
+
+def interrupted(out: Path, stop: int, server: ChatServer, in_flight: int | None) -> None:
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == stop:
+            raise KeyboardInterrupt
+
+    proposer = LlmProposer("test-model", server.url)
+    with pytest.raises(KeyboardInterrupt):
+        optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=9, seed=5, out=out, in_flight=in_flight,
+                 watch=interrupt)  # fmt: skip
+
+
+def test_after_an_interrupt_what_is_printed_is_what_is_sent_next(chat_server: ChatServer, in_folder: Path) -> None:
+    """Two questions were under way, for trials 4 and 7; none was answered."""
+    answered = threading.Event()
+
+    def answer(request: Request) -> Answer:
+        if len(chat_server.requests) > 1:
+            answered.wait(60)
+        return designer(request)
+
+    chat_server.answer = answer
+    interrupted(in_folder / "run", 5, chat_server, 2)
+    answered.set()
+    told, words = shown("--after", "run")
+    assert words.endswith("tokens; for trial 4\n")
+    run(in_folder / "run", 9, LlmProposer("test-model", chat_server.url), in_flight=2)
+    assert told == next(call.prompt for call in asked(in_folder / "run") if call.proposal == "llm-0004")
+
+
+@pytest.mark.parametrize("in_flight", [None, 1])
+def test_where_only_the_thoughts_have_come_their_parameters_are_asked_for_next(
+    chat_server: ChatServer, in_folder: Path, in_flight: int | None
+) -> None:
+    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url), in_flight=in_flight)
+    for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 2)):  # as a kill after the first answer leaves it
+        file = in_folder / "run" / name
+        file.write_text("".join(file.read_text().splitlines(keepends=True)[:lines]))
+    told, words = shown("--after", "run")
+    assert words.endswith("tokens; for trial 4\n")
+    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url), in_flight=in_flight)
+    calls = Transcript(in_folder / "run" / "transcripts.jsonl").calls
+    assert told == next(call.prompt for call in calls if (call.proposal, call.step) == ("llm-0004", "parameters"))
+    assert shown("--after", "run", "--number", "4")[0] == asked(in_folder / "run")[0].prompt
+
+
+def test_variables() -> None:
+    assert [line.partition(":")[0] for line in shown("--variables")[0].splitlines()] == list(VARIABLES)
+
+
+@pytest.mark.parametrize("name", ["plus", "minus"])
+def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Path, name: str) -> None:
+    whole = shown("--template", "--prompt", name)[0]
+    (in_folder / "own.md").write_text(whole, encoding="utf-8")
+    assert shown("target-1", "--prompt", "own.md")[0] == shown("target-1", "--prompt", name)[0]
+    assert shown("--template", "--prompt", "own.md")[0] == whole
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        ([], "armwright prompt needs a TASK"),
+        (["target-9"], 'unknown task "target-9"'),
+        (["target-1", "--number", "4"], "--number 4 goes with --after RUN"),
+        (["target-1", "--prompt", "pluss"], 'unknown prompt "pluss". Did you mean "plus"?'),
+        (["target-1", "--prompt", "."], "prompt . is a folder, not a template file"),
+        (["target-1", "--memory", "onw"], 'unknown memory "onw". Did you mean "own"?'),
+        (["target-1", "--answer", "two"], 'unknown answer "two"'),
+        (["target-1", "--proposals", "0"], "proposals = 0: a whole number from 1 to 100 is needed"),
+        (["target-1", "--after", "nowhere"], "nowhere is not a run folder"),
+        (["target-2", "--after", "run"], "run is a run of another task: target-1"),
+        (["--after", "run", "--space", "space.yaml"], "run is a run of another space: paper"),
+        (["--after", "run", "--seed", "1"], "--seed 1 goes with a new run; run has its own"),
+        (["--after", "run", "--n-init", "4"], "--n-init 4 goes with a new run; run has its own"),
+        (["--after", "run", "--number", "5"], "--number 5: the proposals of run were asked for trials 4"),
+        (["--after", "run", "--number", "-1"], "--number -1: the proposals of run were asked for trials 4"),
+        (["--after", "run", "--memory", "all"], 'unknown memory "all"'),
+    ],
+)
+def test_mistakes_are_one_line(in_folder: Path, args: list[str], message: str) -> None:
+    run(in_folder / "run", 1, "none")
+    (in_folder / "space.yaml").write_text("name: mine\njoints: 5\n", encoding="utf-8")
+    with pytest.raises(ArmwrightError) as refusal:
+        shown(*args)
+    assert message in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_mistake_in_a_template_is_one_line_on_stderr(in_folder: Path) -> None:
+    (in_folder / "own.md").write_text("{{ ''.__class__ }}", encoding="utf-8")
+    done = armwright("prompt", "target-1", "--prompt", "own.md")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("armwright: prompt own.md, line 1 cannot be rendered: access to attribute")
+    assert done.stderr.count("\n") == 1
+
+
+def test_another_template_for_the_same_run_is_refused_in_one_line(chat_server: ChatServer, in_folder: Path) -> None:
+    own = in_folder / "own.md"
+    for text in (OWN, OWN.replace("Only", "\n".join("Just"))):
+        own.write_text(text, encoding="utf-8")
+        if text == OWN:
+            run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, str(own)))
+    with pytest.raises(RunConflictError, match=r"proposer\.template: .* there, .* asked") as refusal:
+        run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, str(own)))
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 400

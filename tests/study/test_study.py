@@ -1,0 +1,362 @@
+"""The study: schedule, reference point, hypervolume, resume."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import moocore
+import numpy as np
+import optuna
+import pytest
+from optuna.samplers import BaseSampler, NSGAIISampler, QMCSampler, RandomSampler
+
+from armwright.exceptions import ProposalError, RunConflictError, RunFolderError, SettingsError
+from armwright.problem.problem import Problem
+from armwright.proposers.proposer import Proposal, Proposer
+from armwright.runs.folder import read_run
+from armwright.runs.history import History
+from armwright.search.samplers import SamplerFactory
+from armwright.spaces.parameters import Design
+from armwright.study.study import Progress, Run, optimize
+from armwright.tasks.task import Task, load_task
+from tests.support.extras import NEEDS_GP
+
+PROBLEM = Problem(load_task("target-1"))
+OPEN = Problem(Task(name="open", targets=((0.3, 0.0, 0.3), (0.3, 0.2, 0.5))))  # states no reference point
+
+
+class Listed(Proposer):
+    """Proposes uniform designs, or fails where `faulty` says so."""
+
+    name = "listed"
+
+    def __init__(self, faulty: tuple[int, ...] = ()) -> None:
+        self.faulty = faulty
+
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
+        if len(history) in self.faulty:
+            raise ProposalError("timeout", "it did not answer")
+        return Proposal(history.problem.space.sample(1, seed)[0], f"listed-{len(history)}")
+
+
+def short(
+    out: Path | None = None, problem: Problem = PROBLEM, proposer: Proposer | str = "none", n_total: int = 8
+) -> Run:
+    return optimize(problem, proposer=proposer, n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
+
+
+def designs(run: Run) -> list[object]:
+    return [(trial.source, trial.design, trial.values, trial.proposal) for trial in run.trials]
+
+
+def test_schedule() -> None:
+    """n_init random trials, then blocks of n_step whose first trial is the proposer's."""
+    run = short(proposer=Listed())
+    assert [trial.source for trial in run.trials] == ["random"] * 5 + ["listed", "bbo", "bbo", "bbo"] * 2
+    assert [trial.number for trial in run.trials] == list(range(13))
+
+
+def test_every_trial_can_be_the_proposers() -> None:
+    run = optimize(PROBLEM, proposer=Listed(), n_init=2, n_step=1, n_total=3)
+    assert [trial.source for trial in run.trials] == ["random"] * 2 + ["listed"] * 3
+
+
+def test_values_are_those_of_the_problem_and_the_curve_is_moocores() -> None:
+    run = short(n_total=30)
+    values = np.array([trial.values for trial in run.trials])
+    assert values == pytest.approx(PROBLEM.evaluate([trial.design for trial in run.trials]).values, abs=0)
+    expected = [
+        moocore.hypervolume(np.minimum(values[: 5 + i], 5.0), ref=[5.0, 5.0]) for i in range(1, 31)
+    ]  # a point moved onto the reference point's lines dominates no area
+    assert run.hypervolume == pytest.approx(np.array(expected))
+    assert run.summary["hypervolume"]["final"] == pytest.approx(expected[-1])
+    assert run.summary["hypervolume"]["mean"] == pytest.approx(np.mean(expected))
+    assert np.all(np.diff(run.hypervolume) >= 0.0)
+
+
+def test_front_members_are_the_non_dominated_trials_with_their_arms() -> None:
+    run = short(n_total=30)
+    values = np.array([trial.values for trial in run.trials])
+    assert [m.number for m in run.front] == sorted(
+        np.flatnonzero(moocore.is_nondominated(values)), key=lambda n: values[n, 0]
+    )
+    assert run.front[0].values == run.trials[run.front[0].number].values
+    assert run.front[0].arm == PROBLEM.arm(run.front[0].design)
+
+
+def test_the_same_seed_gives_the_same_run() -> None:
+    assert designs(short()) == designs(short())
+    other = optimize(PROBLEM, proposer="none", n_init=5, n_total=8, seed=1)
+    assert other.trials[0].design != short().trials[0].design
+
+
+def test_a_reference_point_that_the_task_leaves_open_is_frozen(tmp_path: Path) -> None:
+    run = short(tmp_path / "run", OPEN)
+    first = np.array([trial.values for trial in run.trials[:5]])
+    expected = 1.1 * first[moocore.is_nondominated(first)].max(axis=0)
+    assert run.config.reference_point == pytest.approx(expected)
+    more = short(tmp_path / "run", OPEN, n_total=16)
+    assert more.config.reference_point == run.config.reference_point
+    assert more.hypervolume[:8] == pytest.approx(run.hypervolume)
+
+
+def test_a_proposal_that_fails_becomes_a_black_box_trial() -> None:
+    run = short(proposer=Listed(faulty=(9,)))
+    assert (run.trials[9].source, run.trials[9].fault, run.trials[9].proposal) == ("bbo", "timeout", None)
+    assert run.summary["proposer"]["failures"] == {"timeout": 1}
+
+
+def test_a_proposer_that_fails_from_the_first_is_marked_counted_and_flagged() -> None:
+    run = short(proposer=Listed(faulty=(5, 9)))
+    assert [trial.fault for trial in run.trials] == [None] * 5 + ["timeout", None, None, None] * 2
+    assert {trial.source for trial in run.trials[5:]} == {"bbo"}
+    proposer = run.summary["proposer"]
+    assert (proposer["failures"], proposer["fallback_share"], proposer["flagged"]) == ({"timeout": 2}, 1.0, True)
+
+
+class Repeating(Proposer):
+    """Proposes one design again and again, and keeps how many finished trials it was shown each time."""
+
+    name = "repeating"
+
+    def __init__(self) -> None:
+        self.shown: list[tuple[int, int]] = []
+
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
+        self.shown.append((number, len(history)))
+        return Proposal(history.problem.space.sample(1, 0)[0], f"repeating-{number}")
+
+
+def test_a_trial_that_repeats_an_arm_is_recorded_before_the_next_begins(tmp_path: Path) -> None:
+    """Else the next one would be drawn without it, and after a kill between the two with it."""
+    proposer = Repeating()
+    run = optimize(PROBLEM, proposer=proposer, n_init=2, n_step=1, n_total=5, out=tmp_path / "run")
+    assert proposer.shown == [(number, number) for number in range(2, 7)]
+    assert [trial.same_as for trial in run.trials[3:]] == [2] * 4
+    assert all(trial.feedback is None for trial in run.trials)
+
+
+class Odd(Proposer):
+    """Gives no design at all, or one that no design space takes."""
+
+    name = "odd"
+
+    def __init__(self, *values: float) -> None:
+        self.values = values
+
+    def propose(self, history: History, seed: int, number: int) -> list[Proposal]:
+        design = history.problem.space.sample(1, seed)[0]
+        return [
+            Proposal(Design({**design.params, "link_1": value}), f"odd-{number}.{i}")
+            for i, value in enumerate(self.values)
+        ]
+
+
+@pytest.mark.parametrize("in_flight", [None, 2])
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [((), "the proposer gave no design"), ((9.0,), "link_1 = 9 m is outside 0.03 <= link_1 <= 0.3 m")],
+)
+def test_an_answer_without_a_usable_design_becomes_a_black_box_trial(
+    values: tuple[float, ...], words: str, in_flight: int | None
+) -> None:
+    notes: list[str] = []
+    run = optimize(
+        PROBLEM,
+        proposer=Odd(*values),
+        n_init=5,
+        n_step=4,
+        n_total=8,
+        in_flight=in_flight,
+        watch=lambda progress: notes.append(progress.note),
+    )
+    assert run.summary["proposer"]["failures"] == {"answer": 2}
+    assert [note for note in notes if note] == [words] * 2
+
+
+def test_of_several_designs_the_usable_ones_count() -> None:
+    run = optimize(PROBLEM, proposer=Odd(0.2, 9.0, 0.1), n_init=5, n_step=4, n_total=12)
+    assert [trial.fault or trial.proposal for trial in run.trials[5::4]] == ["odd-5.0", "answer", "odd-5.2"]
+
+
+def nsga2(seed: int) -> BaseSampler:
+    return NSGAIISampler(population_size=5, seed=seed)
+
+
+def qmc(seed: int) -> BaseSampler:
+    return QMCSampler(seed=7, scramble=True, warn_independent_sampling=False)
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+@pytest.mark.parametrize("sampler", ["tpe", "tpe-multivariate", "nsga2", nsga2, qmc])
+@pytest.mark.parametrize("proposer", ["none", "rules", Listed()])
+@pytest.mark.parametrize("stop", [3, 5, 6, 12])
+def test_a_resumed_run_equals_an_uninterrupted_one(
+    tmp_path: Path, proposer: Proposer | str, stop: int, sampler: str | SamplerFactory
+) -> None:
+    check_resume(tmp_path / "run", stop, proposer=proposer, sampler=sampler, n_init=5, n_step=4, n_total=20)
+
+
+@pytest.mark.parametrize("proposer", [pytest.param(name, marks=NEEDS_GP) for name in ("none", "rules")])
+def test_a_resumed_run_with_gp_equals_an_uninterrupted_one(tmp_path: Path, proposer: str) -> None:
+    """It draws by its model from the 11th trial on, some 0.3 s each: few trials, and a stop among them."""
+    check_resume(tmp_path / "run", 12, proposer=proposer, sampler="gp", n_init=5, n_step=4, n_total=12)
+
+
+def check_resume(out: Path, stop: int, **settings: Any) -> None:
+    whole = optimize(PROBLEM, **settings)
+
+    def interrupt(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == stop:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        optimize(PROBLEM, **settings, out=out, watch=interrupt)
+    resumed = optimize(PROBLEM, **settings, out=out)
+    assert resumed.resumed == stop + 1
+    assert designs(resumed) == designs(whole)
+
+
+def test_a_larger_n_total_extends_and_a_finished_run_is_only_read(tmp_path: Path) -> None:
+    short(tmp_path / "run", n_total=8)
+    content = (tmp_path / "run" / "trials.jsonl").read_bytes()
+    again = short(tmp_path / "run", n_total=8)
+    assert (again.resumed, len(again.trials)) == (13, 13)
+    assert (tmp_path / "run" / "trials.jsonl").read_bytes() == content
+    longer = short(tmp_path / "run", n_total=12)
+    assert longer.resumed == 13
+    assert designs(longer) == designs(short(n_total=12))
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["n_trials"] == 17
+
+
+def test_other_settings_are_refused_with_their_differences(tmp_path: Path) -> None:
+    short(tmp_path / "run", n_total=8)
+    with pytest.raises(RunConflictError) as refusal:
+        optimize(PROBLEM, proposer=Listed(), n_init=5, n_step=2, n_total=6, seed=3, out=tmp_path / "run")
+    for difference in (
+        "n_step: 4 there, 2 asked",
+        "seed: 0 there, 3 asked",
+        "proposer.name: None there, listed asked",
+        "n_total: 8 there, 6 asked (it can only grow)",
+    ):
+        assert difference in str(refusal.value)
+
+
+def test_the_order_of_a_proposals_parameters_means_nothing(tmp_path: Path) -> None:
+    class Backwards(Listed):
+        def propose(self, history: History, seed: int, number: int) -> Proposal:
+            proposal = super().propose(history, seed, number)
+            return Proposal(Design(dict(reversed(proposal.design.params.items()))), proposal.id)
+
+    run = short(tmp_path / "run", proposer=Backwards())
+    assert designs(run) == designs(short(proposer=Listed()))
+    assert [t.values for t in read_run(tmp_path / "run")[1]] == [t.values for t in run.trials]
+
+
+def test_a_folder_without_a_finished_trial_takes_any_settings(tmp_path: Path) -> None:
+    def fail(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        optimize(PROBLEM, proposer=Listed(), n_init=1, n_step=1, n_total=1, out=tmp_path / "run", watch=fail)
+    (tmp_path / "run" / "trials.jsonl").write_text("")
+    assert len(short(tmp_path / "run").trials) == 13
+
+
+def test_other_versions_are_noted(tmp_path: Path) -> None:
+    short(tmp_path / "run")
+    config = tmp_path / "run" / "config.yaml"
+    config.write_text(config.read_text().replace("  optuna: ", "  optuna: 0."))
+    run = short(tmp_path / "run", n_total=12)
+    assert run.config.versions["optuna"] == optuna.__version__
+    assert run.config.earlier_versions[0]["optuna"] == f"0.{optuna.__version__}"
+
+
+def test_two_processes_cannot_write_one_run(tmp_path: Path) -> None:
+    def second(progress: Progress) -> None:
+        with pytest.raises(RunFolderError, match="in use by another"):
+            short(tmp_path / "run")
+
+    optimize(PROBLEM, proposer="none", n_init=2, n_total=1, out=tmp_path / "run", watch=second)
+
+
+def test_any_optuna_sampler_by_a_factory(tmp_path: Path) -> None:
+    def uniform(seed: int) -> BaseSampler:
+        return RandomSampler(seed=seed)
+
+    run = optimize(PROBLEM, proposer="none", sampler=uniform, n_init=2, n_total=3, out=tmp_path / "run")
+    named = optimize(PROBLEM, proposer="none", sampler="random", n_init=2, n_total=3)
+    assert designs(run) == designs(named)
+    assert run.config.method.sampler.startswith("line ")
+    assert run.config.method.sampler.endswith(
+        " of tests.study.test_study, test_any_optuna_sampler_by_a_factory.<locals>.uniform"
+    )
+
+
+def test_another_factory_is_another_run(tmp_path: Path) -> None:
+    def go_on(sampler: SamplerFactory, n_total: int) -> Run:
+        return optimize(PROBLEM, proposer="none", sampler=sampler, n_init=2, n_total=n_total, out=tmp_path / "run")
+
+    go_on(lambda seed: RandomSampler(seed=seed), 2)
+    with pytest.raises(
+        RunConflictError, match=r"sampler: line \d+ \(.*\) of tests.study.test_study,.* there, line \d+"
+    ):
+        go_on(lambda seed: QMCSampler(seed=seed), 3)
+    with pytest.raises(RunConflictError, match="qmc asked"):
+        go_on(qmc, 3)
+
+
+def test_a_sampler_or_proposer_of_the_wrong_kind_is_refused() -> None:
+    with pytest.raises(SettingsError, match="a factory seed -> sampler is needed"):
+        optimize(PROBLEM, proposer="none", sampler=RandomSampler())  # type: ignore[arg-type]
+    with pytest.raises(SettingsError, match=r"Listed is a class; give an instance of it: Listed\(\)"):
+        optimize(PROBLEM, proposer=Listed)  # type: ignore[arg-type]
+
+
+def test_a_folder_that_is_deleted_while_the_run_goes_on_is_said_at_once(tmp_path: Path) -> None:
+    def delete(progress: Progress) -> None:
+        if progress.number == 6:
+            shutil.rmtree(tmp_path / "run")
+
+    with pytest.raises(RunFolderError, match="deleted while the run went on"):
+        optimize(PROBLEM, proposer="none", n_init=2, n_total=50, out=tmp_path / "run", watch=delete)
+
+
+def test_progress_tells_the_standing() -> None:
+    seen: list[Progress] = []
+    run = optimize(OPEN, proposer=Listed(), n_init=3, n_step=2, n_total=4, watch=seen.append)
+    finished = [progress for progress in seen if progress.doing == "finished"]
+    assert [progress.iteration for progress in finished] == [0, 0, 0, 1, 2, 3, 4]
+    assert [progress.hypervolume for progress in finished[:2]] == [None, None]
+    assert [progress.hypervolume for progress in finished[3:]] == pytest.approx(run.hypervolume.tolist())
+    assert finished[-1].front_size == len(run.front)
+    assert [progress.source for progress in seen if progress.doing == "proposing"] == ["listed"] * 2
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"seed": 2**31}, {"n_step": 0}, {"n_init": 0}, {"n_total": 0}, {"seed": -1}, {"n_total": 1.5}, {"n_step": True}],
+)
+def test_settings_that_make_no_sense_are_refused(settings: dict[str, int]) -> None:
+    with pytest.raises(SettingsError, match=f"{next(iter(settings))} = "):
+        optimize(PROBLEM, proposer="none", **settings)
+
+
+def test_a_front_outside_the_reference_box_counts_nothing() -> None:
+    problem = Problem(Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0)))
+    run = short(problem=problem)
+    assert run.hypervolume.tolist() == [0.0] * 8
+    assert run.front
+
+
+def test_more_joints_and_other_masses_run_too() -> None:
+    for joints in (1, 8):
+        space = PROBLEM.space.model_copy(update={"joints": joints})
+        run = optimize(Problem(PROBLEM.task, space), proposer="rules", n_init=3, n_step=2, n_total=4)
+        assert len(run.trials) == 7
+
+
+def test_history_evaluates_finished_trials_again_to_the_same_values() -> None:
+    history = short().history
+    assert PROBLEM.outcomes(history.evaluation(range(13))).values.tolist() == [list(trial.values) for trial in history]

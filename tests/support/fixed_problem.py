@@ -1,0 +1,138 @@
+"""Problems whose evaluation is a simple formula, the same on every machine; and histories of them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.paths import Paths
+from armwright.pareto import default_reference_point
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
+from armwright.problem.problem import Problem
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.parameters import Design
+from armwright.tasks.moves import lines_of
+from armwright.tasks.task import Task
+from armwright.tasks.workspace import points_of
+
+
+class FixedProblem(Problem):
+    """The tip comes a part of the way to each target; joint j turns by j steps; torques fall from base to tip."""
+
+    def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
+        rows = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
+        targets = self.task.points
+        built = self.space.designs(rows)
+        n, t, d = len(built), len(targets), self.space.max_joints
+        reach = np.array([sum(design.links) for design in built])
+        base = np.array([design.origin for design in built]).reshape(n, 3)
+        away = targets[None] - base[:, None]  # (N, T, 3)
+        distance = np.linalg.norm(away, axis=-1)
+        part = np.minimum(1.0, reach[:, None] / np.maximum(distance, 1e-9))
+        reached = base[:, None] + part[..., None] * away
+        lower, upper = self.space.joint_range
+        steps = 0.4 * np.arange(1, d + 1) * (1 + np.arange(t)[:, None] % 3) - 1.5  # (T, D)
+        q = np.broadcast_to(np.clip(steps, lower, upper), (n, t, d)).copy()
+        mass = self.space.max_joints * self.space.mass.mass(self.space.link[1])
+        lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
+        torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
+        arms = stack_designs(self.space, rows)
+        error = np.linalg.norm(reached - targets, axis=-1)
+        angle = np.zeros_like(error)
+        known = (arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals)
+        evaluation = Evaluation(*known, self.task.obstacles, moves=self.task.lines, workspace=self.task.workspace)
+        if evaluation.moves:
+            vars(evaluation)["paths"] = _fixed_paths(evaluation)
+        ways = np.linalg.norm(points_of(self.task.workspace) - base[:, None], axis=-1)
+        vars(evaluation)["workspace_error"] = np.maximum(0.0, ways - reach[:, None])
+        return evaluation
+
+
+def _fixed_paths(evaluation: Evaluation) -> Paths:
+    """Between two targets, all is between what it is at them, but for a bow of the tip."""
+    lines = lines_of(evaluation.moves, evaluation.targets)
+    start, end = np.array(evaluation.moves.pairs)[lines.move].T
+    share = lines.share[:, None]
+    q, reached, torques = (
+        (1 - share) * at[:, start] + share * at[:, end]
+        for at in (evaluation.q, evaluation.reached, evaluation.joint_torques)
+    )
+    reached = reached + 0.1 * share * (1 - share)
+    error = np.linalg.norm(reached - lines.points, axis=-1)
+    return Paths(evaluation.moves, lines, np.zeros(len(lines)), q, reached, error, torques)
+
+
+LENGTH = Objective(
+    name="length",
+    label="Length",
+    unit="m",
+    symbol="E_length",
+    words="the distance of the tip from the world's origin, which stands for the room that the arm takes",
+    each=lambda evaluation: np.linalg.norm(evaluation.reached, axis=-1),
+)
+
+
+ONE_OBJECTIVE = (POSITION_ERROR,)
+THREE_OBJECTIVES = (*PAPER_OBJECTIVES, LENGTH)
+
+
+def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Sequence[FinishedTrial] = ()) -> History:
+    """`n` designs at random, then the given proposals (their numbers and values are filled in)."""
+    designs = [*problem.space.sample(n, seed=1), *(trial.design for trial in proposals)]
+    outcomes = problem.evaluate(designs)
+    values, violations = outcomes.values, outcomes.violations
+    reference = problem.reference_point
+    if reference is None and len(designs) >= n_init and values.shape[1] == 2:
+        reference = default_reference_point(values[:n_init])
+    trials = [
+        FinishedTrial(
+            number,
+            "random" if number < n_init else "bbo",
+            design,
+            tuple(row),
+            constraints=tuple(violations[number].tolist()),
+        )
+        for number, (design, row) in enumerate(zip(designs, values.tolist(), strict=True))
+    ]
+    for place, trial in enumerate(proposals, start=n):
+        trials[place] = replace(
+            trials[place],
+            source="llm",
+            proposal=f"llm-{place:04d}",
+            reason=trial.reason,
+            expected=trial.expected,
+        )
+    return History(problem, trials, n_init, reference)
+
+
+def proposal(design: Design, reason: str = "", expected: tuple[float, ...] | None = None) -> FinishedTrial:
+    return FinishedTrial(0, "llm", design, (), reason=reason, expected=expected)
+
+
+SIX_AXIS = DesignSpace(
+    name="six-axis",
+    joints=6,
+    joint_types=("Y", "P"),
+    joint_range=(-2.8, 2.0),
+    origin_x=(-0.25, 0.75),
+    origin_y=(0.0, 0.0),
+    origin_z=(0.125, 0.125),
+    link=(0.05, 0.4),
+    mass={"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},  # type: ignore[arg-type]
+)
+ONE_JOINT = paper_space(1).model_copy(update={"joint_types": ("P",), "link": (0.2, 0.2)})
+TWO_JOINTS = paper_space(2)
+SMALL = paper_space(2).model_copy(
+    update={"link": (0.0005, 0.004), "origin_x": (-0.001, 0.001), "origin_y": (-0.001, 0.001), "origin_z": (0, 1 / 3)}
+)
+
+
+def grid_task(n: int, name: str = "grid", **more: object) -> Task:
+    """`n` points in rows of ten, without a reference point unless one is given."""
+    points = tuple((0.3 + 0.02 * (i % 10), 0.05 * (i // 10), 0.4 + 0.01 * (i % 7)) for i in range(n))
+    return Task(name=name, targets=points, **more)  # type: ignore[arg-type]

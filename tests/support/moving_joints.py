@@ -1,0 +1,43 @@
+"""The kernels for arms with the same joints fixed, in the moving joints alone: as the references have them."""
+
+from typing import Any
+
+import numpy as np
+
+from armwright.kinematics import ik as solve
+from armwright.kinematics.arm_arrays import FIXED, ArmArrays
+from armwright.kinematics.ik import Postures
+
+
+def moving(arrays: ArmArrays) -> np.ndarray:
+    """The places of the joints that move."""
+    assert np.array_equal(arrays.motion < FIXED, np.broadcast_to(arrays.motion[0] < FIXED, arrays.motion.shape))
+    return np.flatnonzero(arrays.motion[0] < FIXED)
+
+
+def of_all(values: np.ndarray, arrays: ArmArrays) -> np.ndarray:
+    """(..., D) from values of the moving joints alone, 0 for the others."""
+    every = np.zeros((*values.shape[:-1], arrays.dof), dtype=values.dtype)
+    every[..., moving(arrays)] = values
+    return every
+
+
+def solve_postures(arrays: ArmArrays, targets: np.ndarray, *args: Any, start: Any = None, **options: Any) -> Postures:
+    own = moving(arrays)
+    if start is not None:
+        start = np.asarray(start, dtype=np.float64)
+        if start.ndim and start.shape[-1] == len(own):
+            start = of_all(start, arrays)
+    found = solve.solve_postures(arrays, targets, *args, start=start, **options)
+    assert not np.delete(found.q, own, axis=-1).any()
+    assert not np.delete(found.torque, own, axis=-1).any()
+    q, torque = (np.ascontiguousarray(values[..., own]) for values in (found.q, found.torque))
+    return Postures(q, found.reached, torque, found.angle)
+
+
+def update_once(
+    arrays: ArmArrays, targets: np.ndarray, q: np.ndarray, h_before: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    own = moving(arrays)
+    after, h = solve.update_once(arrays, targets, of_all(q, arrays), of_all(h_before, arrays))
+    return after[:, own], h[:, own]

@@ -1,0 +1,239 @@
+"""Obstacles: what a file may say of them, and that they come from there to the prompt, the figures and the page."""
+
+from collections.abc import Sequence
+from copy import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from playwright.sync_api import Browser
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import RunConflictError, TaskError
+from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES, OF_CLEARANCE, named_objectives
+from armwright.problem.problem import Problem
+from armwright.report.page import write_report
+from armwright.report.repeat_command import repeat_command
+from armwright.report.solids import clipped
+from armwright.runs.folder import read_run
+from armwright.runs.verification import verify
+from armwright.study.study import optimize
+from armwright.tasks.obstacles import SHAPES, Box, Cylinder
+from armwright.tasks.task import Task, load_task
+from armwright.tasks.task_template import task_template
+from armwright.yaml_documents import parse_document
+from tests.support.browser import Tab
+
+RECORDS: list[dict[str, Any]] = [
+    {"kind": "ground", "name": "table", "z": -0.1},
+    {"kind": "box", "name": "shelf", "center": [0.4, 0.1, 0.3], "size": [0.2, 0.5, 0.04], "rpy": [0.3, -0.2, 0.5]},
+    {"kind": "sphere", "center": [0.2, -0.3, 0.2], "radius": 0.1},
+    {"kind": "cylinder", "name": "pole", "center": [0.3, 0.0, 0.1], "radius": 0.03, "height": 0.4, "axis": [1, 2, 2]},
+]
+POINTS = [[0.4, 0.2, 0.1], [0.4, -0.2, 0.1], [0.3, 0.1, 0.5]]
+WORDS = [
+    "table: ground, solid everywhere below z = -0.1 m",
+    "shelf: box of 0.2 x 0.5 x 0.04 m (along x, y, z) about (0.4, 0.1, 0.3), turned by roll, pitch, yaw "
+    "(0.3, -0.2, 0.5) rad",
+    "sphere of radius 0.1 m about (0.2, -0.3, 0.2)",
+    "pole: cylinder of radius 0.03 m and height 0.4 m about (0.3, 0, 0.1), its axis along (1, 2, 2)",
+]
+
+
+def task_of(records: Sequence[object], **more: object) -> Task:
+    content = {"name": "way", "targets": POINTS, "obstacles": [copy(record) for record in records], **more}
+    return parse_document(yaml.safe_dump(content), Task, TaskError, "way.yaml")
+
+
+# The file
+
+
+def test_what_may_be_written() -> None:
+    task = task_of(RECORDS)
+    assert [obstacle.words() for obstacle in task.obstacles] == WORDS
+    assert task_of(task.model_dump(mode="json")["obstacles"]) == task
+    assert Task(name="none", targets=((0.0, 0.0, 0.0),)).obstacles == ()
+    yawed = task_of([{"kind": "box", "center": [0, 0, 0], "size": [1, 1, 1], "yaw": 0.5}]).obstacles[0]
+    assert yawed.words() == "box of 1 x 1 x 1 m (along x, y, z) about (0, 0, 0), turned by yaw 0.5 rad"
+
+
+@pytest.mark.parametrize(
+    ("records", "words"),
+    [
+        ([{"kind": "bxo"}], 'obstacle 1: kind "bxo" is unknown. Did you mean "box"? Kinds: box, sphere, '),
+        ([RECORDS[0], {"center": [0, 0, 0]}], "obstacle 2: kind is missing. Kinds: box, "),
+        ([{**RECORDS[1], "siez": 1}], 'a box has no "siez". Did you mean "size"? Keys: kind, name, center, size, yaw'),
+        ([{"kind": "sphere", "center": [0, 0, 0]}], "obstacles[0].sphere.radius: Field required"),
+        ([{**RECORDS[2], "radius": 0}], "radius: Input should be greater than 0 (got 0)"),
+        ([{**RECORDS[2], "radius": 1001}], "radius: Input should be less than or equal to 1000"),
+        ([{**RECORDS[2], "center": [0, 0, 1e4]}], "center[2]: Input should be less than or equal to 1000"),
+        ([{**RECORDS[2], "center": [0, 0, float("nan")]}], "center[2]"),
+        ([{**RECORDS[1], "yaw": 1.0}], "yaw and rpy are both given"),
+        ([{**RECORDS[3], "axis": [0, 0, 0]}], "axis = (0, 0, 0) has no direction; give x, y, z or a vector"),
+        ([{**RECORDS[0], "name": "a\nb"}], "name"),
+        ([{**RECORDS[0], "name": "{{ evil }}"}], "name"),
+        ([RECORDS[0]] * 101, "obstacles has 101 records; at most 100 are allowed"),
+        ([3], "obstacles[0]"),
+    ],
+)
+def test_what_may_not_is_refused_in_one_line(records: list[object], words: str) -> None:
+    with pytest.raises(TaskError) as refusal:
+        task_of(records)
+    assert words in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_mapping_is_no_list() -> None:
+    with pytest.raises(TaskError, match="obstacles is a list of records, such as"):
+        parse_document("name: a\ntargets: [[0, 0, 1]]\nobstacles: {kind: ground}", Task, TaskError, "a.yaml")
+
+
+def test_the_template_shows_one_of_each(tmp_path: Path) -> None:
+    lines = task_template(tmp_path / "a.yaml").splitlines()
+    start = lines.index("# obstacles:")
+    shown = yaml.safe_load("\n".join(line.removeprefix("# ") for line in lines[start : lines.index("", start)]))
+    assert {obstacle.kind for obstacle in task_of(shown["obstacles"]).obstacles} == set(SHAPES)
+
+
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 3))
+def test_a_box_is_turned_as_urdf_has_it(rpy: tuple[float, float, float]) -> None:
+    box = Box(kind="box", center=(0.0, 0.0, 0.0), size=(1.0, 1.0, 1.0), rpy=rpy)
+    assert box.solid.rotation == pytest.approx(pinocchio.rpy.rpyToMatrix(*rpy), abs=1e-12)
+
+
+@given(st.tuples(*[st.floats(-100.0, 100.0)] * 3).filter(lambda axis: np.linalg.norm(axis) > 1e-3))
+def test_a_cylinder_stands_along_its_axis(axis: tuple[float, float, float]) -> None:
+    rotation = Cylinder(kind="cylinder", center=(0.0, 0.0, 0.0), radius=1.0, height=1.0, axis=axis).solid.rotation
+    assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-9)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+    assert rotation[:, 2] == pytest.approx(np.array(axis) / np.linalg.norm(axis), abs=1e-9)
+
+
+# What is made of it
+
+
+def test_objectives_of_clearance() -> None:
+    task = task_of(RECORDS, objectives=["collision", "clearance_shortfall"])
+    problem = Problem(task)
+    designs = problem.space.sample(40, 3)
+    evaluation, values = problem.physics(designs), problem.evaluate(designs).values
+    free = evaluation.clearance
+    assert np.any(free < 0.0)
+    assert np.any(free.min(axis=1) > 0.0)
+    for row in range(40):
+        assert values[row, 0] == pytest.approx(sum(max(0.0, -at) for at in free[row]))
+        assert values[row, 1] == pytest.approx(max(max(0.0, 0.1 - at) for at in free[row]))
+    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
+    for quantity in CLEARANCES:
+        least = getattr(evaluation, quantity.name).min(axis=1)
+        assert np.array_equal(quantity(evaluation), np.minimum(least, FAR))
+    assert np.any(verify(problem, designs, values, (1.0, 1.0)).solid)
+    alone = Problem(
+        Task(name="alone", targets=task.targets), objectives=named_objectives(["collision", "clearance_shortfall"])
+    )
+    assert np.all(np.isfinite(alone.evaluate(designs).values))
+    assert np.all(alone.evaluate(designs).values <= values)
+
+
+def test_the_paper_s_objectives_do_not_see_them() -> None:
+    with_, without = task_of(RECORDS), task_of([])
+    designs = Problem(without).space.sample(20, 0)
+    assert np.array_equal(Problem(with_).evaluate(designs).values, Problem(without).evaluate(designs).values)
+    assert not Problem(with_).uses(*OF_CLEARANCE)
+    assert Problem(with_, objectives=(OBJECTIVES["collision"],)).uses(*OF_CLEARANCE)
+
+
+@pytest.mark.slow
+def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
+    file = tmp_path / "way.yaml"
+    said = {"name": "way", "targets": POINTS, "obstacles": RECORDS, "objectives": ["worst_error", "collision"]}
+    file.write_text(yaml.safe_dump(said))
+
+    def armwright(*words: object) -> str:
+        result = CliRunner().invoke(app, list(map(str, words)))
+        assert result.exit_code == 0, result.output
+        return result.output
+
+    assert all(f"  obstacle: {words}\n" in armwright("tasks", file) for words in WORDS)
+    size = ["--n-init", 5, "--n-total", 10]
+    output = armwright("optimize", file, *size, "--out", tmp_path / "run")
+    assert "count in none of the objectives" not in output
+    config, history = read_run(tmp_path / "run")
+    assert config.task.obstacles == load_task(file).obstacles
+    assert np.array_equal(history.problem.evaluate([trial.design for trial in history]).values, history.values)
+    prompt = armwright("prompt", "--after", tmp_path / "run")
+    assert all(f"\n- {words}\n" in prompt for words in WORDS)
+    assert "Orientation does not matter. The inverse kinematics steers around nothing" in prompt
+    assert repeat_command(config).startswith("armwright optimize TASK.yaml")
+    options = ["--objectives", "position_error", *size, "--no-figures", "--out", tmp_path / "other"]
+    assert "the task's obstacles count in none of the objectives" in armwright("optimize", file, *options)
+
+
+def test_a_task_with_other_obstacles_is_another_run(tmp_path: Path) -> None:
+    optimize(Problem(task_of(RECORDS)), proposer="none", n_init=2, n_total=1, out=tmp_path)
+    with pytest.raises(RunConflictError, match=r"task\.obstacles: \[.*table"):
+        optimize(Problem(task_of(RECORDS[:1])), proposer="none", n_init=2, n_total=1, out=tmp_path)
+
+
+# Drawings
+
+
+def test_faces_are_cut_off_at_the_cube() -> None:
+    rng = np.random.default_rng(0)
+    square = np.array([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)])
+    cut = 0
+    for _ in range(300):
+        turn = pinocchio.rpy.rpyToMatrix(*rng.uniform(-3, 3, 3))
+        centre, size = rng.uniform(-1, 1, 3), rng.uniform(0.2, 3.0)
+        face = centre + size * square @ turn.T
+        left = clipped(face, np.zeros(3), 1.0)
+        assert np.all(np.abs(left) <= 1.0 + 1e-9)
+        assert (left - centre) @ turn[:, 2] == pytest.approx(np.zeros(len(left)), abs=1e-9)
+        # What is within both stays: random points of the face lie on the same side of each edge.
+        points = centre + size * (rng.uniform(-1, 1, (200, 2)) @ turn[:, :2].T)
+        kept = points[np.all(np.abs(points) < 1.0 - 1e-6, axis=1)]
+        cut += len(left) != 4
+        if len(kept):
+            sides = np.einsum("kj,knj->kn", np.cross(turn[:, 2], np.roll(left, -1, 0) - left), kept - left[:, None])
+            assert np.all(sides > -1e-9)
+    assert cut > 100
+
+
+def test_the_page_draws_them_where_they_are(tmp_path: Path, browser: Browser) -> None:
+    task = task_of(RECORDS, objectives=["worst_error", "clearance_shortfall"])
+    optimize(Problem(task), proposer="none", n_init=4, n_total=6, out=tmp_path, verify=False)
+    write_report(tmp_path)
+    tab = Tab(browser, offline=True)
+    try:
+        tab.open(tmp_path / "report.html")
+        parts = [np.array(part) for part in tab.ask("armwright.drawnObstacles()")]
+        assert "obstacle" in tab.text("#arm-legend")
+        assert all(words in tab.text("#design-note") for words in WORDS)
+        assert not tab.faults
+    finally:
+        tab.close()
+    solids = [obstacle.solid for obstacle in task.obstacles]
+    plate, edge, box, box_edges, ball, bar, rims = parts
+    assert plate[:, 2].max() == pytest.approx(-0.1, abs=1e-6)
+    assert edge[:, 2] == pytest.approx(-0.1)
+
+    def own(part: np.ndarray, number: int) -> np.ndarray:
+        """In the obstacle's own frame, in units of its half sides."""
+        return (part - solids[number].centre) @ solids[number].rotation / solids[number].half
+
+    for part in (box, box_edges):
+        corners = {tuple(np.sign(row)) for row in own(part, 1) if np.all(np.abs(np.abs(row) - 1.0) < 1e-5)}
+        assert len(corners) == 8
+        assert np.abs(own(part, 1)).max() == pytest.approx(1.0, abs=1e-5)
+    assert np.linalg.norm(own(ball, 2), axis=1) == pytest.approx(1.0, abs=1e-5)
+    for part in (bar, rims):
+        x, y, z = own(part, 3).T
+        across = np.hypot(x, y)
+        assert np.all((np.abs(across - 1.0) < 1e-5) | (across < 1e-5))
+        assert np.abs(z) == pytest.approx(1.0, abs=1e-5)

@@ -1,0 +1,145 @@
+"""Symmetry planes: of known sets, and of any set that was mirrored, however it is turned."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from armwright.tasks.symmetry import centre, distance_to_planes, is_mirrored, symmetry_planes
+from armwright.tasks.task import builtin_names, load_task, random_task
+
+EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
+MILLIMETRES = st.integers(-1000, 1000).map(lambda mm: mm / 1000)
+POINTS = arrays(float, st.tuples(st.integers(2, 8), st.just(3)), elements=MILLIMETRES)
+ROTATIONS = arrays(float, (4,), elements=st.floats(-1.0, 1.0)).filter(lambda q: np.linalg.norm(q) > 0.1)
+
+
+def rotation(quaternion: np.ndarray) -> np.ndarray:
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def has(normals: np.ndarray, normal: np.ndarray) -> bool:
+    return bool(np.any(np.abs(normals @ normal) > 1.0 - 1e-9))
+
+
+def directions(name: str) -> set[tuple[int, ...]]:
+    """Normals in units of their least component that is not 0."""
+    found = symmetry_planes(load_task(name).points)
+    return {tuple(np.round(n / np.abs(n[np.abs(n) > 1e-6]).min()).astype(int).tolist()) for n in found}
+
+
+def test_the_planes_of_target_1_are_a_cubes() -> None:
+    axes = {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
+    assert directions("target-1") == axes | {(1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1)}
+
+
+def test_the_planes_of_target_2_are_its_two_and_its_own() -> None:
+    assert directions("target-2") == {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
+
+
+def test_the_planes_of_target_3_are_an_octagons_and_its_own() -> None:
+    """Its file has six digits, and is symmetric within 1e-6 m."""
+    normals = symmetry_planes(load_task("target-3").points)
+    angles = np.degrees(np.arctan2(normals[:, 2], normals[:, 1])) % 180.0
+    own = np.abs(normals[:, 0]) > 0.5
+    assert np.sort(angles[~own]) == pytest.approx(22.5 * np.arange(8), abs=1e-3)
+    assert normals[own] == pytest.approx(np.array([[1.0, 0.0, 0.0]]))
+    assert np.abs(normals[~own, 0]) == pytest.approx(np.zeros(8))
+
+
+@EXAMPLES
+@given(POINTS, ROTATIONS, arrays(float, (3,), elements=MILLIMETRES))
+def test_a_mirrored_set_has_its_plane_wherever_it_is_turned(
+    half: np.ndarray, quaternion: np.ndarray, shift: np.ndarray
+) -> None:
+    points = np.vstack([half, half * (1.0, -1.0, 1.0)])
+    assume(np.abs(half[:, 1]).max() > 0.01)
+    turn = rotation(quaternion)
+    normals = symmetry_planes(points @ turn.T + shift)
+    assert has(normals, turn @ (0.0, 1.0, 0.0))
+    assert distance_to_planes(turn @ (0.3, 0.0, 0.7) + shift, points @ turn.T + shift, normals) < 1e-6
+
+
+@EXAMPLES
+@given(POINTS)
+def test_a_quarter_turn_about_z_turns_the_planes(half: np.ndarray) -> None:
+    points = np.vstack([half, half * (1.0, -1.0, 1.0)])
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    before, after = symmetry_planes(points), symmetry_planes(points @ turn.T)
+    assert len(before) == len(after)
+    assert all(has(after, turn @ normal) for normal in before)
+
+
+@EXAMPLES
+@given(POINTS, ROTATIONS)
+def test_every_plane_mirrors_the_set_onto_itself(points: np.ndarray, quaternion: np.ndarray) -> None:
+    points = points @ rotation(quaternion).T
+    offsets = points - centre(points)
+    for normal in symmetry_planes(points):
+        assert np.linalg.norm(normal) == pytest.approx(1.0)
+        mirrored = offsets - 2.0 * np.outer(offsets @ normal, normal)
+        apart = np.linalg.norm(mirrored[:, None] - offsets[None], axis=2)
+        assert apart.min(axis=1).max() <= 1e-6 + 1e-12
+
+
+@EXAMPLES
+@given(POINTS, st.randoms(use_true_random=False))
+def test_order_and_points_given_twice_mean_nothing(points: np.ndarray, random: object) -> None:
+    order = [0, *range(len(points))]
+    random.shuffle(order)  # type: ignore[attr-defined]
+    assert symmetry_planes(points[order]).tolist() == symmetry_planes(points).tolist()
+
+
+def test_random_sets_have_no_plane() -> None:
+    for seed in range(30):
+        assert len(symmetry_planes(random_task(seed).points)) == 0
+
+
+def test_a_point_moved_by_more_than_the_tolerance_breaks_the_symmetry() -> None:
+    rng = np.random.default_rng(0)
+    half = rng.uniform(-1.0, 1.0, (5, 3))
+    points = np.vstack([half, half * (1.0, -1.0, 1.0)])
+    for moved, planes in ((1e-7, 1), (3e-5, 0)):
+        points[0, 2] = half[0, 2] + moved
+        assert len(symmetry_planes(points)) == planes
+
+
+def test_a_line_has_the_plane_that_halves_it_and_a_point_none() -> None:
+    """Every place lies on one of the other planes through a line: they would say nothing."""
+    line = np.array([[0.1, 0.2, 0.3]]) + np.arange(5)[:, None] * np.array([[0.0, 0.3, 0.4]])
+    assert symmetry_planes(line) == pytest.approx(np.array([[0.0, 0.6, 0.8]]))
+    assert len(symmetry_planes(np.vstack([line, line[4] + np.array([0.0, 0.9, 1.2])]))) == 0
+    assert symmetry_planes(line[:1]).shape == (0, 3)
+    assert symmetry_planes(np.repeat(line[:1], 3, axis=0)).shape == (0, 3)
+    assert distance_to_planes(line[0], line[:1], np.empty((0, 3))) == np.inf
+
+
+def test_a_plane_without_symmetry_has_itself() -> None:
+    points = np.array([[0.0, 0.0, 0.5], [0.7, 0.1, 0.5], [0.2, 0.3, 0.5]])
+    assert symmetry_planes(points).tolist() == [[0.0, 0.0, 1.0]]
+
+
+def test_many_points() -> None:
+    angles = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
+    ring = np.column_stack([np.cos(angles), np.sin(angles), np.full(120, 0.3)])
+    assert len(symmetry_planes(ring)) == 121
+    steps = np.arange(9) * 0.05
+    grid = np.stack(np.meshgrid(steps, steps, 2 * steps), axis=-1).reshape(-1, 3)
+    assert len(symmetry_planes(grid)) == 5
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_a_plane_that_is_asked_for_is_one_that_is_found(name: str) -> None:
+    points = load_task(name).points
+    planes = symmetry_planes(points)
+    for normal in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.5**0.5, -(0.5**0.5), 0.0)):
+        found = any(abs(abs(plane @ np.array(normal)) - 1.0) < 1e-9 for plane in planes)
+        assert is_mirrored(points, np.array(normal)) == found

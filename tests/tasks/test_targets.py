@@ -1,0 +1,201 @@
+"""Targets that say more than their points: from the file to objectives, prompts and reports."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+import pytest
+
+from armwright.exceptions import ArmError, SettingsError, TaskError
+from armwright.llm.prompt import load_prompt
+from armwright.problem.evaluation import evaluate
+from armwright.problem.miss_reasons import why_missed
+from armwright.problem.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.rotations import rotation_from_rpy
+from armwright.runs.folder import read_config
+from armwright.runs.verification import verify
+from armwright.spaces.design_space import paper_space
+from armwright.study.study import optimize
+from armwright.tasks.targets import Target
+from armwright.tasks.task import Task
+from armwright.yaml_documents import parse_document
+from tests.support.fixed_problem import FixedProblem, fixed_history
+
+RECORDS = """
+name: insert
+targets:
+  - {position: [0.3, 0.0, 0.1], axis: [0, 0, -2]}
+  - [0.3, 0.1, 0.4]
+  - {position: [0.3, -0.2, 0.3], orientation: [1.5, 0, 1.5], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}
+  - {position: [0.2, -0.2, 0.3]}
+restarts: 1
+"""
+
+
+def task(text: str = RECORDS) -> Task:
+    return parse_document(text, Task, TaskError, "insert.yaml")
+
+
+def test_records_become_positions_and_goals() -> None:
+    one = task()
+    assert one.targets == ((0.3, 0.0, 0.1), (0.3, 0.1, 0.4), (0.3, -0.2, 0.3), (0.2, -0.2, 0.3))
+    assert one.points.shape == (4, 3)
+    goals = one.goals
+    assert goals.n_angular.tolist() == [2, 0, 3, 0]
+    assert goals.tolerance.tolist() == [1e-3, 1e-3, 2e-3, 1e-3]
+    assert goals.angle_tolerance == pytest.approx([np.pi / 180, np.pi / 180, 0.05, np.pi / 180])
+    assert goals.weight.tolist() == [1, 1, 2, 1]
+    assert goals.rotation[0][:, 2] == pytest.approx([0, 0, -1])
+    assert np.allclose(goals.rotation @ goals.rotation.swapaxes(1, 2), np.eye(3))
+    assert (goals.restarts, one.is_plain) == (1, False)
+
+
+def test_roll_pitch_yaw_are_those_of_urdf() -> None:
+    for angles in np.random.default_rng(0).uniform(-np.pi, np.pi, (50, 3)):
+        assert rotation_from_rpy(*angles) == pytest.approx(pinocchio.rpy.rpyToMatrix(*angles))
+
+
+def test_a_task_is_written_as_it_was_read() -> None:
+    one = task()
+    written = one.model_dump(mode="json")
+    assert written["targets"][:2] == [{"position": [0.3, 0.0, 0.1], "axis": [0.0, 0.0, -2.0]}, [0.3, 0.1, 0.4]]
+    assert written["targets"][3] == [0.2, -0.2, 0.3], "a record that says no more than a point is one"
+    assert Task(**written) == one
+    assert one != task(RECORDS.replace("-2]", "2]"))
+    assert one.model_copy(update={"name": "other"}).entries == one.entries
+
+
+def test_a_record_without_more_is_the_point() -> None:
+    record = task("name: a\ntargets: [{position: [0.1, 0.2, 0.3], weight: 1}]")
+    assert record == task("name: a\ntargets: [[0.1, 0.2, 0.3]]")
+    assert record.is_plain
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("{axis: [0, 0, 1]}", "target 2: position: Field required"),
+        ("{position: [0, 0, 1], axes: [0, 0, 1]}", 'target 2: unknown key "axes".*Did you mean "axis"'),
+        ("{position: [0, 0, 1], axis: [0, 0, 0]}", "target 2: axis = .* is no direction"),
+        ("{position: [0, 0, 1], axis: [0, 0, .nan]}", r"target 2: axis\[2\]"),
+        ("{position: [0, 0, 1], axis: [0, 0, 1], orientation: [0, 0, 1]}", "target 2: give axis or orientation"),
+        ("{position: [0, 0, 1], orientation: [0, 0, 90]}", r"target 2: orientation = .* in rad.*90° is 1.5708"),
+        ("{position: [0, 0, 1], tolerance: 0}", "target 2: tolerance: .*greater than 0"),
+        ("{position: [0, 0, 1], angle_tolerance: 0.1}", "target 2: angle_tolerance needs an axis"),
+        ("{position: [0, 0, 1], weight: -1}", "target 2: weight"),
+        ("{position: [0, 0, 1001]}", "target 2 = .* is more than 1000 m away"),
+        ("[0, 0]", r"targets\[1\]"),
+    ],
+)
+def test_mistakes_are_named(target: str, words: str) -> None:
+    with pytest.raises(TaskError, match=words):
+        task(f"name: a\ntargets:\n  - [0, 0, 1]\n  - {target}\n")
+
+
+def test_restarts_within_bounds() -> None:
+    with pytest.raises(TaskError, match="restarts"):
+        task(RECORDS.replace("restarts: 1", "restarts: -1"))
+
+
+# Objectives
+
+
+def test_orientation_counts_without_being_named_and_only_where_it_is_asked_for() -> None:
+    assert [o.name for o in Problem(task()).objectives] == ["position_error", "torque", "orientation_error"]
+    with pytest.raises(SettingsError, match=r"orientation_error would be 0 .* no target of task a has"):
+        Problem(task("name: a\ntargets: [[0, 0, 1]]"), objectives=named_objectives(["orientation_error"]))
+
+
+def test_objectives_heed_weights_and_tolerances() -> None:
+    problem = Problem(task(), paper_space(6))
+    found = problem.physics(problem.space.sample(200, 0))
+    weight = np.array([1.0, 1.0, 2.0, 1.0])
+    assert OBJECTIVES["position_error"](found) == pytest.approx(found.position_error @ weight)
+    assert OBJECTIVES["orientation_error"](found) == pytest.approx(found.angle_error @ weight)
+    assert np.array_equal(OBJECTIVES["worst_angle"](found), found.angle_error.max(axis=1))
+    assert np.array_equal(OBJECTIVES["worst_error"](found), found.position_error.max(axis=1))
+    assert not found.angle_error[:, [1, 3]].any()
+    missed = (found.position_error >= [1e-3, 1e-3, 2e-3, 1e-3]) | (found.angle_error >= found.goals.angle_tolerance)
+    assert np.array_equal(UNREACHED_TARGETS(found), missed.sum(axis=1))
+    anywhere = Task(name="a", targets=(Target(position=(0.3, 0.0, 0.3), axis=(0, 0, -1), tolerance=100.0),))
+    found = evaluate(
+        [problem.arm(design) for design in problem.space.sample(50, 0)], anywhere.points, goals=anywhere.goals
+    )
+    assert found.position_error.max() > 0.1
+    assert 0.5 < 1.0 - UNREACHED_TARGETS(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
+
+
+def test_verification_uses_the_same_goals() -> None:
+    """In float64 a design is as good as in the search, by and large, and its orientation counts."""
+    problem = Problem(task(), paper_space(6))
+    designs = problem.space.sample(30, 0)
+    values = problem.evaluate(designs).values
+    verified = verify(problem, designs, values, (1.0, 10.0, 3.0))
+    assert np.median(np.abs(verified.exact - values)) < 1e-3
+    assert (verified.exact[:, 2] > 0.0).all()
+
+
+# Why a target is missed
+
+
+def test_reasons_of_missed_targets() -> None:
+    links = (uniform_link((0, 0, 0.3), 0.1, 0.01),) * 2
+    arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -0.5, 2.0), Joint("revolute", "y", -2.0, 2.0)), links)
+    one = Task(
+        name="a",
+        targets=(
+            (0.3, 0.0, 0.3),
+            (1.0, 0.0, 0.0),
+            (-0.4, 0.0, 0.1),
+            Target(position=(0.3, 0.0, 0.3), axis=(0, 1, 0)),
+        ),
+    )
+    found = evaluate([arm], one.points, goals=one.goals)
+    reached, far, limited, askew = (why_missed(arm, found, 0, target) for target in range(4))
+    assert reached == ""
+    assert far.startswith(f"{1e3 * found.position_error[0, 1]:.1f} mm: out of reach by 0.400 m")
+    assert "out of reach" not in limited
+    assert "joint 1 at its lower limit" in limited
+    assert " mm and " in askew
+    assert f"{np.degrees(found.angle_error[0, 3]):.1f}°" in askew
+
+
+def test_tools_of_arms_are_checked() -> None:
+    link = uniform_link((0, 0, 0.3), 0.1, 0.01)
+    for axis, side in (((0, 0, 2), (1, 0, 0)), ((0, 0, 1), (0, 0, 1)), ((0, 0, float("nan")), (1, 0, 0))):
+        with pytest.raises(ArmError, match="unit vectors at right angles"):
+            Arm((0, 0, 0), (Joint("revolute", "y", -1, 1),), (link,), tool_axis=axis, tool_side=side)
+
+
+# Prompts and run folders
+
+
+def test_the_prompt_says_what_targets_ask_for() -> None:
+    text = load_prompt("plus").render(fixed_history(FixedProblem(task(), paper_space(6))), seed=0)
+    for words in (
+        "- target 1: axis (0, 0, -2)",
+        "- target 3: orientation (1.5, 0, 1.5) rad, tolerance 2 mm, angle tolerance 2.865°, weight 2",
+        "then 1 more times from postures drawn at random",
+        "E_rot",
+        "times the target's weight",
+        "\nA_IK: (0.0, -, 0.0, -)",
+        "\nMISSED: target",
+        "out of reach by",
+    ):
+        assert words in text
+    assert "Orientation and collisions" not in text
+
+
+def test_a_run_keeps_it_all(tmp_path: Path) -> None:
+    problem = Problem(task(), paper_space(6))
+    run = optimize(problem, n_init=5, n_total=1, out=tmp_path / "run")
+    assert read_config(tmp_path / "run").task == problem.task
+    (first, *_) = sorted((tmp_path / "run" / "designs").glob("*/design.json"))
+    records = json.loads(first.read_text())["targets"]
+    assert ["angle_error" in record for record in records] == [True, False, True, False]
+    number = int(first.parent.name)
+    missed = problem.physics([run.history.trials[number].design]).missed[0]
+    assert [record["missed"] is not None for record in records] == missed.tolist()

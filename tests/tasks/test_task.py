@@ -1,0 +1,155 @@
+"""Tasks: the built-in ones, files, points from CSV."""
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armwright.exceptions import TaskError
+from armwright.tasks.points_file import read_points
+from armwright.tasks.task import Task, builtin_tasks, load_task, random_task
+from armwright.tasks.task_template import task_template
+from armwright.yaml_documents import parse_document
+
+
+def test_the_built_in_tasks() -> None:
+    tasks = builtin_tasks()
+    assert list(tasks)[:3] == ["target-1", "target-2", "target-3"]
+    published = {"autodesign-1": 4, "autodesign-2": 6, "autodesign-3": 6, "slideopt-wide": 9, "slideopt-arm": 7}
+    sizes = {name: len(task.targets) for name, task in tasks.items()}
+    assert sizes.items() >= {"target-1": 8, "target-2": 9, "target-3": 8, **published}.items()
+    assert len(tasks) >= 24
+    for name, task in tasks.items():
+        assert task.name == name
+        assert task.provenance
+        assert task.description
+        assert len(set(task.targets)) == len(task.targets)
+        assert np.abs(task.points).max() <= 1.3, "within reach of some arm of the paper's space: base ±1 m, 1.2 m long"
+        if not name.startswith("target-"):
+            assert task.reference_point == (0.625 * len(task.targets),) * 2  # target-1's, target by target
+    for name in ("target-1", "target-2", "target-3"):
+        assert tasks[name].reference_point == (5.0, 5.0)
+        assert "reconstruction" in tasks[name].provenance
+
+
+def test_the_symmetries_that_the_paper_states() -> None:
+    def points(name: str) -> set[tuple[float, ...]]:
+        return {tuple(row) for row in np.round(load_task(name).points, 6).tolist()}
+
+    assert points("target-1") == {(-x, -y, -z) for x, y, z in points("target-1")}  # symmetric about the origin
+    assert points("target-2") == {(x, -y + 0.0, z) for x, y, z in points("target-2")}  # about the xz-plane
+    assert {z for _, _, z in points("target-2")} == {0.5}  # at one height
+    circle = np.linalg.norm(load_task("target-3").points - (0.3, 0.0, 0.3), axis=1)
+    assert circle == pytest.approx(np.full(8, 0.55), abs=1e-6)
+
+
+def test_the_least_task_file(tmp_path: Path) -> None:
+    file = tmp_path / "shelf.yaml"
+    file.write_text("name: shelf\ntargets: [[0.45, 0.0, 0.1]]\n")
+    task = load_task(file)
+    assert task.points.tolist() == [[0.45, 0.0, 0.1]]
+    assert task.reference_point is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name: a\ntargets: []", "targets is empty"),
+        ("name: a\ntargets: [[0, 0, 0]]\njitter: 0.01", 'It is now called "target_noise".'),
+        ("name: a\ntargets: [[0, 0, .nan]]", "targets[0][2]"),
+        ("name: a\ntargets: [[0, 0]]", "targets[0]"),
+        ("name: a\ntargets: [[0, 0, 1, 2]]", "targets[0]"),
+        ("name: a\ntargets: [[450, 0, 2000]]", "more than 1000 m away"),
+        ("name: a\ntargets: [[x, 0, 0]]", "targets[0][0]"),
+        ("name: a\ntarget: [[0, 0, 0]]", 'unknown key "target".'),
+        ("name: ../../etc\ntargets: [[0, 0, 0]]", "name"),
+        ("targets: [[0, 0, 0]]", "name"),
+        ("name: a\ntargets: [[0, 0, 0]]\nreference_point: [0, 5]", "above 0"),
+        ("name: a\ntargets: [[0, 0, 0]]\nreference_point: []", "reference_point"),
+        ("name: a\ntargets: [[0, 0, 0]]\nreference_point: 5", "reference_point"),
+        ("name: a\ntargets: 3", "targets"),
+        ("", "keys and values"),
+        ("[" * 3000, "not valid YAML"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "task.yaml"
+    file.write_text(text)
+    with pytest.raises(TaskError) as refusal:
+        load_task(file)
+    assert words in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 400
+
+
+def test_unknown_names_are_helped(tmp_path: Path) -> None:
+    with pytest.raises(TaskError, match=r'unknown task "targt-1".*Did you mean "target-1"'):
+        load_task("targt-1")
+    with pytest.raises(TaskError, match=r"no file .*armwright init"):
+        load_task(tmp_path / "nothing.yaml")
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(TaskError, match="UTF-8"):
+        load_task(tmp_path / "binary.yaml")
+
+
+@given(st.text(max_size=200))
+def test_no_text_breaks_the_reader(text: str) -> None:
+    with contextlib.suppress(TaskError):
+        assert isinstance(parse_document(text, Task, TaskError, "it"), Task)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("0.1,0.2,0.3\n", "m", [(0.1, 0.2, 1.3)]),
+        ("x,y,z,name\n100,200,300,a\n\n# note\n-1e2, 0, 5,b\n", "mm", [(0.1, 0.2, 1.3), (-0.1, 0.0, 1.005)]),
+        ("\ufeffx;y;z\n1;2;3\n", "m", [(1, 2, 4)]),
+        ("1\t2\t3\r\n", "m", [(1, 2, 4)]),
+        ("1 2  3\n", "m", [(1, 2, 4)]),
+    ],
+)
+def test_points_from_csv(tmp_path: Path, text: str, unit: str, expected: list[tuple[float, ...]]) -> None:
+    file = tmp_path / "points.csv"
+    file.write_text(text, encoding="utf-8", newline="")
+    assert np.array(read_points(file, unit, (0.0, 0.0, 1.0))) == pytest.approx(np.array(expected))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x,y,z\n", "no points"),
+        ("1,2\n3,4\n", "line 1"),
+        ("1,2,3\n4,five,6\n", "line 2"),
+        ("1,2,nan\n", "finite"),
+        ("a,b,c\nd,e,f\n", "line 2"),
+        ("O.1,0.2,0.3\n0.1,0.2,0.3\n", "line 1"),
+    ],
+)
+def test_bad_csv_is_refused_by_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "points.csv"
+    file.write_text(text)
+    with pytest.raises(TaskError, match=words):
+        read_points(file)
+
+
+def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TaskError, match='unit "inch" is not one of m, mm'):
+        read_points(tmp_path / "points.csv", "inch")
+
+
+def test_the_template_is_a_task() -> None:
+    task = parse_document(task_template(Path("mine.yaml"), ((0.1, 0.2345678, 0.3),)), Task, TaskError, "it")
+    assert (task.name, task.targets) == ("mine", ((0.1, 0.2345678, 0.3),))
+    assert len(parse_document(task_template(Path("12.yaml")), Task, TaskError, "it").targets) == 3
+
+
+def test_random_tasks_follow_their_recipe() -> None:
+    for seed in range(20):
+        task = random_task(seed)
+        assert task == random_task(seed)
+        assert 6 <= len(task.targets) <= 12
+        assert np.all(np.ptp(task.points, axis=0) <= 1.2)
+    assert random_task(0) != random_task(1)

@@ -1,0 +1,203 @@
+"""Workspaces: scipy says whether points are spread evenly, closed forms which of them arms reach."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import qmc
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.exceptions import SettingsError, TaskError
+from armwright.problem.evaluation import Evaluation, evaluate
+from armwright.problem.objectives import OBJECTIVES, UNCOVERED_FRACTION
+from armwright.problem.problem import Outcomes, Problem
+from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.spaces.design_space import paper_space
+from armwright.tasks.task import Task, load_task, random_task
+from armwright.tasks.workspace import Region, points_of
+from armwright.yaml_documents import parse_document
+
+Array = NDArray[np.float64]
+CUBE = {"low": (0.0, 0.0, 0.0), "high": (1.0, 1.0, 1.0)}
+
+
+def region(**content: Any) -> Region:
+    return Region.model_validate({**CUBE, **content})
+
+
+def task(**more: Any) -> Task:
+    return Task.model_validate(
+        {"name": "cover", "workspace": {"low": (0.2, -0.3, 0.1), "high": (0.6, 0.3, 0.5)}, **more}
+    )
+
+
+# The points
+
+
+def test_points_are_halton_s() -> None:
+    assert points_of((region(points=3000),)) == pytest.approx(qmc.Halton(3, scramble=False).random(3001)[1:])
+    by_chance = np.mean([qmc.discrepancy(np.random.default_rng(i).random((200, 3))) for i in range(10)])
+    assert qmc.discrepancy(points_of((region(points=200),))) < 0.2 * by_chance
+
+
+def test_each_region_has_its_points_and_they_lie_in_it() -> None:
+    one, flat, spot = (
+        region(points=50),
+        region(low=(0.2, -1.0, 0.5), high=(0.4, 1.0, 0.5)),
+        region(high=(0, 0, 0), points=3),
+    )
+    points = points_of((one, flat, spot))
+    assert points.shape == (253, 3)
+    assert np.array_equal(points[:50], points_of((one,)))
+    assert np.all((points[50:250] >= flat.low) & (points[50:250] <= flat.high))
+    assert np.all(points[250:] == 0.0)
+    assert np.array_equal(points_of((region(points=10),)), points[:10]), "more points keep those that are there"
+
+
+# What is reached
+
+
+def test_a_ball_joint_reaches_a_shell() -> None:
+    """Two links whose first joints point anywhere reach all between |a - b| and a + b from their base."""
+    a, b = 0.45, 0.25
+    links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (1e-4, a, b))
+    joints = tuple(Joint("revolute", axis, -3.1, 3.1) for axis in ("z", "y", "y"))
+    cube = region(low=(-0.8, -0.8, -0.8), high=(0.8, 0.8, 0.8), points=2000)
+    points = points_of((cube,))
+    far = np.linalg.norm(points, axis=1)
+    evaluation = evaluate([Arm((0.0, 0.0, 0.0), joints, links)], [[0.3, 0.2, 0.1]], workspace=[cube])
+    inside = (far < a + b - 2e-4) & (far > a - b + 2e-4)
+    reached = evaluation.workspace_error[0] < 1e-3
+    assert not np.any(reached[(far > a + b + 2e-3) | (far < a - b - 2e-3)])
+    assert reached[inside].mean() > 0.97, "but for some that the straight start does not lead to"
+    volume = 4 / 3 * np.pi * ((a + b) ** 3 - (a - b) ** 3) / 1.6**3
+    assert 1.0 - UNCOVERED_FRACTION(evaluation)[0] == pytest.approx(volume, abs=0.03)
+
+
+def test_points_are_tried_like_targets() -> None:
+    problem = Problem(task(objectives=["uncovered_fraction"]))
+    designs = problem.space.sample(30, 2)
+    arms = [problem.arm(design) for design in designs]
+    as_targets = evaluate(arms, points_of(problem.task.workspace))
+    assert np.array_equal(problem.physics(designs).workspace_error, as_targets.position_error)
+    assert problem.evaluate(designs).values[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
+
+
+def test_longer_arms_cover_no_less() -> None:
+    """Twice as large an arm in a workspace of twice the size is the same."""
+    space = paper_space(5)
+    small = [space.arm(design) for design in space.sample(40, 1)]
+    large = [
+        Arm(
+            tuple(2 * x for x in arm.base),
+            arm.joints,
+            tuple(uniform_link((0, 0, 2 * link.length), 0.1, 0.01) for link in arm.links),
+        )
+        for arm in small
+    ]
+    boxes = [region(low=(-k * 0.4,) * 3, high=(k * 0.4,) * 3) for k in (1, 2)]
+    one, other = (
+        evaluate(arms, [[0.1, 0.2, 0.3]], workspace=[box]) for box, arms in zip(boxes, (small, large), strict=True)
+    )
+    points = points_of((boxes[0],))
+    reach = np.array([arm.reach for arm in small])
+    beyond = np.linalg.norm(points - np.array([arm.base for arm in small])[:, None], axis=-1) > reach[:, None] + 1e-3
+    for evaluation in (one, other):
+        assert np.all(evaluation.workspace_error[beyond] >= 1e-3)
+    assert UNCOVERED_FRACTION(one).mean() == pytest.approx(UNCOVERED_FRACTION(other).mean(), abs=0.02)
+
+
+def test_a_workspace_costs_nothing_where_nothing_asks_for_it() -> None:
+    designs = paper_space().sample(10, 0)
+    target_1 = load_task("target-1")
+    with_ = target_1.model_copy(update={"workspace": task().workspace})
+    evaluation = Problem(with_).physics(designs)
+    assert np.array_equal(Problem(with_).outcomes(evaluation).values, Problem(target_1).evaluate(designs).values)
+    assert "workspace_error" not in vars(evaluation)
+    assert not Problem(with_).uses(UNCOVERED_FRACTION)
+    assert Problem(task(), objectives=(UNCOVERED_FRACTION,)).uses(UNCOVERED_FRACTION)
+
+
+def test_without_a_workspace_nothing_is_unreached() -> None:
+    with pytest.raises(SettingsError, match="uncovered_fraction needs a workspace in the task: workspace: "):
+        Problem(
+            random_task(1).model_copy(update={"reference_point": None}), objectives=(OBJECTIVES["uncovered_fraction"],)
+        ).evaluate(paper_space().sample(1, 0))
+
+
+def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = Problem(task(objectives=["uncovered_fraction", "torque"]))
+    designs = problem.space.sample(30, 5)
+    values = problem.evaluate(designs).values
+    sizes: list[int] = []
+    outcomes_of = Problem.outcomes
+
+    def counted(self: Problem, evaluation: Evaluation, *measured: Mapping[str, Array]) -> Outcomes:
+        sizes.append(len(evaluation))
+        return outcomes_of(self, evaluation, *measured)
+
+    monkeypatch.setattr("armwright.problem.problem.POSTURES_AT_ONCE", {"cpu": 1000})
+    monkeypatch.setattr(Problem, "outcomes", counted)
+    assert np.array_equal(problem.evaluate_matrix(problem.space.matrix(designs)).values, values)
+    assert max(sizes) * (200 + 8) <= 1000
+
+
+# From the file on
+
+
+def test_targets_that_are_left_out_are_the_corners() -> None:
+    found = task(workspace=[CUBE, {"low": (1, 0, 0), "high": (2, 1, 0), "points": 9}])
+    assert len(found.targets) == 8 + 2, "corners that both have count once"
+    assert {(0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (2.0, 1.0, 0.0)} <= set(found.targets)
+    assert Task.model_validate(found.model_dump(mode="json")) == found
+    assert task(targets=[(0.5, 0.0, 0.3)]).targets == ((0.5, 0.0, 0.3),)
+
+
+FAULTS = {
+    "{low: [0, 0, 0.5], high: [1, 1, 0.4]}": "low z = 0.5 m is above its high z = 0.4 m",
+    "{low: [0, 0], high: [1, 1, 1]}": "workspace.*low",
+    "{low: [0, 0, 0]}": "workspace.*high",
+    "{low: [0, 0, 0], high: [1, 1, 1], points: 0}": "points",
+    "{low: [0, 0, 0], high: [1, 1, 1], point: 9}": "point",
+    "{low: [0, 0, 0], high: [1, 1, 2000]}": "high",
+    "[[0, 0, 0], [1, 1, 1]]": "workspace",
+    "everything": r"workspace is \{low: \[x, y, z\], high",
+    "[]": "targets",
+    "[{low: [0, 0, 0], high: [1, 1, 1], points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]": "than 10000",
+}
+
+
+@pytest.mark.parametrize("written", FAULTS)
+@pytest.mark.parametrize("targets", ["", "targets: [[0.1, 0.2, 0.3]]\n"])
+def test_workspaces_that_cannot_be_are_refused_in_one_line(written: str, targets: str) -> None:
+    text = f"name: x\n{targets}workspace: {written}"
+    if written == "[]" and targets:
+        assert parse_document(text, Task, TaskError, "it").workspace == ()
+        return
+    with pytest.raises(TaskError, match=FAULTS[written]) as refused:
+        parse_document(text, Task, TaskError, "it.yaml")
+    assert "\n" not in str(refused.value)
+
+
+def test_too_many_boxes_are_refused() -> None:
+    with pytest.raises(ValueError, match="workspace has 21 boxes; at most 20"):
+        task(workspace=[CUBE] * 21)
+
+
+def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
+    (in_folder / "cover.yaml").write_text(
+        "name: cover\nworkspace: {low: [0.2, -0.3, 0.1], high: [0.5, 0.3, 0.4], points: 60}\n"
+        "objectives: [uncovered_fraction, torque]\n"
+    )
+    told = CliRunner().invoke(app, ["optimize", "cover.yaml", "--n-total", "20", "--out", "run"])
+    assert told.exit_code == 0, told.output
+    shown = CliRunner().invoke(app, ["tasks", "cover.yaml"]).output
+    assert "workspace: box from (0.2, -0.3, 0.1) to (0.5, 0.3, 0.4), 60 points" in shown
+    told = CliRunner().invoke(
+        app, ["optimize", "cover.yaml", "--objectives", "torque", "--n-total", "2", "--no-figures", "--out", "other"]
+    )
+    assert "the task's workspace counts in none of the objectives (uncovered_fraction heeds it)" in told.output
