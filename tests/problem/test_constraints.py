@@ -69,7 +69,7 @@ def told(values: np.ndarray, broken: np.ndarray) -> History:
     )
     designs = SPACE.sample(len(values), 0)
     rows = zip(designs, values.tolist(), broken.tolist(), strict=True)
-    trials = [FinishedTrial(i, "bbo", d, tuple(v), constraints=tuple(b)) for i, (d, v, b) in enumerate(rows)]
+    trials = [FinishedTrial(i, "bbo", d, tuple(v), violations=tuple(b)) for i, (d, v, b) in enumerate(rows)]
     return History(problem, trials, 0, (10.0, 10.0))
 
 
@@ -218,7 +218,7 @@ def test_a_looser_bound_of_a_task_never_takes_hypervolume_away() -> None:
 
 def test_nothing_of_a_task_without_constraints_tells_of_any(tmp_path: Path) -> None:
     run = optimize(Problem(task()), proposer="none", n_total=3, out=tmp_path / "run")
-    assert all("constraints" not in line for line in lines(tmp_path / "run"))
+    assert all("violations" not in line for line in lines(tmp_path / "run"))
     assert "feasibility" not in run.summary
     assert run.history.masked_objectives is run.history.values
     assert all(trial.is_feasible for trial in run.trials)
@@ -268,7 +268,7 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     assert run.front
     for member in run.front:
         design = json.loads((tmp_path / "run" / "designs" / f"{member.number:04d}" / "design.json").read_text())
-        assert list(design["constraints"].values()) == broken[member.number].tolist()
+        assert list(design["violations"].values()) == broken[member.number].tolist()
     numbers = numbers_of(there, there.front[0])
     assert numbers["worst_error"] == pytest.approx(there.evaluation([there.front[0].number]).position_error.max())
     # what is verified keeps its bounds, but for a little, when it is built a little off
@@ -309,8 +309,8 @@ def test_the_study_of_a_run_carries_its_constraints(tmp_path: Path) -> None:
     names = [constraint.words for constraint in problem.constraints]
     box = BlackBox(SPACE, "tpe", seed=1, constraints=names)
     box.restore(run.trials)
-    assert [list(trial.constraints.items()) for trial in box.study.trials] == [
-        list(zip(names, trial.constraints, strict=True)) for trial in run.trials
+    assert [list(trial.violations.items()) for trial in box.study.trials] == [
+        list(zip(names, trial.violations, strict=True)) for trial in run.trials
     ]
     assert sorted(t.number for t in box.study.best_trials) == sorted(member.number for member in run.front)
 
@@ -325,7 +325,7 @@ def test_a_line_without_its_constraints_is_damaged(tmp_path: Path) -> None:
     optimize(Problem(task(*BOUNDS)), proposer="none", n_total=2, out=tmp_path / "run")
     file = tmp_path / "run" / "trials.jsonl"
     first = json.loads(file.read_text().splitlines()[0])
-    del first["constraints"]
+    del first["violations"]
     file.write_text(json.dumps(first) + "\n")
     with pytest.raises(RunFolderError, match=r"line 1 is damaged .expected 3 violations, found 0"):
         read_run(tmp_path / "run")
@@ -383,11 +383,11 @@ def test_a_study_of_ones_own_says_how_far_its_trials_break_constraints() -> None
     values, broken = outcomes.values, outcomes.violations
     box = BlackBox(SPACE, "random", 0, constraints=[constraint.words for constraint in problem.constraints])
     rows = zip(designs, values.tolist(), broken.tolist(), strict=True)
-    trials = [FinishedTrial(i, "bbo", d, tuple(v), constraints=tuple(b)) for i, (d, v, b) in enumerate(rows)]
+    trials = [FinishedTrial(i, "bbo", d, tuple(v), violations=tuple(b)) for i, (d, v, b) in enumerate(rows)]
     box.restore(trials)
     assert np.array_equal(study_history(box.study, problem).violations, broken)
     silent = BlackBox(SPACE, "random", 0)
-    silent.restore([replace(trial, constraints=()) for trial in trials])
+    silent.restore([replace(trial, violations=()) for trial in trials])
     with pytest.raises(SettingsError, match=r'set_constraint\("worst_error <= 0.4"'):
         study_history(silent.study, problem)
 

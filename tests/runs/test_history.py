@@ -27,7 +27,7 @@ trials = st.lists(
 
 def finished(number: int, design: object, values: tuple[float, ...], broken: float, source: str) -> FinishedTrial:
     assert design in DESIGNS
-    return FinishedTrial(number, source, design, values, constraints=(broken,))  # type: ignore[arg-type]
+    return FinishedTrial(number, source, design, values, violations=(broken,))  # type: ignore[arg-type]
 
 
 def assert_same(one: History, other: History) -> None:

@@ -109,7 +109,7 @@ def test_exported_trials_equal_those_of_the_run(which: str, request: pytest.Fixt
             assert trial.params == space.free_values(ours.design)
             assert trial.distributions == {name: every[name] for name in trial.params}
             assert trial.values == list(ours.values)
-            assert trial.constraints == dict(zip(constraints, ours.constraints, strict=True))
+            assert trial.constraints == dict(zip(constraints, ours.violations, strict=True))
             told = {
                 "source": ours.source,
                 "joints": ours.design.joints,

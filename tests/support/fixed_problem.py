@@ -95,7 +95,7 @@ def fixed_history(problem: Problem, n: int = 14, n_init: int = 10, proposals: Se
             "random" if number < n_init else "bbo",
             design,
             tuple(row),
-            constraints=tuple(violations[number].tolist()),
+            violations=tuple(violations[number].tolist()),
         )
         for number, (design, row) in enumerate(zip(designs, values.tolist(), strict=True))
     ]

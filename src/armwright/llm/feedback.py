@@ -164,7 +164,7 @@ def _broken(history: History, number: int) -> str:
     constraints = history.problem.constraints
     words = [
         f"{c.quantity.symbol} = {c.measured(value):.4g}, not {c.relation} {c.bound:.12g}"
-        for c, value in zip(constraints, history.trials[number].constraints, strict=True)
+        for c, value in zip(constraints, history.trials[number].violations, strict=True)
         if value > 0.0
     ]
     return ("; ".join(words) or "none") if constraints else ""

@@ -101,7 +101,7 @@ class History:
     def violations(self) -> Array:
         """(N, C) violation of each constraint of the task; satisfied at <= 0."""
         known, new = self._known("violations", np.empty((0, len(self.problem.constraints))))
-        rows = [trial.constraints for trial in new]
+        rows = [trial.violations for trial in new]
         return np.vstack([known, np.array(rows, dtype=np.float64).reshape(len(rows), known.shape[1])])
 
     @cached_property

@@ -164,7 +164,7 @@ class _Export:
                 params=params,
                 distributions={name: every[name] for name in params},
                 values=trial.values,
-                constraints=dict(zip(names, trial.constraints, strict=True)),
+                constraints=dict(zip(names, trial.violations, strict=True)),
                 user_attrs={name: value for name, value in attributes.items() if value not in (None, "")},
                 system_attrs={**trial.sampler_notes.get("trial", {}), **artifacts.get(trial.number, {})},
             )

@@ -333,7 +333,7 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
             "reason": history.trials[member.number].reason,
             "params": dict(member.design.params),
             "objectives": _objectives(history, member.values),
-            **_constraints(history, member.number),
+            **_violations(history, member.number),
             "masses": history.problem.space.mass_note,
             "targets": [
                 {
@@ -354,14 +354,14 @@ def _rows(history: History) -> Iterable[dict[str, Any]]:
     for trial in history:
         objectives = _objectives(history, trial.values)
         params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
-        broken = dict(zip((c.words for c in history.problem.constraints), trial.constraints, strict=True))
+        broken = dict(zip((c.words for c in history.problem.constraints), trial.violations, strict=True))
         yield {"number": trial.number, "source": trial.source, **params, **objectives, **broken}
 
 
-def _constraints(history: History, number: int) -> dict[str, Any]:
+def _violations(history: History, number: int) -> dict[str, Any]:
     """Of one design, how far it breaks each constraint (<= 0: not at all); nothing of a task without any."""
     names = [constraint.words for constraint in history.problem.constraints]
-    return {"constraints": dict(zip(names, history.trials[number].constraints, strict=True))} if names else {}
+    return {"violations": dict(zip(names, history.trials[number].violations, strict=True))} if names else {}
 
 
 def _objectives(history: History, values: Sequence[float]) -> dict[str, float]:

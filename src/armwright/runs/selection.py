@@ -72,7 +72,7 @@ def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
 
 def bounded_numbers(history: History, number: int) -> dict[str, float]:
     """The quantities of a design that the constraints bound, by name."""
-    pairs = zip(history.problem.constraints, history.trials[number].constraints, strict=True)
+    pairs = zip(history.problem.constraints, history.trials[number].violations, strict=True)
     return {constraint.quantity.name: constraint.measured(broken) for constraint, broken in pairs}
 
 

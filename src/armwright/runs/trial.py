@@ -45,7 +45,7 @@ class FinishedTrial:
         same_as: the earlier trial with an equal design, whose values it has.
         seconds: wall time by part (total, proposing, sampling, evaluation).
         sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
-        constraints: violation of each constraint; satisfied at <= 0.
+        violations: of each constraint; satisfied at <= 0.
         failure: why the custom evaluator gave no values, so that the design has its `worst`.
     """
 
@@ -66,13 +66,13 @@ class FinishedTrial:
     same_as: int | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
-    constraints: tuple[float, ...] = ()
+    violations: tuple[float, ...] = ()
     failure: _Text = ""
 
     @property
     def is_feasible(self) -> bool:
         """Return whether it satisfies all constraints."""
-        return all(violation <= 0.0 for violation in self.constraints)
+        return all(violation <= 0.0 for violation in self.violations)
 
 
 _LINE: TypeAdapter[FinishedTrial] = TypeAdapter(FinishedTrial)
@@ -97,8 +97,8 @@ def parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int,
     trial = _LINE.validate_json(line)
     if len(trial.values) != n_objectives:
         raise ValueError(f"expected {n_objectives} values, found {len(trial.values)}")
-    if len(trial.constraints) != n_constraints:
-        raise ValueError(f"expected {n_constraints} violations, found {len(trial.constraints)}")
+    if len(trial.violations) != n_constraints:
+        raise ValueError(f"expected {n_constraints} violations, found {len(trial.violations)}")
     if trial.number != number:
         raise ValueError(f"expected trial number {number}, found {trial.number}")
     return replace(trial, design=space.design(trial.design.params))

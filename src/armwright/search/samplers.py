@@ -168,7 +168,7 @@ class BlackBox:
                     values=list(trial.values),
                     user_attrs=_attributes(trial.source, trial.proposal),
                     system_attrs=dict(trial.sampler_notes.get("trial", {})),
-                    constraints=dict(zip(self._constraints, trial.constraints, strict=True)),
+                    constraints=dict(zip(self._constraints, trial.violations, strict=True)),
                 )
             )
             for name, note in trial.sampler_notes.get("study", {}).items():

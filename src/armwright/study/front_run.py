@@ -246,7 +246,7 @@ class _Search:
             values, broken = outcomes.values, outcomes.violations
         trials = [
             FinishedTrial(
-                number, FRONT, design, tuple(values[number].tolist()), constraints=tuple(broken[number].tolist())
+                number, FRONT, design, tuple(values[number].tolist()), violations=tuple(broken[number].tolist())
             )
             for number, design in enumerate(designs)
         ]

@@ -94,7 +94,7 @@ def _trials(history: History, members: Sequence[FrontMember], refined: Refined) 
             POLISH,
             design,
             tuple(refined.values[i].tolist()),
-            constraints=tuple(violations[k].tolist()),
+            violations=tuple(violations[k].tolist()),
             reason=f"refines trial {members[i].number}",
             refines=members[i].number,
             evaluations=refined.evaluations * (k + 1) // len(better) - refined.evaluations * k // len(better),

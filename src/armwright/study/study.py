@@ -378,7 +378,7 @@ class Study:
             return
         known = self._pending[first].trial if first in self._pending else self.trials[first]
         if known.values:
-            self._tell(pending, Evaluated(Outcome(known.values, known.constraints, known.failure), 0.0))
+            self._tell(pending, Evaluated(Outcome(known.values, known.violations, known.failure), 0.0))
 
     def _tell(self, pending: _Pending, evaluated: Evaluated) -> None:
         """Let the sampler learn from a trial at once, whatever is before it."""
@@ -389,7 +389,7 @@ class Study:
         pending.trial = replace(
             pending.trial,
             values=outcome.values,
-            constraints=outcome.violations,
+            violations=outcome.violations,
             failure=outcome.failure,
             sampler_notes=noted,
             seconds={

@@ -184,5 +184,5 @@ def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTria
         proposal=noted.get("proposal"),
         reason=str(noted.get("reason", "")),
         expected=None if expected is None else tuple(expected),
-        constraints=tuple(trial.constraints[constraint.words] for constraint in problem.constraints),
+        violations=tuple(trial.constraints[constraint.words] for constraint in problem.constraints),
     )
