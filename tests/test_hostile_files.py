@@ -161,9 +161,9 @@ def test_config_without_a_proposer_setting_is_refused(run: Path, field: str) -> 
 
 @pytest.mark.parametrize("values", [[], [1.0], [1.0, 2.0, 3.0], [float("nan"), 1.0]], ids=str)
 def test_existing_arms_with_other_objectives_are_refused(run: Path, values: list[float]) -> None:
-    bought = json.loads((run / "bought.json").read_text())
-    bought[0]["values"] = values
-    (run / "bought.json").write_text(json.dumps(bought))
+    arms = json.loads((run / "existing_arms.json").read_text())
+    arms[0]["values"] = values
+    (run / "existing_arms.json").write_text(json.dumps(arms))
     with pytest.raises(RunFolderError, match="compare the arms again"):
         write_report(run)
 

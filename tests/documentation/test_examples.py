@@ -39,7 +39,7 @@ def told(server: ChatServer) -> tuple[str, ...]:
         "4-wall-painting",
         "5-obstacle-reach",
         "6-price",
-        "7-buy-or-build",
+        "7-compare-arms",
     ],
 )
 def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
