@@ -169,7 +169,7 @@ def test_version_and_help() -> None:
         (("targt-1",), 'unknown task "targt-1". Did you mean "target-1"?'),
         (("nothing.yaml",), "there is no file nothing.yaml"),
         (("a" * 300,), "unknown task"),
-        (("target-1", "--space", "turns.yaml"), "beyond ±2π"),
+        (("target-1", "--space", "turns.yaml"), "exceeds ±2π"),
         (("target-1", "--proposer", "none", "--base-url", "http://x"), "uses no language model"),
         (("target-1", "--proposer", "none", "--prompt", "x"), 'unknown prompt "x"'),
         (("bad.yaml",), 'unknown key "target".'),

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import armwright as aw
 from armwright.cli.app import app
 from armwright.problem.problem import Problem
+from armwright.runs.optuna_export import export_study
 from armwright.study.study import optimize
 from armwright.tasks.task import load_task
 from tests import ROOT
@@ -102,6 +103,7 @@ def test_without_a_model_an_example_says_so() -> None:
 
 def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out="runs/target-1-seed0")
+    export_study(Path("runs/target-1-seed0"))
     page = (EXAMPLES.parent / "docs" / "optuna.md").read_text()
     asking, *others = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     compile(asking, "optuna.md", "exec")  # needs a model

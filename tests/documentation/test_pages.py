@@ -39,7 +39,7 @@ NOT_RUN = {
     r"armwright .*--proposer manual:.*": "waits for people; test_manual.py answers",
     r"armwright optimize .*--live|armwright live .*": "serves until nobody looks on; test_live.py looks on",
     r"armwright compare-arms .* ur5e panda .*": "robot_descriptions fetches these arms from a network",
-    r"armwright optimize .*--workers .*|armwright worker .*": "waits for other processes; test_workers.py starts them",
+    r"armwright optimize .*--scheduler .*|dask .*": "needs a cluster on other machines; test_dask.py starts one",
     r"optuna-dashboard .*": "serves until it is stopped",
     r"xargs .* < cells.txt": "minutes: all cells of the experiment; the lines of cells.txt are checked",
     r"python -m (tests\.fuzz|pytest) .*": "minutes to hours; the suite has a short form of both",

@@ -225,7 +225,7 @@ def test_the_tables_hold_the_same_numbers(comparison: Comparison, tmp_path: Path
     assert "6.70 (2.03)" in text
     assert "The Paper" in text
     assert "one cell is missing" in text
-    assert "smallest p that 3 pairs of runs can give is 0.25" in text
+    assert "smallest possible p for 3 pairs of runs is 0.25" in text
     for line in re.findall(r"(?m)^\|.*$", text):
         assert line.endswith("|")
     tex = (tmp_path / "table.tex").read_text()

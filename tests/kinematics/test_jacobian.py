@@ -121,6 +121,6 @@ def test_clumsiness_is_of_the_worst_target_and_costs_nothing_where_nobody_asks()
     assert problem.evaluate(designs).values[:, 0] == pytest.approx((1.0 - evaluation.dexterity).max(axis=1))
     assert np.all((evaluation.dexterity >= 0.0) & (evaluation.dexterity <= 1.0))
     plain = Problem(task, space).physics(designs)
-    Problem(task, space).values(plain)
+    Problem(task, space).outcomes(plain)
     assert "_singular_values" not in vars(plain)
     assert stack_designs(space, space.matrix(designs)).precision == "float32"

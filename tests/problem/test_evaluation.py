@@ -90,7 +90,7 @@ def test_targets_that_cannot_be(targets: np.ndarray) -> None:
 
 
 def test_no_arms() -> None:
-    with pytest.raises(ArmError, match="no arms"):
+    with pytest.raises(ArmError, match="expected at least one arm"):
         evaluate([], TARGETS)
 
 

@@ -67,7 +67,7 @@ def test_beside_our_objectives_and_constraints() -> None:
         (lambda arm, task: math.nan, "gave energy = nan; it must be a finite number for every arm"),
         (lambda arm, task: np.array([np.inf]), "gave energy = inf; it must be a finite number"),
         (lambda arm, task: 10**400, "gave energy = inf; it must be a finite number"),
-        (lambda arm, task: 1 / 0, r"failed: ZeroDivisionError: division by zero \(test_measuring.py, line \d+\)"),
+        (lambda arm, task: 1 / 0, r"failed: ZeroDivisionError: division by zero \(test_evaluators.py, line \d+\)"),
     ],
 )
 def test_what_a_function_gives_is_checked(made: Callable[[aw.Arm, aw.Task], float], words: str) -> None:
