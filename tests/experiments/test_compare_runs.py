@@ -16,15 +16,9 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.experiments.compare_runs import (
-    Comparison,
-    Run,
-    compare_runs,
-    find_runs,
-    list_runs,
-    read_run_record,
-    side_by_side,
-)
+from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
+from armwright.experiments.run_list import find_runs, list_runs
+from armwright.experiments.run_summary import RunSummary, read_run_summary
 from armwright.experiments.statistics import interval, paired_test
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -77,7 +71,7 @@ def test_the_numbers_of_the_table_are_those_of_the_histories(runs: Path, compari
         assert row.e_hv == interval([summary["hypervolume"]["mean"] for summary in summaries])
         # METHOD 7: the mean over the trials of the mean, and of the deviation, over the seeds.
         assert row.e_hv.mean == pytest.approx(np.mean([np.mean(at) for at in curves.T]))
-        assert row.deviation == pytest.approx(np.mean([np.std(at) for at in curves.T]))
+        assert row.sigma_hv == pytest.approx(np.mean([np.std(at) for at in curves.T]))
         assert row.final.mean == pytest.approx(curves[:, -1].mean())
     assert len(comparison.rows) == 4
 
@@ -93,7 +87,7 @@ def test_contrasts_pair_the_seeds(comparison: Comparison) -> None:
     assert comparison.contrasts
     for contrast in comparison.contrasts:
         ours, theirs = (
-            [run.curve.mean() for run in comparison.of(method, contrast.task)]
+            [run.curve.mean() for run in comparison.runs_of(method, contrast.task)]
             for method in (contrast.method, comparison.baseline)
         )
         assert contrast.test == paired_test(ours, theirs)
@@ -102,10 +96,10 @@ def test_contrasts_pair_the_seeds(comparison: Comparison) -> None:
 
 
 def test_over_all_tasks_each_counts_once(runs: Path) -> None:
-    records = [read_run_record(folder) for folder in find_runs([runs]) if "target-1" in folder.name]
+    records = [read_run_summary(folder) for folder in find_runs([runs]) if "target-1" in folder.name]
     gains = [0.9, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
 
-    def as_task(run: Run, i: int) -> Run:
+    def as_task(run: RunSummary, i: int) -> RunSummary:
         """The same run on another task, the rules' hypervolume so many times as large."""
         gain = gains[i] if "rules" in run.method else 1.0
         history = [gain * value for value in run.summary["hypervolume"]["history"]]
@@ -113,16 +107,16 @@ def test_over_all_tasks_each_counts_once(runs: Path) -> None:
         return replace(run, task=f"task-{i}", summary=summary)
 
     several = [as_task(run, i) for i in range(7) for run in records]
-    (over,) = side_by_side(several).overall
+    (over,) = compare_summaries(several).overall
     means = {m: np.mean([run.curve.mean() for run in records if run.method == m]) for m in {r.method for r in records}}
     ours = next(mean for method, mean in means.items() if "rules" in method)
     ratios = np.array(gains) * ours / next(mean for method, mean in means.items() if "rules" not in method)
     assert over.ratio.mean == pytest.approx(ratios.mean())
     assert over.test.p == pytest.approx(wilcoxon(np.log(ratios)).pvalue)
     assert over.test.better == int(np.sum(ratios > 1.0))
-    assert "## Over all tasks" in markdown(side_by_side(several), "x")
+    assert "## Over all tasks" in markdown(compare_summaries(several), "x")
     five = [run for run in several if run.task not in ("task-5", "task-6")]
-    assert side_by_side(five).overall == []
+    assert compare_summaries(five).overall == []
 
 
 def test_times_say_how_many_got_there(comparison: Comparison) -> None:
@@ -137,9 +131,9 @@ def test_times_say_how_many_got_there(comparison: Comparison) -> None:
 def test_a_flagged_run_stands_for_nothing(runs: Path, tmp_path: Path) -> None:
     place = shutil.copytree(runs, tmp_path / "runs")
     changed(place / "target-1-rules-1", lambda s: s["proposer"].update(flagged=True, fallback_share=0.5))
-    found = side_by_side([read_run_record(folder) for folder in find_runs([place])])
+    found = compare_summaries([read_run_summary(folder) for folder in find_runs([place])])
     method = next(m for m in found.methods if "rules" in m)
-    assert [run.seed for run in found.of(method, "target-1")] == [0, 2]
+    assert [run.seed for run in found.runs_of(method, "target-1")] == [0, 2]
     assert "excluded, because 50% of its proposals failed" in markdown(found, "x")
 
 
@@ -147,7 +141,7 @@ def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> Non
     place = shutil.copytree(runs, tmp_path / "runs")
     for seed in SEEDS:
         changed(place / f"target-1-rules-{seed}", lambda s: s["proposer"].update(origin="scripted", model="gpt-x"))
-    found = side_by_side([read_run_record(folder) for folder in find_runs([place])])
+    found = compare_summaries([read_run_summary(folder) for folder in find_runs([place])])
     for text in (markdown(found, "x"), latex(found)):
         assert "[scripted]" in text
         assert "gpt-x" not in text
@@ -155,7 +149,7 @@ def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> Non
 
 
 def test_what_cannot_be_compared_is_refused(runs: Path, tmp_path: Path) -> None:
-    record = read_run_record(runs / "target-1-none-0")
+    record = read_run_summary(runs / "target-1-none-0")
     for words, task, settings in (
         ("targets differ", Task(name="target-1", targets=((0.3, 0.0, 0.2),), reference_point=(5.0, 5.0)), {}),
         ("12 and 13 counted trials", load_task("target-1"), {"n_total": 13}),
@@ -163,17 +157,17 @@ def test_what_cannot_be_compared_is_refused(runs: Path, tmp_path: Path) -> None:
         out = tmp_path / words.split()[0]
         optimize(Problem(task), proposer="none", n_init=4, seed=1, out=out, verify=False, **{"n_total": 12, **settings})
         with pytest.raises(SettingsError, match=words):
-            side_by_side([record, read_run_record(out)])
+            compare_summaries([record, read_run_summary(out)])
     copy = shutil.copytree(runs / "target-1-none-0", tmp_path / "copy")
     with pytest.raises(SettingsError, match="leave one out"):
-        side_by_side([record, read_run_record(copy)])
-    with pytest.raises(SettingsError, match='no run is of the method "x"'):
-        side_by_side([record], "x")
+        compare_summaries([record, read_run_summary(copy)])
+    with pytest.raises(SettingsError, match='no run has the method "x"'):
+        compare_summaries([record], "x")
     (copy / "summary.json").unlink()
     with pytest.raises(RunFolderError, match="not finished"):
-        read_run_record(copy)
+        read_run_summary(copy)
     with pytest.raises(SettingsError, match="no finished run"):
-        side_by_side([])
+        compare_summaries([])
 
 
 def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest(tmp_path: Path) -> None:
@@ -185,10 +179,10 @@ def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest
                      out=tmp_path / f"{proposer}-{seed}")  # fmt: skip
     optimize(Problem(stated), sampler="random", proposer="none", n_init=4, n_total=6, verify=False, out=tmp_path / "s")
     find_front(Problem(task), budget=2000, out=tmp_path / "front")
-    records = [read_run_record(folder) for folder in find_runs([tmp_path])]
+    records = [read_run_summary(folder) for folder in find_runs([tmp_path])]
     own = [record.config.reference_point for record in records]
     assert len(set(own)) > 2
-    found = side_by_side(records)
+    found = compare_summaries(records)
     shared = tuple(max(values) for values in zip(*own, strict=True))
     assert found.widened == ["mine"]
     assert found.reference_point("mine") == shared
@@ -207,7 +201,7 @@ def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest
 
 def test_searches_for_the_whole_front_stand_beside_studies(runs: Path, tmp_path: Path) -> None:
     find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
-    found = side_by_side([read_run_record(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
+    found = compare_summaries([read_run_summary(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     row = next(row for row in found.rows if row.method == "front search")
     assert row.e_hv is None
     assert row.final.mean > 8.0
@@ -252,7 +246,7 @@ def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) ->
 @pytest.mark.slow
 def test_figures_show_a_front_search_beside_a_study(runs: Path, tmp_path: Path) -> None:
     find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
-    found = side_by_side([read_run_record(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
+    found = compare_summaries([read_run_summary(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}
     assert {"hypervolume-methods", "attainment-target-1"} <= names
 
@@ -266,7 +260,7 @@ def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_serv
     chat_server.answer = lambda request: best if wants_design(request) else words
     proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
     optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
-    found = side_by_side([read_run_record(tmp_path / "run", "no $\\alpha_{x markup")])
+    found = compare_summaries([read_run_summary(tmp_path / "run", "no $\\alpha_{x markup")])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}
     assert "reasoning-target-1" in names
 

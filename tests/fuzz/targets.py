@@ -446,7 +446,8 @@ def damaged(name: str, data: bytes) -> Iterator[Path]:
 
 def looked_at(there: Path) -> None:
     """What readers of a run folder do."""
-    from armwright.experiments.compare_runs import compare_runs, list_runs
+    from armwright.experiments.compare_runs import compare_runs
+    from armwright.experiments.run_list import list_runs
     from armwright.proposers.replay import ReplayProposer
     from armwright.report.page_content import RunContent
     from armwright.report.tables import markdown

@@ -529,13 +529,14 @@ def compare(
 ) -> None:
     """Compare finished runs by method, task and seed: tables, intervals, tests."""
     from armwright.cli import console as view
-    from armwright.experiments.compare_runs import finished_runs, side_by_side
+    from armwright.experiments.compare_runs import compare_summaries
+    from armwright.experiments.run_list import read_finished_runs
     from armwright.report.tables import markdown, write_tables
 
     words = view.stdout_console()
-    finished, unfinished = finished_runs(places)
+    finished, unfinished = read_finished_runs(places)
     notes = [f"{folder} is not finished, and left out" for folder in unfinished]
-    comparison = side_by_side(finished, baseline)
+    comparison = compare_summaries(finished, baseline)
     title = "Runs compared"
     words.print(markdown(comparison, title, notes=notes), end="")
     if out is not None:
@@ -617,7 +618,7 @@ def runs(
 ) -> None:
     """List the runs that lie in a folder, and how far each has come."""
     from armwright.cli import console as view
-    from armwright.experiments.compare_runs import find_runs, list_runs
+    from armwright.experiments.run_list import find_runs, list_runs
 
     listed = list_runs(find_runs(places or [Path("runs")]))
     if json_:

@@ -6,8 +6,9 @@ from pathlib import Path
 import yaml
 
 from armwright.exceptions import FailureError, RunFolderError
-from armwright.experiments.compare_runs import Comparison, read_run_record
+from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import Cell, ExperimentPlan
+from armwright.experiments.run_summary import read_run_summary
 from armwright.files import replace_file
 from armwright.runs.results import read_summary
 
@@ -16,7 +17,9 @@ PLAN = "experiment.yaml"  # what was run, as it was
 
 def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
     """The finished ones among the cells, with the labels and in the order of the plan."""
-    records = [read_run_record(cell.folder, cell.plan.label) for cell in cells if read_summary(cell.folder) is not None]
+    records = [
+        read_run_summary(cell.folder, cell.plan.label) for cell in cells if read_summary(cell.folder) is not None
+    ]
     if not records:
         raise FailureError("no cell of the experiment is finished, so there is nothing to compare")
     labels = [method.label for method in plan.methods.values()]

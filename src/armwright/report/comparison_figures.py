@@ -14,7 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from armwright.experiments.compare_runs import Comparison, Run
+from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.run_summary import RunSummary
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
 from armwright.pareto import front_numbers, hypervolume, solution_numbers
 from armwright.report.arm_figures import draw_arm, frame
@@ -82,7 +83,7 @@ def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[s
     """Yield figures of one run per task: its samples, Solutions 1 and 2, and the reasons for Solution 1."""
     shown = next((method for method in samples if method in comparison.methods), comparison.methods[-1])
     for task in comparison.tasks[:COLUMNS]:
-        runs = [run for run in comparison.of(shown, task) if len(run.curve)]
+        runs = [run for run in comparison.runs_of(shown, task) if len(run.curve)]
         if not runs:
             continue
         history = runs[0].history()
@@ -195,7 +196,7 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
     if any(comparison.best_known(task) is not None for task in comparison.tasks):
         handles.append(Line2D([], [], color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label="best known"))
     _legend(figure, handles)
-    seeds = {len(comparison.of(method, task)) for method in methods for task in comparison.tasks} - {0}
+    seeds = {len(comparison.runs_of(method, task)) for method in methods for task in comparison.tasks} - {0}
     runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
     caption = f"mean and standard deviation of {runs} runs"
     figure.suptitle(f"{title}: {caption}" if title else caption.capitalize(), fontsize=10)
@@ -208,7 +209,7 @@ def draw_attainment(comparison: Comparison, task: str) -> Figure:
     reference = comparison.reference_point(task)
     handles: list[Any] = []
     for method in comparison.methods:
-        runs = comparison.of(method, task)
+        runs = comparison.runs_of(method, task)
         if not runs:
             continue
         fronts = [_front(run) for run in runs]
@@ -266,13 +267,13 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
         (task, method)
         for task in comparison.tasks
         for method in comparison.methods
-        if any(run.proposer for run in comparison.of(method, task))
+        if any(run.proposer for run in comparison.runs_of(method, task))
     ]
     figure, axes = one_panel(6.4, 1.3 + 0.32 * len(pairs))
     sources: dict[str, None] = {}
     for row, (task, method) in enumerate(pairs):
         left = 0.0
-        for source, share in _gained_shares(comparison.of(method, task)).items():
+        for source, share in _gained_shares(comparison.runs_of(method, task)).items():
             style = look(source)
             axes.barh(
                 row,
@@ -286,7 +287,7 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
             )
             left += share
             sources[source] = None
-    axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.marked(method)}" for task, method in pairs])
+    axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.label(method)}" for task, method in pairs])
     axes.set_ylim(len(pairs) - 0.4, -0.6)
     axes.set_xlim(0, 1)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0))
@@ -299,7 +300,7 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
     return figure
 
 
-def _gained_shares(runs: Sequence[Run]) -> Mapping[str, float]:
+def _gained_shares(runs: Sequence[RunSummary]) -> Mapping[str, float]:
     gained: dict[str, list[float]] = {RANDOM: [], BBO: []}
     for run in runs:
         for source, share in run.gained.items():
@@ -307,7 +308,7 @@ def _gained_shares(runs: Sequence[Run]) -> Mapping[str, float]:
     return {source: sum(shares) / len(runs) for source, shares in gained.items() if shares}
 
 
-def _reasons(run: Run, history: History, solutions: tuple[int, int] | None) -> Figure | None:
+def _reasons(run: RunSummary, history: History, solutions: tuple[int, int] | None) -> Figure | None:
     """Draw the reasons given for Solution 1, or for the proposal on the front that is nearest to it."""
     if solutions is None or not run.proposer:
         return None
@@ -366,7 +367,7 @@ def _name_axes(axes: Any, config: RunConfig) -> None:
     axes.set_ylabel(axis_label(config.objectives[1], config.space))
 
 
-def _front(run: Run) -> np.ndarray:
+def _front(run: RunSummary) -> np.ndarray:
     """Return the front of a run in the first two objectives, (K, 2)."""
     counted = run.history().masked_objectives
     return counted[front_numbers(counted)][:, :2]
@@ -416,7 +417,7 @@ def _handle(comparison: Comparison, method: str, marked: bool = True) -> Line2D:
         linewidth=1.5,
         marker=marker,
         markersize=4,
-        label=comparison.marked(method),
+        label=comparison.label(method),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.experiments.compare_arms import dominance_counts, read_existing_arms
-from armwright.experiments.compare_runs import method_words
+from armwright.experiments.run_summary import describe_method
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pareto import hypervolume
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
@@ -248,7 +248,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "masses": space.mass_note,
         "is_toy": space.is_toy,
         "seed": config.seed,
-        "method": method_words(config),
+        "method": describe_method(config),
         "study": None if study is None else study.model_dump(mode="json"),
         "n_init": method.n_init,
         "planned": None if study is None else study.n_trials,

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from armwright.experiments.compare_runs import Comparison, Run
+from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.run_summary import RunSummary
 from armwright.experiments.statistics import Interval, least_p
 
 Published = Mapping[tuple[str, str], tuple[float, float]]  # (method, task): (E_hv, σ_hv)
@@ -20,14 +21,14 @@ def row_records(comparison: Comparison, published: Published) -> Iterable[dict[s
             "method": row.method,
             "runs": row.runs,
             **_flat("e_hv", row.e_hv),
-            "sigma_hv": row.deviation,
+            "sigma_hv": row.sigma_hv,
             **_flat("final", row.final),
             **_flat("share_of_best_known", row.share),
             "best_known": comparison.best_known(row.task),
             "published_e_hv": None if theirs is None else theirs[0],
             "published_sigma_hv": None if theirs is None else theirs[1],
             "seconds": row.seconds,
-            "scripted": any(run.is_scripted for run in comparison.of(row.method, row.task)),
+            "scripted": any(run.is_scripted for run in comparison.runs_of(row.method, row.task)),
         }
 
 
@@ -83,7 +84,7 @@ def proposer_records(comparison: Comparison) -> list[dict[str, Any]]:
     records: list[dict[str, Any]] = []
     for task in comparison.tasks:
         for method in comparison.methods:
-            runs = [run for run in comparison.of(method, task) if run.proposer]
+            runs = [run for run in comparison.runs_of(method, task) if run.proposer]
             if runs:
                 records.append({"task": task, "method": method, **_proposer_means(runs)})
     return records
@@ -92,7 +93,7 @@ def proposer_records(comparison: Comparison) -> list[dict[str, Any]]:
 def run_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
     """Yield one record per run."""
     best = {task: comparison.best_known(task) for task in comparison.tasks}
-    for run in [*comparison.runs, *comparison.left_out]:
+    for run in [*comparison.runs, *comparison.excluded]:
         known = best.get(run.task)
         yield {
             "task": run.task,
@@ -113,7 +114,7 @@ def _flat(name: str, value: Interval | None) -> dict[str, float | None]:
     return {name: value.mean, f"{name}_low": value.low, f"{name}_high": value.high}
 
 
-def _proposer_means(runs: Sequence[Run]) -> dict[str, Any]:
+def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:
     habits = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats")
     each: list[dict[str, Any]] = []
     for run in runs:

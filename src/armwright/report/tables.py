@@ -4,7 +4,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from armwright.exceptions import RunFolderError
-from armwright.experiments.compare_runs import Comparison, Row, Run
+from armwright.experiments.compare_runs import Comparison, MethodResult
+from armwright.experiments.run_summary import RunSummary
 from armwright.experiments.statistics import Interval, least_p
 from armwright.files import as_csv, replace_file
 from armwright.report.table_records import (
@@ -94,7 +95,7 @@ def _summary_part(comparison: Comparison, published: Published, published_in: st
     if len(comparison.tasks) <= WIDE:
         head = ["method", *comparison.tasks]
         for method in methods:
-            lines.append([comparison.marked(method), *(cell(method, task) for task in comparison.tasks)])
+            lines.append([comparison.label(method), *(cell(method, task) for task in comparison.tasks)])
             published_values = [published.get((method, task)) for task in comparison.tasks]
             if any(published_values):
                 lines.append(
@@ -104,7 +105,7 @@ def _summary_part(comparison: Comparison, published: Published, published_in: st
                     ]
                 )
     else:
-        head = ["task", *(comparison.marked(method) for method in methods)]
+        head = ["task", *(comparison.label(method) for method in methods)]
         lines = [[task, *(cell(method, task) for method in methods)] for task in comparison.tasks]
     source = f" Published: {published_in}." if published_in and published else ""
     return [f"## Hypervolume over the trials\n\n{caption}{source}", _table(head, lines)]
@@ -118,7 +119,7 @@ def _final_part(comparison: Comparison) -> str:
     lines = [
         [
             row.task,
-            comparison.marked(row.method),
+            comparison.label(row.method),
             str(row.runs),
             _interval(row.final),
             "–" if row.share is None else _interval(row.share, scale=100.0, unit=" %", decimals=1),
@@ -146,7 +147,7 @@ def _overall_part(comparison: Comparison) -> str:
     )
     lines = [
         [
-            comparison.marked(over.method),
+            comparison.label(over.method),
             _interval(over.ratio, decimals=3),
             f"{over.test.better} of {over.test.n}",
             f"{over.test.effect:+.2f}",
@@ -173,7 +174,7 @@ def _contrast_part(comparison: Comparison) -> str:
     lines = [
         [
             contrast.task,
-            comparison.marked(contrast.method),
+            comparison.label(contrast.method),
             _interval(contrast.test.difference, sign=True),
             f"{contrast.test.better} of {contrast.test.n}",
             f"{contrast.test.effect:+.2f}",
@@ -213,7 +214,7 @@ def _time_part(comparison: Comparison) -> str:
         return f"{median} ({time.reached} of {time.runs})"
 
     lines = [
-        [task, comparison.marked(method), *(cell(task, method, level) for level in levels)] for task, method in places
+        [task, comparison.label(method), *(cell(task, method, level) for level in levels)] for task, method in places
     ]
     head = ["task", "method", *(f"{level:.0%}" for level in levels)]
     return f"## Trials to a hypervolume\n\n{caption}\n\n{_table(head, lines)}"
@@ -234,7 +235,7 @@ def _proposer_part(comparison: Comparison) -> str:
     lines = [
         [
             record["task"],
-            comparison.marked(record["method"]),
+            comparison.label(record["method"]),
             _number(record["proposals"], 0),
             _share(record["front_share"]),
             _share(record["gained_share"]),
@@ -263,7 +264,7 @@ def latex(comparison: Comparison, published: Published | None = None, published_
             return "-- & --"
         mean = f"{row.e_hv.mean:.{DECIMALS}f}"
         mean = rf"\textbf{{{mean}}}" if best.get(task) == method else mean
-        return f"{mean} & {row.deviation:.{DECIMALS}f}"
+        return f"{mean} & {row.sigma_hv:.{DECIMALS}f}"
 
     lines = [
         "% needs \\usepackage{booktabs}",
@@ -276,7 +277,7 @@ def latex(comparison: Comparison, published: Published | None = None, published_
     for method in comparison.methods:
         if not any((method, task) in ours for task in tasks):
             continue
-        lines.append(f"{_tex(comparison.marked(method))} & {' & '.join(numbers(method, t) for t in tasks)} " + r"\\")
+        lines.append(f"{_tex(comparison.label(method))} & {' & '.join(numbers(method, t) for t in tasks)} " + r"\\")
         published_values = [published.get((method, task)) for task in tasks]
         if any(published_values):
             cells = " & ".join("-- & --" if t is None else f"{t[0]:.2f} & {t[1]:.2f}" for t in published_values)
@@ -299,7 +300,7 @@ def _best(comparison: Comparison) -> dict[str, str]:
 
 def _remarks(comparison: Comparison) -> list[str]:
     """Return the notes that the tables need: excluded runs, shared reference points, stand-ins and models."""
-    notes = [f"{run.method} on {run.task}, seed {run.seed}: {_flag(run)}" for run in comparison.left_out]
+    notes = [f"{run.method} on {run.task}, seed {run.seed}: {_flag(run)}" for run in comparison.excluded]
     notes += [
         f"{task}: runs had different reference points; all use the largest values, "
         f"({', '.join(f'{value:.4g}' for value in comparison.reference_point(task))})"
@@ -317,13 +318,13 @@ def _remarks(comparison: Comparison) -> list[str]:
     return notes
 
 
-def _flag(run: Run) -> str:
+def _flag(run: RunSummary) -> str:
     return f"excluded, because {run.proposer['fallback_share']:.0%} of its proposals failed"
 
 
-def _pair(row: Row) -> str:
+def _pair(row: MethodResult) -> str:
     assert row.e_hv is not None
-    return f"{row.e_hv.mean:.{DECIMALS}f} ({row.deviation:.{DECIMALS}f})"
+    return f"{row.e_hv.mean:.{DECIMALS}f} ({row.sigma_hv:.{DECIMALS}f})"
 
 
 def _interval(value: Interval, scale: float = 1.0, unit: str = "", decimals: int = DECIMALS, sign: bool = False) -> str:

@@ -1,0 +1,133 @@
+"""A finished run, read from its summary, and the short description of its method."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.exceptions import RunFolderError
+from armwright.pareto import hypervolume
+from armwright.runs.attribution import credit_by_source
+from armwright.runs.config import FrontMethod, RunConfig
+from armwright.runs.folder import read_config, read_run
+from armwright.runs.history import History
+from armwright.runs.results import read_summary
+
+LABELS = {"rules": "rules", "llm": "LLM", "manual": "people", "scripted": "scripted"}  # of built-in proposers
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """A finished run.
+
+    reference_point: bounds its hypervolume. If it differs from that of the run itself, all hypervolumes are computed
+        again from the trials (for a front search, from the designs it kept).
+    """
+
+    folder: Path
+    method: str
+    task: str
+    seed: int
+    config: RunConfig
+    summary: Mapping[str, Any]
+    reference_point: tuple[float, ...]
+
+    @cached_property
+    def curve(self) -> Array:
+        """Hypervolume over the counted trials (I,), without later refinement; empty for a front search."""
+        if isinstance(self.config.method, FrontMethod):
+            return np.zeros(0)
+        is_stored = self._has_own_reference_point
+        curve = np.array(self.summary["hypervolume"]["history"]) if is_stored else self.history().hypervolume
+        return curve[: self.config.method.n_total]
+
+    @cached_property
+    def final(self) -> float:
+        """Hypervolume at the end."""
+        if len(self.curve):
+            return float(self.curve[-1])
+        if self._has_own_reference_point:
+            return float(self.summary["hypervolume"]["final"])
+        return hypervolume(self.history().masked_objectives, self.reference_point)
+
+    @cached_property
+    def gained(self) -> Mapping[str, float]:
+        """Share of the final hypervolume that each source's trials added when they were evaluated."""
+        if self._has_own_reference_point:
+            gained = {source: credit["hypervolume_gained"] or 0.0 for source, credit in self.summary["credit"].items()}
+        else:
+            credits = credit_by_source(self.history())
+            gained = {source: credit.hypervolume_gained or 0.0 for source, credit in credits.items()}
+        total = sum(gained.values())
+        return {source: share / total for source, share in gained.items()} if total else dict.fromkeys(gained, 0.0)
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the run [s]."""
+        return float(
+            self.summary["search"]["seconds"] if "search" in self.summary else self.summary["seconds"]["total"]
+        )
+
+    @property
+    def proposer(self) -> Mapping[str, Any]:
+        """The proposer's part of the summary; empty without a proposer."""
+        return self.summary.get("proposer") or {}
+
+    @property
+    def is_flagged(self) -> bool:
+        """Whether too many proposals failed for the run to represent its method."""
+        return bool(self.proposer.get("flagged"))
+
+    @property
+    def is_scripted(self) -> bool:
+        """Whether a scripted stand-in answered instead of a model."""
+        return self.proposer.get("origin") == "scripted"
+
+    @property
+    def _has_own_reference_point(self) -> bool:
+        return self.reference_point == self.config.reference_point
+
+    def history(self) -> History:
+        """Read the trials from the run's folder."""
+        _, history = read_run(self.folder)
+        task = history.problem.task.model_copy(update={"reference_point": self.reference_point})
+        return replace(history, problem=replace(history.problem, task=task))
+
+
+def read_run_summary(folder: Path, method: str | None = None) -> RunSummary:
+    """Read a finished run.
+
+    Args:
+        folder: The run folder.
+        method: Name of its method; by default a description of its settings.
+    """
+    config, summary = read_config(folder), read_summary(folder)
+    if summary is None:
+        raise RunFolderError(f"{folder} is not finished; repeat the command that started it")
+    label = method or describe_method(config)
+    return RunSummary(folder, label, config.task.name, config.seed, config, summary, config.reference_point or ())
+
+
+def describe_method(config: RunConfig) -> str:
+    """Describe a run's search in a few words; only settings that differ from the defaults are named."""
+    method = config.method
+    if isinstance(method, FrontMethod):
+        return "front search"
+    text = "BBO" if method.sampler == "tpe" else f"BBO ({method.sampler})"
+    if method.proposer is not None:
+        name = str(method.proposer["name"])
+        text += f"/{LABELS.get(name, name)}"
+        text += {"plus": "+", "minus": "-"}.get(str(method.proposer.get("prompt", "")), "")
+        if model := method.proposer.get("model"):
+            text += f" {model}"
+        if method.n_step != 10:
+            text += f" (N_step {method.n_step})"
+    if method.polish_every:
+        text += f" (polish {method.polish_every})"
+    if method.n_total != 200:
+        text += f" ({method.n_total} trials)"
+    return text
