@@ -309,7 +309,7 @@ def test_the_study_of_a_run_carries_its_constraints(tmp_path: Path) -> None:
     names = [constraint.words for constraint in problem.constraints]
     box = BlackBox(SPACE, "tpe", seed=1, constraints=names)
     box.restore(run.trials)
-    assert [list(trial.violations.items()) for trial in box.study.trials] == [
+    assert [list(trial.constraints.items()) for trial in box.study.trials] == [
         list(zip(names, trial.violations, strict=True)) for trial in run.trials
     ]
     assert sorted(t.number for t in box.study.best_trials) == sorted(member.number for member in run.front)
