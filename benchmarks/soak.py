@@ -108,7 +108,7 @@ def bare(kind: str, n: int, folder: Path) -> list[Look]:
         asked = alone.ask()
         assert suggested(asked, problem) == trial.design.params, "the same trials"
         alone.tell(asked, trial.values)
-        if trial.same_as is None:
+        if trial.duplicate_of is None:
             started = time.process_time()
             problem.evaluate([trial.design])
             evaluating += time.process_time() - started

@@ -119,7 +119,7 @@ def test_exported_trials_equal_those_of_the_run(which: str, request: pytest.Fixt
                 "fault": ours.fault,
                 "failure": ours.failure or None,
                 "refines": ours.refines,
-                "same_as": ours.same_as,
+                "duplicate_of": ours.duplicate_of,
                 "verdict": verdicts.get(ours.number),
             }
             assert trial.user_attrs == {name: value for name, value in told.items() if value is not None}

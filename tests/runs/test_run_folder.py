@@ -84,7 +84,7 @@ def test_summary(run: Run) -> None:
         "front_size",
         "verification",
         "evaluations",
-        "same_arms",
+        "duplicates",
         "polish",
         "credit",
         "proposer",

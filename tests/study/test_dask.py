@@ -139,7 +139,7 @@ def test_workers_need_no_evaluator_file_and_each_design_is_evaluated_once(
     assert notes[0] == f"evaluating on the Dask cluster at {shell.address}"
     assert numbers(tmp_path / "run") == list(range(35))
     assert set(bench.counts.values()) == {1}
-    assert bench.counts.total() == 35 - found.summary["same_arms"]
+    assert bench.counts.total() == 35 - found.summary["duplicates"]
     for trial in found.trials[:5]:
         assert trial.values == (sum(trial.design.links), 1.0 + trial.design.origin[2])
 
@@ -186,7 +186,7 @@ def test_the_design_of_a_killed_shell_worker_is_evaluated_by_the_other(
     assert [pid for pid, name in bench.evaluated if name == twice] == [victim.pid, other.pid]
     assert sum("a worker was lost; trial " in note for note in notes) == 1
     assert numbers(tmp_path / "run") == list(range(N_TRIALS))
-    assert bench.counts.total() == N_TRIALS - found.summary["same_arms"] + 1
+    assert bench.counts.total() == N_TRIALS - found.summary["duplicates"] + 1
 
 
 @pytest.mark.slow

@@ -18,8 +18,8 @@ def test_a_repeated_design_is_evaluated_once_and_counted() -> None:
         earlier = first.setdefault(frozenset(trial.design.params.items()), trial.number)
         is_repeated = earlier != trial.number
         repeated += is_repeated
-        assert trial.same_as == (earlier if is_repeated else None)
+        assert trial.duplicate_of == (earlier if is_repeated else None)
         assert trial.evaluations == (0 if is_repeated else 1)
         assert trial.values == run.trials[earlier].values
     assert repeated > 10
-    assert run.summary["same_arms"] == repeated
+    assert run.summary["duplicates"] == repeated

@@ -133,7 +133,7 @@ def test_a_trial_that_repeats_an_arm_is_recorded_before_the_next_begins(tmp_path
     proposer = Repeating()
     run = optimize(PROBLEM, proposer=proposer, n_init=2, n_step=1, n_total=5, out=tmp_path / "run")
     assert proposer.shown == [(number, number) for number in range(2, 7)]
-    assert [trial.same_as for trial in run.trials[3:]] == [2] * 4
+    assert [trial.duplicate_of for trial in run.trials[3:]] == [2] * 4
     assert all(trial.feedback is None for trial in run.trials)
 
 

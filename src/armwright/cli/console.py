@@ -82,9 +82,9 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     _show_standing(console, summary["best_known"])
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
     console.print(f"{summary['n_trials']} trials{more}{broken}: {sources}; {_seconds(summary['seconds'])}")
-    if summary["same_arms"]:
+    if summary["duplicates"]:
         console.print(
-            f"{summary['same_arms']} trials repeated the design of an earlier one and were not evaluated again"
+            f"{summary['duplicates']} trials repeated the design of an earlier one and were not evaluated again"
         )
     _show_proposer(console, summary["proposer"])
     scaled = TORQUE in history.problem.objectives

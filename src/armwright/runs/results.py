@@ -125,7 +125,7 @@ def summarize(
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         "evaluations": sum(trial.evaluations for trial in history),
-        "same_arms": sum(trial.same_as is not None for trial in history),
+        "duplicates": sum(trial.duplicate_of is not None for trial in history),
         "polish": None,
         "credit": {source: asdict(credit) for source, credit in credit_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),

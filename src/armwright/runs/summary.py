@@ -120,7 +120,7 @@ class StudySummary(_Summary):
 
     hypervolume: _Curve
     evaluations: Count
-    same_arms: Count
+    duplicates: Count
     polish: _Polish | None
     credit: dict[str, _Credit]
     proposer: _Proposer | None

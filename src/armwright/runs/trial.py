@@ -42,7 +42,7 @@ class FinishedTrial:
         feedback: how many finished trials the proposer knew, if not all before this one.
         refines: the trial whose design was refined for this one.
         evaluations: designs that were evaluated to find it: many for a refined one, none for a duplicate.
-        same_as: the earlier trial with an equal design, whose values it has.
+        duplicate_of: the earlier trial with an equal design, whose values it has.
         seconds: wall time by part (total, proposing, sampling, evaluation).
         sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
         violations: of each constraint; satisfied at <= 0.
@@ -63,7 +63,7 @@ class FinishedTrial:
     feedback: int | None = None
     refines: int | None = None
     evaluations: Annotated[int, Field(ge=0)] = 1
-    same_as: int | None = None
+    duplicate_of: int | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     violations: tuple[float, ...] = ()

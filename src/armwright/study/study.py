@@ -293,7 +293,7 @@ class Study:
             number, evaluated = result
             self._tell(self._pending[number], evaluated)
             for pending in self._pending.values():
-                if pending.trial.same_as == number and not pending.is_evaluated:
+                if pending.trial.duplicate_of == number and not pending.is_evaluated:
                     self._tell(pending, Evaluated(evaluated.outcome, 0.0))
             self._record_ready(turns)
             timeout = 0.0
@@ -368,7 +368,7 @@ class Study:
         first = self._first_of.setdefault(design, number)
         trial = _begun(number, source, design, turn)
         if first != number:
-            trial = replace(trial, same_as=first, evaluations=0)
+            trial = replace(trial, duplicate_of=first, evaluations=0)
         if refinement is not None:
             trial = replace(trial, refines=refinement.refines, evaluations=trial.evaluations + refinement.evaluations)
         pending = _Pending(optuna_trial, trial, turn, proposed - started, sampled - proposed)
