@@ -62,7 +62,7 @@ def test_config_repeats_the_run(run: Run) -> None:
         "n_total": 8,
         "in_flight": None,
         "polish_every": None,
-        "start": [],
+        "initial_designs": [],
     }
     assert config["seed"] == 0
     assert {"armwright", "optuna", "warp-lang", "python"} <= set(config["versions"])

@@ -20,26 +20,26 @@ GIVEN = PROBLEM.space.sample(2, 77)
 
 
 def test_the_first_trials_are_theirs(tmp_path: Path) -> None:
-    run = optimize(PROBLEM, proposer=None, n_init=5, n_total=10, start=GIVEN, out=tmp_path / "run")
-    assert [trial.source for trial in run.trials] == ["start"] * 2 + ["random"] * 3 + ["bbo"] * 10
+    run = optimize(PROBLEM, proposer=None, n_init=5, n_total=10, initial_designs=GIVEN, out=tmp_path / "run")
+    assert [trial.source for trial in run.trials] == ["initial_design"] * 2 + ["random"] * 3 + ["bbo"] * 10
     assert [trial.design for trial in run.trials[:2]] == GIVEN
     assert [trial.values for trial in run.trials[:2]] == [tuple(row) for row in PROBLEM.evaluate(GIVEN).values.tolist()]
     without = optimize(PROBLEM, proposer=None, n_init=5, n_total=10)
     assert [t.design for t in run.trials[2:5]] == [t.design for t in without.trials[2:5]]  # drawn by their numbers
     config, history = read_run(tmp_path / "run")
-    assert [dict(design.params) for design in GIVEN] == list(config.study.start)
-    assert history.trials[0].source == "start"
-    again = optimize(PROBLEM, proposer=None, n_init=5, n_total=14, start=GIVEN, out=tmp_path / "run")
+    assert [dict(design.params) for design in GIVEN] == list(config.study.initial_designs)
+    assert history.trials[0].source == "initial_design"
+    again = optimize(PROBLEM, proposer=None, n_init=5, n_total=14, initial_designs=GIVEN, out=tmp_path / "run")
     assert again.resumed == 15
-    with pytest.raises(RunConflictError, match="start"):
+    with pytest.raises(RunConflictError, match="initial_designs"):
         optimize(PROBLEM, proposer=None, n_init=5, n_total=14, out=tmp_path / "run")
 
 
 def test_what_cannot_start_is_refused() -> None:
-    with pytest.raises(SettingsError, match="more than the n_init = 1 first trials"):
-        optimize(PROBLEM, n_init=1, start=GIVEN)
+    with pytest.raises(SettingsError, match="2 initial designs do not fit into the n_init = 1 first trials"):
+        optimize(PROBLEM, n_init=1, initial_designs=GIVEN)
     with pytest.raises(DesignError, match="joint_5"):
-        optimize(PROBLEM, start=paper_space(5).sample(1, 0))
+        optimize(PROBLEM, initial_designs=paper_space(5).sample(1, 0))
 
 
 def test_from_a_run_of_before(tmp_path: Path) -> None:
@@ -48,13 +48,13 @@ def test_from_a_run_of_before(tmp_path: Path) -> None:
     )
     assert begun.exit_code == 0, begun.output
     file = sorted((tmp_path / "a" / "designs").glob("*/design.json"))[0]
-    options = ["--start", str(file), "--n-total", "5", "--no-figures", "--out", str(tmp_path / "b")]
+    options = ["--initial-design", str(file), "--n-total", "5", "--no-figures", "--out", str(tmp_path / "b")]
     result = CliRunner().invoke(app, ["optimize", "target-1", *options])
     assert result.exit_code == 0, result.output
     _, history = read_run(tmp_path / "b")
     assert history.trials[0].design.params == json.loads(file.read_text())["params"]
     config = (tmp_path / "b" / "config.yaml").read_text()
-    assert "start:" in config
+    assert "initial_designs:" in config
 
 
 def test_files_that_hold_no_design_are_refused(tmp_path: Path) -> None:
@@ -65,6 +65,6 @@ def test_files_that_hold_no_design_are_refused(tmp_path: Path) -> None:
     file.write_text("params: 3")
     with pytest.raises(DesignError, match="params"):
         read_design(file, PROBLEM.space)
-    result = CliRunner().invoke(app, ["optimize", "target-1", "--start", str(tmp_path / "none.json")])
+    result = CliRunner().invoke(app, ["optimize", "target-1", "--initial-design", str(tmp_path / "none.json")])
     assert isinstance(result.exception, DesignError)
     assert "cannot read" in str(result.exception)

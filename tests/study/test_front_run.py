@@ -129,18 +129,18 @@ def test_same_seed_same_front_and_resumed_equals_uninterrupted(done: FrontRun, t
 
 def test_it_begins_with_a_run_or_a_proposer(tmp_path: Path) -> None:
     study = optimize(PROBLEM, proposer="rules", n_total=30, seed=0, out=tmp_path / "study")
-    run = find_front(PROBLEM, budget="500", seed=0, begin_with=tmp_path / "study", out=tmp_path / "a")
+    run = find_front(PROBLEM, budget="500", seed=0, initial_designs=tmp_path / "study", out=tmp_path / "a")
     together = np.vstack([run.history.values, study.history.values])
     assert hypervolume(together, (5, 5)) == pytest.approx(hypervolume(run.history.values, (5, 5)))  # nothing is lost
-    proposed = find_front(PROBLEM, budget="500", seed=0, begin_with=RulesProposer(), out=tmp_path / "b")
-    assert proposed.config.method.begin_with == {"proposer": {"name": "rules"}}
+    proposed = find_front(PROBLEM, budget="500", seed=0, initial_designs=RulesProposer(), out=tmp_path / "b")
+    assert proposed.config.method.initial_designs == {"proposer": {"name": "rules"}}
     _, first = read_run(tmp_path / "b" / "proposals")
     assert sum(trial.source == "rules" for trial in first) == 20
     with pytest.raises(SettingsError, match="another task"):
-        find_front(Problem(OPEN), begin_with=tmp_path / "study")
+        find_front(Problem(OPEN), initial_designs=tmp_path / "study")
     with pytest.raises(RunFolderError, match="not a run folder"):
-        find_front(PROBLEM, begin_with=tmp_path / "nothing")
-    with pytest.raises(RunConflictError, match="begin_with"):
+        find_front(PROBLEM, initial_designs=tmp_path / "nothing")
+    with pytest.raises(RunConflictError, match="initial_designs"):
         find_front(PROBLEM, budget="500", seed=0, out=tmp_path / "a")
 
 
@@ -209,7 +209,7 @@ def test_a_front_wholly_outside_the_box_is_kept_drawn_and_gone_on_with(tmp_path:
 def test_a_proposer_is_not_asked_for_a_folder_of_another_run(tmp_path: Path) -> None:
     optimize(PROBLEM, proposer="none", n_init=2, n_total=2, out=tmp_path / "study")
     with pytest.raises(RunConflictError):
-        find_front(PROBLEM, budget=500, begin_with=RulesProposer(), out=tmp_path / "study")
+        find_front(PROBLEM, budget=500, initial_designs=RulesProposer(), out=tmp_path / "study")
     assert not (tmp_path / "study" / "proposals").exists()
 
 

@@ -211,7 +211,7 @@ def optimize(
         bool, typer.Option("--once", help="With manual:DIR: take the answers that are there, and exit at a question.")
     ] = False,
     robust: Robust = False,
-    start: Annotated[
+    initial_design: Annotated[
         list[Path] | None,
         typer.Option(help="A design to begin with, such as designs/0042/design.json of a run; several may be given."),
     ] = None,
@@ -242,7 +242,7 @@ def optimize(
 
     words = view.stderr_console() if json_ else view.stdout_console()
     problem = _problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
-    starts = [read_design(file, problem.space) for file in start or ()]
+    initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     wishes = Wishes(
         proposer, model, base_url, prompt, memory, answer, proposals, temperature, model_seed, output, origin,
         max_calls, max_cost, replay_strict, once,
@@ -267,7 +267,7 @@ def optimize(
                 n_total=n_total,
                 in_flight=(1 if in_flight is None else in_flight) if overlap else None,
                 polish_every=polish_every,
-                start=starts,
+                initial_designs=initial_designs,
                 on_model_failure=on_model_failure,
                 verify=verify,
                 workers=_workers(workers, scheduler),
@@ -407,13 +407,13 @@ def front(
         raise SettingsError("--from and --proposer both give the first designs; choose one")
     words = view.stderr_console() if json_ else view.stdout_console()
     problem = _problem(task, space, robust, device, many=True, objectives=objectives)
-    begin_with = from_
+    initial_designs = from_
     if proposer is not None:
         choice = choose_proposer(proposer)
         if choice.proposer is None:
             raise SettingsError(f"--proposer {proposer} gives no designs to begin with; leave it out")
         words.print(choice.reason)
-        begin_with = choice.proposer
+        initial_designs = choice.proposer
     folder = out or Path("runs") / f"{problem.task.name}-front-seed{seed}"
     try:
         with view.searching(words) as watch:
@@ -421,7 +421,7 @@ def front(
                 problem,
                 budget=budget,
                 seed=seed,
-                begin_with=begin_with,
+                initial_designs=initial_designs,
                 stop_at_stall=stall,
                 out=folder,
                 watch=watch,

@@ -28,8 +28,8 @@ TASK_FIELDS = (  # fields that distinguish one task from another
 def repeat_command(config: RunConfig, polished: bool = False, spent: int | None = None) -> str:
     """Return the shell command that repeats a run, without options at their defaults.
 
-    The user's own task, space and initial designs appear as TASK.yaml, SPACE.yaml and START-1.json; their content is in
-    the run's config.yaml.
+    The user's own task, space and initial designs appear as TASK.yaml, SPACE.yaml and DESIGN-1.json; their content is
+    in the run's config.yaml.
 
     Args:
         config: The settings of the run.
@@ -46,24 +46,24 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
     alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in TASK_FIELDS)
     words = [name if alike else OWN_TASK]
     settings: dict[str, Any] = {}
-    n_starts = 0
+    n_designs = 0
     known = {name: load_space(name).model_dump(exclude={"name"}) for name in builtin_spaces()}
     alike = [name for name, content in known.items() if content == config.space.model_dump(exclude={"name"})]
     if "paper" not in alike:
         settings["space"] = alike[0] if alike else OWN_SPACE
     if isinstance(config.method, FrontMethod):
-        begun = config.method.begin_with or {}
-        settings |= {"budget": spent, "from": begun.get("run"), "proposer": begun.get("proposer", {}).get("name")}
+        first = config.method.initial_designs or {}
+        settings |= {"budget": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
         command = "front"
     else:
         command = "optimize"
         if not _is_known(config.method):
             return ""
         settings |= _study_options(config.method)
-        n_starts = len(config.method.start)
+        n_designs = len(config.method.initial_designs)
     given = {key: value for key, value in settings.items() if value is not None and value != DEFAULTS.get(key)}
     options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
-    options += [text for n in range(n_starts) for text in ("--start", f"START-{n + 1}.json")]
+    options += [text for n in range(n_designs) for text in ("--initial-design", f"DESIGN-{n + 1}.json")]
     options += ["--robust"] * (config.tolerance > 0.0)
     options += ["--overlap"] * ("in_flight" in given)
     line = shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from armwright.runs.history import BBO, RANDOM, START
+from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM
 
 
 class Look(NamedTuple):
@@ -17,7 +17,7 @@ class Look(NamedTuple):
 
 _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
-    START: Look("start", "#111111", "P", 36),
+    INITIAL_DESIGN: Look("initial design", "#111111", "P", 36),
     BBO: Look("black box", "#0072B2", "o", 20),
     "polish": Look("polish", "#009E73", "D", 28, "...."),
     "front": Look("front search", "#0072B2", "o", 14),

@@ -33,7 +33,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     proposer: its name and settings; None for black-box trials only.
     in_flight: how many questions go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials the next free one refines a design of the front; None: never.
-    start: designs that the first of the n_init trials are, in place of random ones.
+    initial_designs: that the first of the n_init trials are, in place of random ones.
     """
 
     proposer: dict[str, Any] | None
@@ -43,7 +43,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     n_total: int = Field(ge=1)
     in_flight: int | None = Field(default=None, ge=1)
     polish_every: int | None = Field(default=None, ge=1)
-    start: tuple[dict[str, float | str], ...] = ()
+    initial_designs: tuple[dict[str, float | str], ...] = ()
 
     @field_validator("proposer")
     @classmethod
@@ -68,7 +68,7 @@ class FrontMethod(BaseModel, frozen=True, extra="forbid"):
     """How a search for the whole front searches (front.py): there is nothing to choose but what it begins with."""
 
     search: Literal["front"] = "front"
-    begin_with: dict[str, Any] | None = None
+    initial_designs: dict[str, Any] | None = None
 
     @property
     def n_init(self) -> int:
@@ -192,8 +192,8 @@ def _identity(config: RunConfig) -> dict[str, Any]:
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)
-    if method.get("begin_with"):
-        method["begin_with"].pop("run", None)  # a path has many spellings; what lay there is known by its sha256
+    if isinstance(method["initial_designs"], dict):
+        method["initial_designs"].pop("run", None)  # a path has many spellings; its content is known by its sha256
     for key in ("versions", "earlier_versions", "reference_point"):
         del content[key]
     return _flat({**content, **method})

@@ -27,10 +27,10 @@ from armwright.spaces.parameters import Design
 
 RANDOM = "random"
 BBO = "bbo"
-START = "start"  # an arm that is there already
+INITIAL_DESIGN = "initial_design"  # given by the user, such as an existing arm
 POLISH = "polish"  # a design of the front, refined
 FRONT = "front"  # of a search for the whole front
-NOT_PROPOSED = (RANDOM, BBO, START, POLISH, FRONT)
+NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, POLISH, FRONT)
 GROWING = (
     "values",
     "violations",

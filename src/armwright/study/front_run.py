@@ -103,7 +103,7 @@ def find_front(
     *,
     budget: str | int | Budget = "5s",
     seed: int = 0,
-    begin_with: str | Path | Proposer | None = None,
+    initial_designs: str | Path | Proposer | None = None,
     stop_at_stall: bool = True,
     out: str | Path | None = None,
     watch: Callable[[FrontProgress], None] | None = None,
@@ -112,7 +112,7 @@ def find_front(
 
     budget: a time such as "5s" (loading the kernels not included), or a number of evaluations, of which the last batch
         may go beyond it by up to 1000. With a number the result depends on the seed alone.
-    begin_with: a run folder, all of whose designs are taken, or a proposer, who gives the first designs.
+    initial_designs: a run folder, all of whose designs are taken, or a proposer, who gives the first designs.
     stop_at_stall: whether to end early when the hypervolume hardly grows any more.
 
     Examples:
@@ -125,7 +125,7 @@ def find_front(
     """
     budget = budget if isinstance(budget, Budget) else Budget.of(str(budget))
     seed = whole("seed", seed, 0)
-    rows, origin = _beginning(problem, begin_with)  # before a folder is made
+    rows, origin = _beginning(problem, initial_designs)  # before a folder is made
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
         config = RunConfig(
@@ -135,7 +135,7 @@ def find_front(
             device=problem.device,
             objectives=record_objectives(problem.objectives),
             reference_point=problem.reference_point or _reference_point(problem, seed),
-            method=FrontMethod(begin_with=origin),
+            method=FrontMethod(initial_designs=origin),
             seed=seed,
             versions=versions(),
         )
@@ -143,8 +143,8 @@ def find_front(
             config = folder.adopt(config)
         if folder is None or not (folder.path / SEARCH).exists():
             # A proposer is asked, and paid, only once the folder is known to be ours.
-            if begin_with is not None and not isinstance(begin_with, (str, Path)):
-                rows = _proposed(problem, begin_with, seed, None if folder is None else folder.path)
+            if initial_designs is not None and not isinstance(initial_designs, (str, Path)):
+                rows = _proposed(problem, initial_designs, seed, None if folder is None else folder.path)
             if folder is not None:
                 rows = np.vstack([rows, _rows(problem, _trials_of(problem, folder))])
         return _Search(problem, config, folder, rows, watch).run(budget, stop_at_stall)
@@ -289,22 +289,22 @@ def _rows(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:
     return problem.space.matrix([trial.design for trial in trials]).reshape(-1, len(problem.space.parameters))
 
 
-def _beginning(problem: Problem, begin_with: str | Path | Proposer | None) -> tuple[Array, dict[str, Any] | None]:
+def _beginning(problem: Problem, initial_designs: str | Path | Proposer | None) -> tuple[Array, dict[str, Any] | None]:
     """(N, P) designs that are there already, and where they come from; none yet where a proposer is to give them."""
     nothing = _rows(problem, ())
-    if begin_with is None:
+    if initial_designs is None:
         return nothing, None
-    if not isinstance(begin_with, (str, Path)):
-        return nothing, {"proposer": {"name": begin_with.name, **begin_with.settings()}}
-    _, run = read_run(begin_with)
+    if not isinstance(initial_designs, (str, Path)):
+        return nothing, {"proposer": {"name": initial_designs.name, **initial_designs.settings()}}
+    _, run = read_run(initial_designs)
     space = run.problem.space.model_copy(update={"name": problem.space.name})
     if space != problem.space or run.problem.task.entries != problem.task.entries:
         raise SettingsError(
-            f"{begin_with} holds a run of another task or design space ({run.problem.task.name}, "
+            f"{initial_designs} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"
         )
     rows = _rows(problem, run)
-    return rows, {"run": str(begin_with), "designs": len(rows), "sha256": sha256(rows.tobytes()).hexdigest()}
+    return rows, {"run": str(initial_designs), "designs": len(rows), "sha256": sha256(rows.tobytes()).hexdigest()}
 
 
 def _proposed(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Array:

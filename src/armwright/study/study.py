@@ -22,7 +22,7 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import Method, RunConfig, record_objectives, versions
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
-from armwright.runs.history import BBO, POLISH, RANDOM, START, FrontMember, History
+from armwright.runs.history import BBO, INITIAL_DESIGN, POLISH, RANDOM, FrontMember, History
 from armwright.runs.results import discard_results, read_summary, results_are_there, summarize, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
@@ -121,7 +121,7 @@ def optimize(
     n_total: int = 200,
     in_flight: int | None = None,
     polish_every: int | None = None,
-    start: Sequence[Design] = (),
+    initial_designs: Sequence[Design] = (),
     on_model_failure: str = "stop",
     verify: bool = True,
     workers: Workers | None = None,
@@ -136,7 +136,7 @@ def optimize(
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
     polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
-    start: designs to begin with, such as an arm that is there already: the first of the n_init trials are theirs.
+    initial_designs: the designs of the first of the n_init trials, such as an existing arm.
     verify: whether the front is verified where results are written (`verification.py`); not with an evaluator.
     workers: processes that evaluate designs in place of this one.
     on_model_failure: before the first trial, "stop" raises ModelError, "continue" goes on with black-box trials; a run
@@ -160,8 +160,8 @@ def optimize(
         proposer = choose_proposer(proposer).proposer
     elif isinstance(proposer, type):
         raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
-    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every, start)
-    for design in method.start:
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every, initial_designs)
+    for design in method.initial_designs:
         problem.space.design(design)  # says what is wrong before anything is begun
     if problem.evaluator is not None and method.polish_every is not None:
         raise SettingsError("--polish-every does not go with an evaluator: a refinement takes a thousand evaluations")
@@ -442,9 +442,9 @@ class Study:
             assert self.proposer is not None
             source = self.proposer.name
             return *self.black_box.inject(turn.proposal.design, number, source, turn.proposal.id), source
-        if number < len(self.method.start):
-            given = Design(self.method.start[number])
-            return *self.black_box.inject(given, number, START, None), START
+        if number < len(self.method.initial_designs):
+            given = Design(self.method.initial_designs[number])
+            return *self.black_box.inject(given, number, INITIAL_DESIGN, None), INITIAL_DESIGN
         source = RANDOM if number < self.method.n_init else BBO
         return *self.black_box.draw(number, source), source
 
@@ -511,11 +511,13 @@ def study_method(
     n_total: int,
     in_flight: int | None,
     polish_every: int | None,
-    start: Sequence[Design] = (),
+    initial_designs: Sequence[Design] = (),
 ) -> Method:
     """How `optimize` searches with these arguments; SettingsError where they do not go together."""
-    if len(start) > n_init:
-        raise SettingsError(f"{len(start)} designs to start with are more than the n_init = {n_init} first trials")
+    if len(initial_designs) > n_init:
+        raise SettingsError(
+            f"{len(initial_designs)} initial designs do not fit into the n_init = {n_init} first trials"
+        )
     if in_flight is not None and proposer is not None and not proposer.overlaps:
         raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
     return Method(
@@ -526,7 +528,7 @@ def study_method(
         n_total=whole("n_total", n_total, 1),
         in_flight=None if in_flight is None else whole("in_flight", in_flight, 1),
         polish_every=None if polish_every is None else whole("polish_every", polish_every, 1),
-        start=tuple(dict(design.params) for design in start),
+        initial_designs=tuple(dict(design.params) for design in initial_designs),
     )
 
 
