@@ -83,7 +83,7 @@ def searched(problem: Problem, reference: tuple[float, ...], seed: int) -> tuple
     search = FrontSearch(problem.space.parameters, lambda rows: problem.evaluate_matrix(rows).values, reference, seed)
     while search.evaluations < EVALUATIONS:
         search.step()
-    return search.rows, search.values
+    return search.matrix, search.values
 
 
 def by_sequence(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, Array]:
@@ -104,7 +104,7 @@ def by_sequence(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, 
         )
         while search.evaluations < PER_SEQUENCE:
             search.step()
-        rows.append(whole(search.rows))
+        rows.append(whole(search.matrix))
         values.append(search.values)
     return np.vstack(rows), np.vstack(values)
 

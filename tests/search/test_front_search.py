@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem.problem import Problem
-from armwright.search.encoding import Columns
+from armwright.search.encoding import DesignEncoding
 from armwright.search.front_search import CAPACITIES, FIRST_BATCH, SMALLEST_BATCH, FrontSearch
 from armwright.search.survival import leaders, survivors
 from armwright.search.variation import RARE_SHARE, _parents
@@ -51,20 +51,20 @@ def stepped(search, n):
 
 
 def assert_same(one, other):
-    np.testing.assert_array_equal(one.rows, other.rows)
+    np.testing.assert_array_equal(one.matrix, other.matrix)
     np.testing.assert_array_equal(one.values, other.values)
     np.testing.assert_array_equal(one.history, other.history)
     assert one.evaluations == other.evaluations
 
 
-def test_the_same_seed_gives_the_same_front_and_another_seed_another():
+def test_equal_seeds_give_equal_fronts():
     one = stepped(made(), 10)
     assert_same(one, stepped(made(), 10))
-    assert not np.array_equal(one.rows, stepped(made(seed=1), 10).rows)
+    assert not np.array_equal(one.matrix, stepped(made(seed=1), 10).matrix)
 
 
 @pytest.mark.parametrize("n_objectives", [1, 2, 3, 4])
-def test_a_restored_search_goes_on_to_the_bit(n_objectives):
+def test_restored_search_equals_uninterrupted_one(n_objectives):
     whole = stepped(made(n_objectives), 12)
     state = stepped(made(n_objectives), 5).state()
     restored = made(n_objectives)
@@ -72,7 +72,7 @@ def test_a_restored_search_goes_on_to_the_bit(n_objectives):
     assert_same(stepped(restored, 7), whole)
 
 
-def test_asking_again_gives_the_same_designs_until_they_are_told():
+def test_ask_repeats_its_designs_until_tell():
     search = stepped(made(), 2)
     rows = search.ask()
     np.testing.assert_array_equal(search.ask(), rows)
@@ -80,29 +80,29 @@ def test_asking_again_gives_the_same_designs_until_they_are_told():
     assert not np.array_equal(search.ask(), rows)
 
 
-def test_evaluations_are_counted():
+def test_evaluations_count_every_batch():
     assert stepped(made(), 3).evaluations == FIRST_BATCH + 2 * SMALLEST_BATCH
 
 
 @pytest.mark.parametrize(("n_objectives", "least"), [(1, 0.999), (2, 0.98), (3, 0.9), (4, 0.7)])
-def test_the_front_of_dtlz2_is_found(n_objectives, least):
+def test_search_finds_front_of_dtlz2(n_objectives, least):
     search = stepped(made(n_objectives), 60)
     share_of_sphere = {1: 1.0, 2: np.pi / 4, 3: np.pi / 6, 4: np.pi**2 / 32}[n_objectives]
     best = 1.1**n_objectives - share_of_sphere
     assert least * best < search.hypervolume <= best
-    assert np.mean(search.rows[:, 1] == 1) > 0.9
+    assert np.mean(search.matrix[:, 1] == 1) > 0.9
 
 
-def test_the_front_is_a_front_within_the_box_and_bounded_in_number():
+def test_front_is_non_dominated_sorted_and_bounded():
     search = stepped(made(), 60)
-    assert CAPACITIES[0] <= len(search.rows) == len(search.values) <= CAPACITIES[1]
+    assert CAPACITIES[0] <= len(search.matrix) == len(search.values) <= CAPACITIES[1]
     assert front_mask(search.values).all()
     assert np.all(search.values < 1.1)
     assert np.all(np.diff(search.values[:, 0]) > 0.0)
-    np.testing.assert_array_equal(dtlz2(2)(search.rows), search.values)
+    np.testing.assert_array_equal(dtlz2(2)(search.matrix), search.values)
 
 
-def test_every_design_asked_for_lies_in_its_space():
+def test_asked_designs_lie_in_the_space():
     search = made()
     for _ in range(20):
         rows = search.ask()
@@ -114,24 +114,24 @@ def test_every_design_asked_for_lies_in_its_space():
         search.tell(rows, dtlz2(2)(rows))
 
 
-def test_a_space_without_categories_can_be_searched():
+def test_space_without_categories_is_searched():
     parameters = [p for p in MIXED if isinstance(p, FloatParameter)]
     search = FrontSearch(parameters, lambda rows: rows[:, :2] ** 2, [10.0, 10.0], seed=0)
     assert stepped(search, 30).hypervolume > 99.9
 
 
-def test_known_designs_are_taken_along():
+def test_known_designs_join_the_front():
     perfect = np.array([[0.5, 1, 0.5, 0.5, 0.5, 0.5, 0.5]])
-    unvalued = made(rows=perfect)
+    unvalued = made(known=perfect)
     assert len(unvalued.ask()) == FIRST_BATCH + 1
-    valued = made(rows=perfect, values=dtlz2(2)(perfect))
+    valued = made(known=perfect, known_values=dtlz2(2)(perfect))
     assert valued.hypervolume > 0.0
     assert valued.evaluations == 0
     for search in (stepped(unvalued, 5), stepped(valued, 5)):
-        assert np.any(np.all(search.rows == perfect, axis=1))
+        assert np.any(np.all(search.matrix == perfect, axis=1))
 
 
-def test_a_search_stalls_when_the_hypervolume_no_longer_grows():
+def test_search_stalls_when_hypervolume_stops_growing():
     search = stepped(made(), 1)
     assert not search.stalled
     while not search.stalled:
@@ -141,7 +141,7 @@ def test_a_search_stalls_when_the_hypervolume_no_longer_grows():
     assert late / early - 1.0 < 1e-3
 
 
-def test_side_pools_begin_join_and_survive_a_stop(monkeypatch):
+def test_side_pools_start_join_and_are_restored(monkeypatch):
     for name, value in (("SIDE_FROM", 2000), ("SIDE_LIFE", 1500)):
         monkeypatch.setattr(f"armwright.search.front_search.{name}", value)
     search, ages = made(), []
@@ -157,16 +157,16 @@ def test_side_pools_begin_join_and_survive_a_stop(monkeypatch):
     assert spent == pytest.approx(0.25 * (search.evaluations - 2000), abs=FIRST_BATCH)
     while other.evaluations < 12_000:
         other.step()
-    assert np.array_equal(other.rows, search.rows)
+    assert np.array_equal(other.matrix, search.matrix)
 
 
-def test_a_front_wholly_outside_the_box_is_drawn_towards_it():
+def test_front_outside_reference_box_moves_into_it():
     search = FrontSearch(MIXED, lambda rows: 5.0 + dtlz2(2)(rows), [5.9, 5.9], seed=0)
     assert len(stepped(search, 1).values) == 0 or search.hypervolume >= 0.0
     assert stepped(search, 30).hypervolume > 0.0
 
 
-def test_survivors_are_those_that_the_hypervolume_needs():
+def test_survivors_keep_most_hypervolume():
     rng = np.random.default_rng(0)
     values = rng.random((500, 2))
     kept = survivors(values, np.array([1.0, 1.0]), 5)
@@ -177,7 +177,7 @@ def test_survivors_are_those_that_the_hypervolume_needs():
     assert hypervolume(values[kept], [1.0, 1.0]) >= max(at_random)
 
 
-def test_survivors_beside_a_small_front_are_the_next_best_and_of_equals_one_is_first():
+def test_survivors_fill_a_small_front_by_rank():
     values = np.array([[9.0, 9.0], [1.0, 1.0], [1.0, 1.0], [2.0, 2.0], [0.0, 7.0], [6.0, 0.0]])
     kept = survivors(values, np.array([5.0, 5.0]), 5)
     assert kept.tolist() == [1, 2, 3, 4, 5]
@@ -187,7 +187,7 @@ def test_survivors_beside_a_small_front_are_the_next_best_and_of_equals_one_is_f
     st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0), st.integers(0, 5)), min_size=1, max_size=60),
     st.integers(1, 4),
 )
-def test_leaders_are_the_best_of_the_best_structures(points, most):
+def test_leaders_are_best_points_of_best_structures(points, most):
     values, structures = np.array(points)[:, :2], np.array([kind for _, _, kind in points])
     reference = np.array([1.5, 1.5])
     kept = leaders(values, structures, reference, most)
@@ -203,8 +203,8 @@ def test_leaders_are_the_best_of_the_best_structures(points, most):
         assert largest[kind] in boxes[chosen]
 
 
-def test_rare_structures_have_more_than_their_share_of_children():
-    columns = Columns(MIXED)
+def test_rare_structures_get_more_children():
+    columns = DesignEncoding(MIXED)
     rows = columns.random(100, np.random.default_rng(0))
     rows[:, 1] = 0.0
     rows[-1, 1] = 2.0  # the only one of its kind
@@ -215,8 +215,8 @@ def test_rare_structures_have_more_than_their_share_of_children():
     assert set(parents.tolist()) == set(range(100))
 
 
-def test_columns_are_the_space_s():
-    columns = Columns(SPACE.parameters)
+def test_encoding_round_trips_designs_of_a_space():
+    columns = DesignEncoding(SPACE.parameters)
     rows = columns.random(200, np.random.default_rng(0))
     assert rows.shape == (200, len(SPACE.parameters))
     for design in SPACE.designs(rows):
@@ -225,24 +225,24 @@ def test_columns_are_the_space_s():
     np.testing.assert_allclose(columns.from_units(columns.units(rows)), rows[:, columns.real], atol=1e-15)
 
 
-def test_numbers_beyond_a_range_are_reflected_into_it():
-    columns = Columns(MIXED[:1])
+def test_units_outside_a_range_are_reflected():
+    columns = DesignEncoding(MIXED[:1])
     units = np.array([[-0.1], [0.0], [1.2], [2.5], [-7.0]])
     np.testing.assert_allclose(columns.from_units(units)[:, 0], [-1.5, -2.0, 2.0, -2.0, -2.0], atol=1e-12)
 
 
-def test_arms_are_found_far_better_than_at_random():
+def test_search_beats_random_arms():
     problem = Problem(load_task("target-1"))
     search = stepped(
         FrontSearch(SPACE.parameters, lambda rows: problem.evaluate_matrix(rows).values, (5.0, 5.0), seed=0), 8
     )
-    columns = Columns(SPACE.parameters)
+    columns = DesignEncoding(SPACE.parameters)
     random = problem.evaluate_matrix(columns.random(search.evaluations, np.random.default_rng(0))).values
     assert search.hypervolume > 1.1 * hypervolume(random, (5.0, 5.0))
 
 
 @pytest.mark.slow
-def test_pymoo_s_nsga2_finds_no_more_on_average_over_five_seeds():
+def test_search_matches_nsga2_of_pymoo_over_five_seeds():
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
     from pymoo.optimize import minimize

@@ -53,10 +53,10 @@ def test_never_worse_and_counted(budget: int) -> None:
     refined = refine(PROBLEM.space.parameters, evaluate, rows, values, (5.0, 5.0), budget, 3)
     assert refined.evaluations == sum(counted) == 20 * POPULATION * (budget // POPULATION)
     assert np.all(refined.values[refined.improved] < values[refined.improved])
-    assert np.array_equal(refined.rows[~refined.improved], rows[~refined.improved])
+    assert np.array_equal(refined.matrix[~refined.improved], rows[~refined.improved])
     # What it says is what comes out, and it is in the space, with the joints as they were.
-    assert np.array_equal(PROBLEM.evaluate_matrix(refined.rows).values, refined.values)
-    for before, after in zip(designs, PROBLEM.space.designs(refined.rows), strict=True):
+    assert np.array_equal(PROBLEM.evaluate_matrix(refined.matrix).values, refined.values)
+    for before, after in zip(designs, PROBLEM.space.designs(refined.matrix), strict=True):
         assert PROBLEM.space.design(after.params) == after
         assert after.joints == before.joints
 
@@ -66,9 +66,9 @@ def test_same_seed_same_result_and_categories_stay() -> None:
     rows = np.array([[0.0, 0.0, 1.0], [2.0, 2.0, 0.0]])
     runs = [refine(parameters, lambda r: paraboloids(r[:, :2]), rows, paraboloids(rows[:, :2]), (1, 1), 240, 5)] * 2
     runs.append(refine(parameters, lambda r: paraboloids(r[:, :2]), rows, paraboloids(rows[:, :2]), (1, 1), 240, 6))
-    assert np.array_equal(runs[0].rows, runs[1].rows)
-    assert not np.array_equal(runs[0].rows, runs[2].rows)
-    assert np.array_equal(runs[0].rows[:, 2], rows[:, 2])
+    assert np.array_equal(runs[0].matrix, runs[1].matrix)
+    assert not np.array_equal(runs[0].matrix, runs[2].matrix)
+    assert np.array_equal(runs[0].matrix[:, 2], rows[:, 2])
 
 
 def test_a_space_without_real_parameters_is_left_alone() -> None:

@@ -41,14 +41,14 @@ def fill(box: BlackBox, n: int, first: int = 0) -> list[FinishedTrial]:
     return trials
 
 
-def test_distributions_are_the_spaces_parameters() -> None:
+def test_distributions_match_parameters_of_the_space() -> None:
     found = distributions(SPACE)
     assert list(found) == [parameter.name for parameter in SPACE.parameters]
     assert len(found) == 2 * 4 + 3
 
 
 @pytest.mark.parametrize(("name", "value"), [("link_3", 1.4), ("joint_2", "Z"), ("origin_x", float("nan"))])
-def test_what_is_outside_the_space_never_enters_the_study(name: str, value: float | str) -> None:
+def test_injected_design_outside_space_is_refused(name: str, value: float | str) -> None:
     """Optuna takes an out-of-range value with a warning; an unknown category leaves its trial RUNNING."""
     box = BlackBox(SPACE, "tpe", seed=0)
     wrong = Design({**SPACE.sample(1, 0)[0].params, name: value})
@@ -57,7 +57,7 @@ def test_what_is_outside_the_space_never_enters_the_study(name: str, value: floa
     assert box.study.get_trials(deepcopy=False) == []
 
 
-def test_an_injected_design_is_evaluated_as_it_is_and_marked() -> None:
+def test_injected_design_keeps_parameters_and_source() -> None:
     box = BlackBox(SPACE, "tpe", seed=0)
     design = SPACE.sample(1, 3)[0]
     trial, taken = box.inject(design, 0, "rules", "rules-0000")
@@ -69,7 +69,7 @@ def test_an_injected_design_is_evaluated_as_it_is_and_marked() -> None:
     assert kept.user_attrs == {"source": "rules", "proposal": "rules-0000"}
 
 
-def test_the_sampler_learns_from_injected_designs() -> None:
+def test_sampler_learns_from_injected_designs() -> None:
     """The same seed draws another design once an injected one has been told."""
     plain, taught = BlackBox(SPACE, "tpe", seed=0), BlackBox(SPACE, "tpe", seed=0)
     for box in (plain, taught):
@@ -80,7 +80,7 @@ def test_the_sampler_learns_from_injected_designs() -> None:
 
 
 @pytest.mark.parametrize("sampler", LEARNING)
-def test_every_named_sampler_learns_from_the_rules_proposals(sampler: str) -> None:
+def test_named_samplers_learn_from_rules_proposals(sampler: str) -> None:
     """What it draws depends on how well a proposal among the first ten did."""
 
     def drawn(*values: float) -> list[Design]:
@@ -96,18 +96,18 @@ def test_every_named_sampler_learns_from_the_rules_proposals(sampler: str) -> No
 
 
 @pytest.mark.parametrize("sampler", [*LEARNING, "random"])
-def test_every_named_sampler_runs_with_proposals(sampler: str) -> None:
+def test_named_samplers_run_with_proposals(sampler: str) -> None:
     run = optimize(PROBLEM, proposer="rules", sampler=sampler, n_init=10, n_step=3, n_total=6)
     assert [trial.source for trial in run.trials[10:]] == ["rules", "bbo", "bbo"] * 2
     assert len({trial.design for trial in run.trials}) == 16
     assert run.config.method.sampler == sampler
 
 
-def test_every_name_is_among_those_tested() -> None:
+def test_all_named_samplers_are_tested() -> None:
     assert set(SAMPLERS) == {"tpe", "tpe-multivariate", "nsga2", "gp", "random"}
 
 
-def test_each_factory_has_a_name_of_its_own_and_the_same_one_keeps_it() -> None:
+def test_factory_names_are_unique_and_stable() -> None:
     def made(cls: type[BaseSampler], **settings: int) -> SamplerFactory:
         return lambda seed: cls(seed=seed, **settings)
 
@@ -135,14 +135,14 @@ def test_each_factory_has_a_name_of_its_own_and_the_same_one_keeps_it() -> None:
     assert not any(" at 0x" in name for name in names)
 
 
-def test_gp_without_its_packages_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_gp_packages_name_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extras, "is_installed", lambda package: package != "torch")
     with pytest.raises(MissingExtraError, match=r'gp needs torch: pip install "armwright\[gp\]"'):
         optimize(PROBLEM, proposer="none", sampler="gp")
     optimize(PROBLEM, proposer="none", sampler="nsga2", n_init=1, n_total=1)
 
 
-def test_injected_designs_count_towards_the_startup_trials_of_tpe() -> None:
+def test_injected_designs_count_as_startup_trials_of_tpe() -> None:
     """TPE draws at random until it has 10 trials, whoever made them."""
     for n, random in ((9, True), (10, False)):
         box = BlackBox(SPACE, "tpe", seed=0)
@@ -152,7 +152,7 @@ def test_injected_designs_count_towards_the_startup_trials_of_tpe() -> None:
         assert (drawn == box.__class__(SPACE, "random", seed=0).draw(n, BBO)[1]) is random
 
 
-def test_a_restored_study_goes_on_as_if_it_had_never_stopped() -> None:
+def test_restored_study_equals_uninterrupted_one() -> None:
     whole = BlackBox(SPACE, "tpe", seed=5)
     trials = fill(whole, 25)
     resumed = BlackBox(SPACE, "tpe", seed=5)
@@ -160,7 +160,7 @@ def test_a_restored_study_goes_on_as_if_it_had_never_stopped() -> None:
     assert [trial.design for trial in fill(resumed, 8, first=17)] == [trial.design for trial in trials[17:]]
 
 
-def test_a_resumed_sampler_does_not_repeat_its_first_draws() -> None:
+def test_resumed_sampler_does_not_repeat_draws() -> None:
     """One seed for the whole run would: a sampler made anew begins at its beginning."""
     first = fill(BlackBox(SPACE, "random", seed=0), 20)
     resumed = BlackBox(SPACE, "random", seed=0)
@@ -169,14 +169,14 @@ def test_a_resumed_sampler_does_not_repeat_its_first_draws() -> None:
     assert not {trial.design for trial in first} & {trial.design for trial in again}
 
 
-def test_random_trials_do_not_depend_on_the_sampler() -> None:
+def test_random_trials_are_independent_of_the_sampler() -> None:
     """So that methods that are compared by seed begin alike."""
     a = fill(BlackBox(SPACE, "tpe", seed=3), 10)
     b = fill(BlackBox(SPACE, "random", seed=3), 10)
     assert [trial.design for trial in a] == [trial.design for trial in b]
 
 
-def test_genetic_samplers_take_injected_designs_as_parents() -> None:
+def test_genetic_samplers_use_injected_designs_as_parents() -> None:
     """NSGA-II passes over enqueued trials unless they were given a generation."""
 
     def nsga2(seed: int) -> BaseSampler:
@@ -194,7 +194,7 @@ def test_genetic_samplers_take_injected_designs_as_parents() -> None:
     assert child in injected  # without crossover and mutation a child is a parent
 
 
-def test_a_target_out_of_reach_is_a_finite_objective_not_a_failure() -> None:
+def test_unreachable_target_is_a_finite_objective() -> None:
     """FAILED trials would teach the sampler nothing."""
     problem = Problem(Task(name="far", targets=((50.0, 0.0, 0.0),)))
     box = BlackBox(SPACE, "tpe", seed=0)
@@ -204,7 +204,7 @@ def test_a_target_out_of_reach_is_a_finite_objective_not_a_failure() -> None:
     assert 40.0 < box.study.trials[0].values[0] < 60.0
 
 
-def test_tpe_is_the_papers() -> None:
+def test_tpe_has_settings_of_the_paper() -> None:
     """The same draws as a plain Optuna study with the sampler that docs/method.md §5 pins."""
     box, plain = BlackBox(SPACE, "tpe", seed=4), optuna.create_study(directions=["minimize"] * 2)
     for trial in fill(box, 30):
@@ -216,14 +216,14 @@ def test_tpe_is_the_papers() -> None:
         plain.tell(asked, trial.values)
 
 
-def test_an_unknown_sampler_is_refused_by_name() -> None:
+def test_unknown_sampler_is_refused_with_suggestion() -> None:
     with pytest.raises(SettingsError, match=r'unknown sampler "tp".*Did you mean "tpe"'):
         sampler_factory("tp")
     with pytest.raises(SettingsError, match=r'Did you mean "tpe-multivariate".*tpe-multivariate, nsga2, gp, random'):
         sampler_factory("tpe_multivariate")
 
 
-def test_the_users_optuna_verbosity_is_left_as_it_was(capfd: pytest.CaptureFixture[str]) -> None:
+def test_optuna_verbosity_of_the_user_is_restored(capfd: pytest.CaptureFixture[str]) -> None:
     before = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.INFO)
     try:

@@ -38,7 +38,7 @@ from armwright.robot.urdf_reader import UrdfArm, read_urdf
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import FrontMember, History
 from armwright.search.cma_es import refine
-from armwright.search.encoding import Columns
+from armwright.search.encoding import DesignEncoding
 from armwright.seeding import derived_seed
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import FloatParameter
@@ -248,11 +248,11 @@ def _searched(problem: Problem, arm: Arm, seed: int) -> Vector:
             losses[rows, 0] = np.where(missed > 0.0, 1.0 + missed, torque / (1.0 + torque))
         return losses
 
-    rows = Columns(parameters).random(POSITIONS, np.random.default_rng(derived_seed(seed, 0)))
+    rows = DesignEncoding(parameters).random(POSITIONS, np.random.default_rng(derived_seed(seed, 0)))
     losses = evaluate(rows)
     best = np.argsort(losses[:, 0], kind="stable")[:REFINED]
     refined = refine(parameters, evaluate, rows[best], losses[best], (1.0,), REFINEMENT, derived_seed(seed, 1))
-    x, y, z = refined.rows[refined.values[:, 0].argmin()].tolist()
+    x, y, z = refined.matrix[refined.values[:, 0].argmin()].tolist()
     return x, y, z
 
 

@@ -1,7 +1,7 @@
-"""Refinement: the real parameters of designs, each tuned by a small CMA-ES of its own, all side by side.
+"""CMA-ES for many designs at once: one small strategy per design tunes its real parameters, categories stay.
 
-Hansen, The CMA Evolution Strategy: A Tutorial, 2016 (arXiv:1604.00772), with its default constants. Categories stay as
-they are. A design is replaced only by one that is better in every objective.
+Hansen, The CMA Evolution Strategy: A Tutorial, 2016 (arXiv:1604.00772), with its default constants. A design is
+replaced only by one that is better in every objective.
 """
 
 import math
@@ -9,71 +9,81 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.search.encoding import Columns
+from armwright.search.encoding import DesignEncoding
 from armwright.spaces.parameters import Parameter
 
-POPULATION = 12  # samples a design and generation
+POPULATION = 12  # samples per design and generation
 FIRST_STEP = 0.05  # of a parameter's range
 LONGEST_STEP = 0.3
 
 
 @dataclass(frozen=True)
 class Refined:
-    """N designs and what they became.
+    """N refined designs.
 
-    rows, values: (N, P) and (N, M); unchanged where nothing better was found.
-    improved: (N,) whether something was.
-    evaluations: how many were spent in all.
+    Attributes:
+        matrix: (N, P) designs, unchanged if none better was found.
+        values: (N, M) their objective values.
+        improved: (N,) whether a better one was found.
+        evaluations: number of evaluations spent in all.
     """
 
-    rows: Array
+    matrix: Array
     values: Array
-    improved: np.ndarray
+    improved: NDArray[np.bool_]
     evaluations: int
 
 
 def refine(
     parameters: Sequence[Parameter],
     evaluate: Callable[[Array], Array],
-    rows: Array,
+    matrix: Array,
     values: Array,
     scale: Sequence[float],
     budget: int,
     seed: int,
 ) -> Refined:
-    """Designs that are better than `rows` in all objectives, by the same amount of each one's scale.
+    """Search for designs that are better than the given ones in every objective.
 
-    rows, values: (N, P) designs and (N, M) their values, all minimised.
-    scale: (M,) what counts as much in one objective as in another, such as the reference point.
-    budget: evaluations for each design.
+    The loss is the largest increase of an objective, relative to its scale.
+
+    Args:
+        parameters: P parameters of the design space.
+        evaluate: maps an (N, P) matrix of designs to (N, M) values, all minimised.
+        matrix: (N, P) designs.
+        values: (N, M) values of `matrix`.
+        scale: (M,) amounts that weigh the same in each objective, such as the reference point.
+        budget: evaluations per design.
+        seed: of all random numbers.
     """
-    columns = Columns(parameters)
-    if not len(columns.real):
-        return Refined(rows, values, np.zeros(len(rows), dtype=bool), 0)
-    best_rows, best_values = rows.copy(), values.copy()
-    best = np.zeros(len(rows))  # how much worse than the given design, in the objective that lost most
-    strategy = _Strategies(columns.units(rows), np.random.default_rng(seed))
+    encoding = DesignEncoding(parameters)
+    if not len(encoding.real):
+        return Refined(matrix, values, np.zeros(len(matrix), dtype=bool), 0)
+    best_matrix, best_values = matrix.copy(), values.copy()
+    best_loss = np.zeros(len(matrix))
+    strategies = _Strategies(encoding.units(matrix), np.random.default_rng(seed))
     generations = budget // POPULATION
-    every = np.arange(len(rows))
+    every = np.arange(len(matrix))
     for _ in range(generations):
-        units = strategy.ask()  # (N, K, R)
-        samples = np.repeat(rows[:, None], POPULATION, axis=1)
-        samples[..., columns.real] = columns.from_units(units)
-        found = evaluate(samples.reshape(-1, rows.shape[1])).reshape(len(rows), POPULATION, -1)
-        loss = np.max((found - values[:, None]) / np.asarray(scale), axis=-1)  # (N, K)
+        units = strategies.ask()  # (N, K, R)
+        samples = np.repeat(matrix[:, None], POPULATION, axis=1)
+        samples[..., encoding.real] = encoding.from_units(units)
+        sampled = evaluate(samples.reshape(-1, matrix.shape[1])).reshape(len(matrix), POPULATION, -1)
+        loss = np.max((sampled - values[:, None]) / np.asarray(scale), axis=-1)  # (N, K)
         first = loss.argmin(axis=1)
-        better = loss[every, first] < best
-        best[better] = loss[every, first][better]
-        best_rows[better] = samples[every, first][better]
-        best_values[better] = found[every, first][better]
-        strategy.tell(units, loss)
-    return Refined(best_rows, best_values, best < 0.0, generations * POPULATION * len(rows))
+        better = loss[every, first] < best_loss
+        best_loss[better] = loss[every, first][better]
+        best_matrix[better] = samples[every, first][better]
+        best_values[better] = sampled[every, first][better]
+        strategies.tell(units, loss)
+    return Refined(best_matrix, best_values, best_loss < 0.0, generations * POPULATION * len(matrix))
 
 
 class _Strategies:
-    """N strategies in R dimensions, on the unit cube."""
+    """N independent CMA-ES strategies in R dimensions, on the unit cube."""
 
     def __init__(self, means: Array, rng: np.random.Generator) -> None:
         n, dims = means.shape
@@ -95,7 +105,7 @@ class _Strategies:
         self._expected = math.sqrt(dims) * (1 - 1 / (4 * dims) + 1 / (21 * dims**2))  # length of a normal vector
 
     def ask(self) -> Array:
-        """(N, K, R) samples, clipped to the unit cube."""
+        """Draw (N, K, R) samples, clipped to the unit cube."""
         spread, self._axes = np.linalg.eigh(self._covariance)
         self._lengths = np.sqrt(np.maximum(spread, 1e-14))
         n, dims = self._mean.shape
@@ -104,7 +114,7 @@ class _Strategies:
         return np.clip(self._mean[:, None] + self._sigma[:, None, None] * steps, 0.0, 1.0)
 
     def tell(self, units: Array, loss: Array) -> None:
-        """Adapts means, steps and covariances to samples (N, K, R) and their losses (N, K)."""
+        """Adapt means, step sizes and covariances to samples (N, K, R) and their losses (N, K)."""
         self._generation += 1
         order = np.argsort(loss, axis=1, kind="stable")[:, : len(self._weights), None]
         steps = (np.take_along_axis(units, order, axis=1) - self._mean[:, None]) / self._sigma[:, None, None]
@@ -115,14 +125,14 @@ class _Strategies:
         c = self._c_sigma
         self._sigma_path = (1 - c) * self._sigma_path + math.sqrt(c * (2 - c) * self._mass) * whitened
         length = np.linalg.norm(self._sigma_path, axis=1)
-        # Where steps grow fast the path of the covariance stands still, as it would grow too fast.
-        settled = math.sqrt(1 - (1 - c) ** (2 * self._generation))
-        follows = length / settled < (1.4 + 2 / (step.shape[1] + 1)) * self._expected
+        # The covariance path pauses while the step size grows fast, or it would grow too fast (h_sigma).
+        normaliser = math.sqrt(1 - (1 - c) ** (2 * self._generation))
+        h_sigma = length / normaliser < (1.4 + 2 / (step.shape[1] + 1)) * self._expected
         growth = np.exp(c / self._damping * (length / self._expected - 1))
         self._sigma = np.clip(self._sigma * growth, 1e-6, LONGEST_STEP)
 
         c = self._c_path
-        self._path = (1 - c) * self._path + follows[:, None] * math.sqrt(c * (2 - c) * self._mass) * step
+        self._path = (1 - c) * self._path + h_sigma[:, None] * math.sqrt(c * (2 - c) * self._mass) * step
         rank_one = self._path[:, :, None] * self._path[:, None, :]
         rank_mu = np.einsum("k,nki,nkj->nij", self._weights, steps, steps)
         kept = 1 - self._c_one - self._c_mu

@@ -32,7 +32,7 @@ def refine_one(history: History, seed: int) -> Refinement:
     """The design of the front that is worth it most, refined; seed: the run's."""
     member = next_to_refine(history)
     refined = refine_members(history, [member], derived_seed(seed, REFINING, len(history)), EVALUATIONS)
-    (design,) = history.problem.space.designs(refined.rows)
+    (design,) = history.problem.space.designs(refined.matrix)
     return Refinement(member.number, design if refined.improved[0] else None, refined.evaluations)
 
 

@@ -1,7 +1,7 @@
-"""The black box: Optuna asks and is told. The only file that builds Optuna studies and samplers.
+"""Black-box search by Optuna: samplers, and an in-memory study that is asked for one trial at a time.
 
-A fresh sampler, seeded from (seed, trial number), draws each trial: a resumed sampler with one seed for the
-whole run would repeat its first draws, this one goes on as if it had never stopped.
+Each trial is drawn by a new sampler, seeded from (seed, trial number). One sampler with one seed for the whole run
+would repeat its first draws after a resume.
 """
 
 import warnings
@@ -29,9 +29,14 @@ from armwright.spaces.parameters import Design, FloatParameter, ParameterValue
 
 SamplerFactory = Callable[[int], BaseSampler]
 
-# Of NSGA-II. 200 trials are then 20 generations, and the 10 random trials are the first. Mean hypervolume over the
-# iterations, target-1 to -3, three seeds each, populations of 5, 10, 20, 30, 50: black box alone 10.3, 10.4, 8.8, 9.8,
-# 8.7 (TPE 12.0); with the rules 14.7, 14.7, 14.7, 14.5, 14.5 (TPE 14.7). So few seeds tell 10 from 50, not from 5.
+# Population of NSGA-II; the 10 random trials are its first generation. Mean hypervolume over the iterations, target-1
+# to -3, three seeds each:
+#
+#   population            5    10    20    30    50   (TPE)
+#   black box alone    10.3  10.4   8.8   9.8   8.7    12.0
+#   with the rules     14.7  14.7  14.7  14.5  14.5    14.7
+#
+# Three seeds separate 10 from 50, but not from 5.
 POPULATION = 10
 
 
@@ -49,7 +54,7 @@ def _nsga2(seed: int) -> BaseSampler:
 
 def _gp(seed: int) -> BaseSampler:
     with warnings.catch_warnings():
-        # The argument is what Optuna calls experimental: it says that our objectives have no noise.
+        # Optuna calls the argument experimental. It declares that the objectives have no noise.
         warnings.simplefilter("ignore", ExperimentalWarning)
         return GPSampler(n_startup_trials=10, deterministic_objective=True, seed=seed)
 
@@ -68,20 +73,22 @@ SAMPLERS: dict[str, SamplerFactory] = {
 
 
 def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
-    """The factory `seed -> Optuna sampler` of a name, or the given one.
+    """Return the factory `seed -> Optuna sampler` of a name, or the given factory.
 
-    MissingExtraError where `gp` lacks its packages.
+    Raises:
+        SettingsError: the name is unknown, or `sampler` is not a factory.
+        MissingExtraError: the packages of `gp` are not installed.
     """
     if isinstance(sampler, BaseSampler) or not (isinstance(sampler, str) or callable(sampler)):
         raise SettingsError(
-            f"sampler = {sampler!r}: a name ({', '.join(SAMPLERS)}) or a factory seed -> sampler is needed, "
-            "because every trial gets a sampler of its own"
+            f"expected a sampler name ({', '.join(SAMPLERS)}) or a factory seed -> sampler, got {sampler!r}; every "
+            "trial needs a new sampler"
         )
     if not isinstance(sampler, str):
         return sampler
     if sampler not in SAMPLERS:
         raise SettingsError(
-            f'unknown sampler "{sampler}".{did_you_mean(sampler, SAMPLERS)} Samplers: {", ".join(SAMPLERS)}'
+            f'unknown sampler "{sampler}".{did_you_mean(sampler, SAMPLERS)} Available: {", ".join(SAMPLERS)}'
         )
     if sampler == "gp":
         check_extra("gp", "the sampler gp")
@@ -89,37 +96,38 @@ def sampler_factory(sampler: str | SamplerFactory) -> SamplerFactory:
 
 
 def sampler_name(sampler: str | SamplerFactory) -> str:
-    """What a run's settings call a sampler, so that a run that is resumed with another one is refused.
+    """Return the name of a sampler in the settings of a run; a run resumes only with the same name.
 
-    A factory by its module and name; a lambda or a function within a function has no name of its own, and is told by
-    its line and by a sum over what it holds.
+    A factory is named by its module and name. A lambda or a nested function, which has no unique name, is named by its
+    line and a checksum of its code and of the values it captures.
     """
     factory = sampler_factory(sampler)
-    return sampler if isinstance(sampler, str) else _named(factory)
+    return sampler if isinstance(sampler, str) else _name_of(factory)
 
 
-def _named(thing: Any) -> str:
-    if isinstance(thing, partial):
-        given = [_named(value) for value in thing.args]
-        given += [f"{name}={_named(value)}" for name, value in thing.keywords.items()]
-        return f"partial({', '.join([_named(thing.func), *given])})"
-    if isinstance(thing, MethodType):
-        return f"{_named(thing.__self__)}.{thing.__name__}"
-    if isinstance(thing, FunctionType) and ("<lambda>" in thing.__qualname__ or "<locals>" in thing.__qualname__):
-        held = [*(thing.__defaults__ or ()), *(cell.cell_contents for cell in thing.__closure__ or ())]
-        # A function that holds itself would never end.
-        named = [list(_constants(v.__code__)) if isinstance(v, FunctionType) else _named(v) for v in held]
-        words = repr([*_constants(thing.__code__), *named])
-        line = f"line {thing.__code__.co_firstlineno} ({crc32(words.encode()):08x})"
-        return f"{line} of {thing.__module__}, {thing.__qualname__}"  # what differs first: long settings are shown cut
-    if hasattr(thing, "__qualname__"):  # functions and classes
-        return f"{getattr(thing, '__module__', None)}.{thing.__qualname__}"
-    own_words = type(thing).__repr__ is not object.__repr__  # the others hold an address, which is new in each process
-    return repr(thing) if own_words else f"{_named(type(thing))}()"
+def _name_of(value: Any) -> str:
+    """Name a factory, or a value that it captures, so that the name is equal in every process."""
+    if isinstance(value, partial):
+        arguments = [_name_of(argument) for argument in value.args]
+        arguments += [f"{name}={_name_of(argument)}" for name, argument in value.keywords.items()]
+        return f"partial({', '.join([_name_of(value.func), *arguments])})"
+    if isinstance(value, MethodType):
+        return f"{_name_of(value.__self__)}.{value.__name__}"
+    if isinstance(value, FunctionType) and ("<lambda>" in value.__qualname__ or "<locals>" in value.__qualname__):
+        captured = [*(value.__defaults__ or ()), *(cell.cell_contents for cell in value.__closure__ or ())]
+        # Captured functions by their constants only: a function that captures itself would recurse without end.
+        names = [list(_constants(v.__code__)) if isinstance(v, FunctionType) else _name_of(v) for v in captured]
+        checksum = crc32(repr([*_constants(value.__code__), *names]).encode())
+        line = f"line {value.__code__.co_firstlineno} ({checksum:08x})"
+        return f"{line} of {value.__module__}, {value.__qualname__}"  # the line first: long settings are shown cut
+    if hasattr(value, "__qualname__"):  # functions and classes
+        return f"{getattr(value, '__module__', None)}.{value.__qualname__}"
+    has_own_repr = type(value).__repr__ is not object.__repr__  # the default one holds an address
+    return repr(value) if has_own_repr else f"{_name_of(type(value))}()"
 
 
 def _constants(code: CodeType) -> Iterator[str]:
-    """What a function's code uses by name, and the values in it."""
+    """Yield the names that the code of a function uses, and its constants."""
     yield from code.co_names
     for value in code.co_consts:
         if isinstance(value, CodeType):
@@ -129,9 +137,14 @@ def _constants(code: CodeType) -> Iterator[str]:
 
 
 class BlackBox:
-    """An in-memory Optuna study over a design space, asked for one trial at a time.
+    """In-memory Optuna study over a design space.
 
-    constraints: their names. Optuna's samplers prefer trials that meet them (Deb's rules), its best trials do.
+    Args:
+        space: the design space.
+        sampler: name of a sampler, or a factory seed -> sampler.
+        seed: of the run.
+        n_objectives: number of objectives, all minimised.
+        constraints: names of the constraints; Optuna's samplers prefer trials that satisfy them (Deb's rules).
     """
 
     def __init__(
@@ -154,11 +167,11 @@ class BlackBox:
 
     @property
     def study(self) -> optuna.Study:
-        """Optuna's own object."""
+        """Study of Optuna."""
         return self._study
 
     def restore(self, trials: Iterable[FinishedTrial]) -> None:
-        """Adds finished trials, as a resumed run finds them on disk."""
+        """Add the finished trials of a run that is resumed."""
         for trial in trials:
             params = self._space.free_values(trial.design)
             self._study.add_trial(
@@ -176,52 +189,57 @@ class BlackBox:
         self._study_notes = self._storage.get_study_system_attrs(self._study_id)
 
     def draw(self, number: int, source: str) -> tuple[Trial, Design]:
-        """The sampler's next design; uniformly random where source is `random`."""
+        """Return a trial with the sampler's next design, drawn uniformly if `source` is `random`."""
         seed = derived_seed(self._seed, SAMPLING, number)
         sampler = self._factory(seed)
         self._study.sampler = _random(seed) if source == RANDOM else sampler
         trial = self._study.ask()
-        design = self._suggested(trial)
-        self._enlist(sampler, trial)
+        design = self._suggest(trial)
+        self._assign_generation(sampler, trial)
         for name, value in _attributes(source, None).items():
             trial.set_user_attr(name, value)
         return trial, design
 
     def inject(self, design: Design, number: int, source: str, proposal: str | None) -> tuple[Trial, Design]:
-        """A trial for a design from elsewhere, which the sampler will learn from, and the design as the space has it.
+        """Return a trial with a design from another source, and the design with normalised parameters.
 
-        DesignError where it is not in the space.
+        Raises:
+            DesignError: the design is not in the space.
         """
-        # Checked here because Optuna takes out-of-range values with only a warning, and leaves a trial with an
-        # unknown category RUNNING for ever.
+        # Optuna only warns of values out of range, and leaves a trial with an unknown category RUNNING for ever.
         checked = self._space.design(design.params)
         sampler = self._study.sampler = self._factory(derived_seed(self._seed, SAMPLING, number))
         self._study.enqueue_trial(self._space.free_values(checked), user_attrs=_attributes(source, proposal))
         trial = self._study.ask()
-        self._suggested(trial)
-        self._enlist(sampler, trial)
+        self._suggest(trial)
+        self._assign_generation(sampler, trial)
         return trial, checked
 
     def tell(
-        self, trial: Trial, values: Iterable[float], constraints: Iterable[float] = ()
+        self, trial: Trial, values: Iterable[float], violations: Iterable[float] = ()
     ) -> dict[str, dict[str, Any]]:
-        """The trial's values, and how far it breaks each constraint; from now on the sampler learns from it.
+        """Pass the result of a trial to the sampler.
 
-        Returns what the sampler noted meanwhile on the trial and on the study (a genetic one: generations, parents):
-        `restore` needs it.
+        Args:
+            trial: a trial from `draw` or `inject`.
+            values: objective values.
+            violations: constraint violations; satisfied at <= 0.
+
+        Returns:
+            Notes of the sampler on the trial and on the study, such as generations and parents; needed by `restore`.
         """
-        for name, broken in zip(self._constraints, constraints, strict=True):
-            trial.set_constraint(name, broken)
-        told = self._study.tell(trial, list(values))
+        for name, violation in zip(self._constraints, violations, strict=True):
+            trial.set_constraint(name, violation)
+        finished = self._study.tell(trial, list(values))
         before, self._study_notes = self._study_notes, self._storage.get_study_system_attrs(self._study_id)
         notes = {
-            "trial": _notes(told.system_attrs, self._constraints),
+            "trial": _notes(finished.system_attrs, self._constraints),
             "study": {name: note for name, note in self._study_notes.items() if before.get(name) != note},
         }
-        return {place: noted for place, noted in notes.items() if noted}
+        return {level: noted for level, noted in notes.items() if noted}
 
-    def _suggested(self, trial: Trial) -> Design:
-        """The design that a trial suggests: parameter by parameter, as some decide which of the others matter."""
+    def _suggest(self, trial: Trial) -> Design:
+        """Return the design that a trial suggests; earlier parameters decide which of the later ones are free."""
         params: dict[str, ParameterValue] = {}
         for parameter in self._space.parameters:
             if not self._space.is_free(parameter.name, self._space.from_free_values(params).params):
@@ -234,18 +252,18 @@ class BlackBox:
                 params[parameter.name] = trial.suggest_categorical(parameter.name, parameter.choices)
         return self._space.from_free_values(params)
 
-    def _enlist(self, sampler: BaseSampler, trial: Trial) -> None:
-        """Gives the trial a generation, where the sampler has such.
+    def _assign_generation(self, sampler: BaseSampler, trial: Trial) -> None:
+        """Assign a generation to the trial, if the sampler is a genetic one.
 
-        Genetic samplers pass over trials without one, and give one only to trials whose values they draw.
+        Genetic samplers ignore trials without a generation, and assign one only to trials whose values they draw.
         """
-        enlist = getattr(sampler, "get_trial_generation", None)
-        if enlist is not None:
-            enlist(self._study, self._study.get_trials(deepcopy=False)[trial.number])
+        assign = getattr(sampler, "get_trial_generation", None)
+        if assign is not None:
+            assign(self._study, self._study.get_trials(deepcopy=False)[trial.number])
 
 
 def _notes(attributes: Mapping[str, Any], constraints: Sequence[str]) -> dict[str, Any]:
-    """What a sampler noted on a trial: without what Optuna itself keeps there."""
+    """Return the system attributes of a trial that the sampler wrote, without those of Optuna itself."""
     own = {"fixed_params", *(f"constraints:{name}" for name in constraints)}
     return {name: note for name, note in attributes.items() if name not in own}
 
@@ -255,6 +273,6 @@ def _attributes(source: str, proposal: str | None) -> dict[str, Any]:
 
 
 def quiet_study(storage: InMemoryStorage, directions: Sequence[StudyDirection]) -> optuna.Study:
-    """A new study that Optuna does not announce."""
+    """Create a study without Optuna's log message."""
     with quietly():
         return optuna.create_study(storage=storage, directions=directions)

@@ -1,4 +1,4 @@
-"""Which designs stay: those that the hypervolume would lose most without, in a bounded number."""
+"""Selection by hypervolume: which designs stay in a pool of limited size."""
 
 import moocore
 import numpy as np
@@ -7,28 +7,29 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.pareto import front_mask
 
-Rows = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
-MOST_EXACT = 3  # objectives; with more, exact contributions cost seconds a thousand points
+MOST_EXACT = 3  # objectives; with more, exact contributions take seconds per thousand points
 
 
-def front(values: Array, reference_point: Array) -> Rows:
-    """The rows of `values` (N, M) that are on the front and within the reference box."""
+def front(values: Array, reference_point: Array) -> Indices:
+    """Return the indices of `values` (N, M) on the Pareto front and within the reference box."""
     within = np.flatnonzero(np.all(values < reference_point, axis=1))
     return within[front_mask(values[within])]
 
 
-def nearest(values: Array, reference_point: Array, most: int) -> Rows:
-    """The rows on the front of `values` (N, M), at most so many, that exceed the reference box by the least share."""
+def nearest(values: Array, reference_point: Array, most: int) -> Indices:
+    """Return the indices of at most `most` points on the front of `values` (N, M), nearest to the reference box."""
     best = np.flatnonzero(front_mask(values))
     excess = np.maximum(values[best] / reference_point - 1.0, 0.0).sum(axis=1)
     return best[np.argsort(excess, kind="stable")[:most]]
 
 
-def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
-    """The rows of `values` (N, M) that stay, at most `capacity`: of the front, or the whole front and the next best.
+def survivors(values: Array, reference_point: Array, capacity: int) -> Indices:
+    """Return the indices of at most `capacity` of `values` (N, M): the front, thinned or filled up.
 
-    Points within the reference box come before those outside, which are the better the less they exceed it.
+    The front is filled up by Pareto rank. Points within the reference box come first, then those outside, ranked by how
+    far they exceed it.
     """
     best = front(values, reference_point)
     if len(best) >= capacity:
@@ -40,11 +41,18 @@ def survivors(values: Array, reference_point: Array, capacity: int) -> Rows:
     return np.concatenate([best, others[np.lexsort((rank, outside))]])[:capacity]
 
 
-def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int) -> Rows:
-    """Of the `most` best structures (N,), the rows of `values` (N, M) that are best in one of M + 1 ways.
+def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int) -> Indices:
+    """Return the indices of the best points of the best structures.
 
-    A structure is as good as the largest box of its points: what a point dominates alone, bounded by the reference
-    point. The other ways give the gain in one objective more weight, so that not only the middle of its front stays.
+    A structure is as good as its point with the largest box: the volume that the point alone dominates, bounded by the
+    reference point. Of each structure M + 1 points are kept: that one, and one for each objective, whose box is
+    weighted by the gain in this objective, so that the ends of its front stay, too.
+
+    Args:
+        values: (N, M) objective values.
+        structures: (N,) structure of each point.
+        reference_point: (M,) bound of the boxes.
+        most: number of structures.
     """
     gains = np.maximum(reference_point - values, 0.0)
     boxes = np.prod(gains, axis=1)
@@ -53,34 +61,34 @@ def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array
     largest = np.maximum.reduceat(boxes[order], starts)
     leading = np.argsort(-largest, kind="stable")[:most]
     sizes = np.diff(starts, append=len(order))
-    found: list[Rows] = []
-    for worth in (boxes, *(boxes[:, None] * gains**2).T):
-        best = np.repeat(np.maximum.reduceat(worth[order], starts), sizes)
-        places = np.flatnonzero(worth[order] == best)
-        first = places[np.searchsorted(places, starts[leading])]
-        found.append(order[first])
-    return np.unique(np.concatenate(found))
+    kept: list[Indices] = []
+    for weighted in (boxes, *(boxes[:, None] * gains**2).T):
+        best = np.repeat(np.maximum.reduceat(weighted[order], starts), sizes)
+        candidates = np.flatnonzero(weighted[order] == best)
+        first = candidates[np.searchsorted(candidates, starts[leading])]
+        kept.append(order[first])
+    return np.unique(np.concatenate(kept))
 
 
-def thinned(front: Array, reference_point: Array, capacity: int) -> Rows:
-    """The rows, at most `capacity`, that keep most of the hypervolume of a front (N, M) within the reference box."""
+def thinned(front: Array, reference_point: Array, capacity: int) -> Indices:
+    """Return the indices of at most `capacity` points of a `front` (N, M) that keep most of its hypervolume."""
     kept = np.arange(len(front))
     if len(kept) > capacity and front.shape[1] > MOST_EXACT:
-        return _winners(front, reference_point, capacity)
+        return _farthest(front, reference_point, capacity)
     while len(kept) > capacity:
-        # Contributions change as neighbours go, so not all of the surplus goes at once.
+        # Contributions change when neighbours are removed, so the surplus is removed in several rounds.
         contributions = moocore.hv_contributions(front[kept], ref=reference_point)
         surplus = len(kept) - capacity
-        going = min(surplus, max(-(-surplus // 2), capacity // 8))
-        kept = np.delete(kept, np.argsort(contributions, kind="stable")[:going])
+        n_removed = min(surplus, max(-(-surplus // 2), capacity // 8))
+        kept = np.delete(kept, np.argsort(contributions, kind="stable")[:n_removed])
     return kept
 
 
-def _winners(front: Array, reference_point: Array, n: int) -> Rows:
-    """The points that reach farthest from the reference point along one of `n` fixed directions.
+def _farthest(front: Array, reference_point: Array, n: int) -> Indices:
+    """Return the points that reach farthest from the reference point along one of `n` fixed directions.
 
     The mean of (farthest reach) ** M over all directions is proportional to the hypervolume (Deng & Zhang,
-    IEEE Trans. Evol. Comput. 23(6), 2019), so a point that wins nowhere hardly contributes.
+    IEEE Trans. Evol. Comput. 23(6), 2019), so the other points contribute little.
     """
     directions = np.abs(np.random.default_rng(0).standard_normal((n, front.shape[1])))
     gain = reference_point - front

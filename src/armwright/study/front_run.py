@@ -208,7 +208,7 @@ class _Search:
 
     def _progress(self, budget: Budget) -> FrontProgress:
         search = self.search
-        return FrontProgress(search.evaluations, self.seconds, search.hypervolume, len(search.rows), budget)
+        return FrontProgress(search.evaluations, self.seconds, search.hypervolume, len(search.matrix), budget)
 
     def _save(self, state: Mapping[str, Any]) -> None:
         if self.folder is None:
@@ -239,10 +239,10 @@ class _Search:
 
     def _finish(self, ended: str, resumed: int) -> FrontRun:
         kept = self.search.best(MOST_DESIGNS)
-        designs, values = self.problem.space.designs(self.search.rows[kept]), self.search.values[kept]
+        designs, values = self.problem.space.designs(self.search.matrix[kept]), self.search.values[kept]
         broken = np.empty((len(designs), 0))
         if self.problem.constraints:  # the search knows their ranks alone
-            outcomes = self.problem.evaluate_matrix(self.search.rows[kept])
+            outcomes = self.problem.evaluate_matrix(self.search.matrix[kept])
             values, broken = outcomes.values, outcomes.violations
         trials = [
             FinishedTrial(

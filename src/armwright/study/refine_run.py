@@ -86,8 +86,8 @@ def _trials(history: History, members: Sequence[FrontMember], refined: Refined) 
     Where none did, the summary tells of the evaluations: under `polish`, and in its sum.
     """
     better = np.flatnonzero(refined.improved).tolist()
-    designs = history.problem.space.designs(refined.rows[better])
-    violations = history.problem.evaluate_matrix(refined.rows[better]).violations
+    designs = history.problem.space.designs(refined.matrix[better])
+    violations = history.problem.evaluate_matrix(refined.matrix[better]).violations
     return [
         FinishedTrial(
             len(history) + k,
