@@ -29,6 +29,7 @@ def test_type_checkers_see_the_same_names() -> None:
     assert set(aw.__all__) == imported - {"Any", "TYPE_CHECKING", "import_module"}
 
 
+@pytest.mark.slow
 def test_the_python_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     readme = (ROOT / "README.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)

@@ -101,6 +101,7 @@ def test_without_a_model_an_example_says_so() -> None:
     assert "2 proposals by rules" in said
 
 
+@pytest.mark.slow
 def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out="runs/target-1-seed0")
     export_study(Path("runs/target-1-seed0"))

@@ -209,6 +209,7 @@ def test_what_an_arm_can_do_is_found(rows: int) -> None:
 
 
 @pytest.mark.parametrize("lanes", [1, 2])
+@pytest.mark.slow
 def test_lanes_do_not_change_the_bits(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     arms, asked = stack_arms(tooled_arms(60, 6, 12)), goals([2, 3, 0, 3, 2, 2, 3, 0, 2])
     points = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 3))

@@ -392,6 +392,7 @@ def test_a_study_of_ones_own_says_how_far_its_trials_break_constraints() -> None
         study_history(silent.study, problem)
 
 
+@pytest.mark.slow
 def test_a_search_for_the_front_keeps_the_bounds_and_goes_on_to_the_bit(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
     whole = find_front(problem, budget=12_000, stop_at_stall=False, out=tmp_path / "whole")

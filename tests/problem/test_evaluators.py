@@ -188,6 +188,7 @@ def test_what_cannot_be_loaded_is_said_in_one_line(file: Path, place: str, words
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.slow
 def test_a_run_is_resumed_with_its_evaluator_alone(file: Path) -> None:
     """The file may be mended; that is noted. The run folder names it, and never loads it."""
     task = WHOLE

@@ -48,6 +48,7 @@ def test_exact_values_are_the_references(designs: list[Design]) -> None:
     agree(found.exact, values_of(PROBLEM, designs))
 
 
+@pytest.mark.slow
 def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None:
     rows = PROBLEM.space.matrix(designs)
     copies = list(moved(PROBLEM.space, rows))
@@ -61,6 +62,7 @@ def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None
     agree(found.moved, worst)
 
 
+@pytest.mark.slow
 def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
     found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
     shape = STARTS, len(PROBLEM.task.targets), PROBLEM.space.joints

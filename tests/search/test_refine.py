@@ -152,6 +152,7 @@ def test_polish_refuses_what_it_cannot_do(run: Run, tmp_path: Path) -> None:
         polish_run(run.folder)
 
 
+@pytest.mark.slow
 def test_polish_within_a_study(tmp_path: Path) -> None:
     settings = {"proposer": "rules", "n_init": 5, "n_step": 10, "seed": 1, "polish_every": 5}
     run = optimize(PROBLEM, n_total=30, **settings)

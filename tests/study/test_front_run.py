@@ -99,11 +99,13 @@ def test_its_summary_and_files(done: FrontRun) -> None:
         mujoco.MjModel.from_xml_path(str(done.folder / f"designs/{member.number:04d}/arm.urdf"))
 
 
+@pytest.mark.slow
 def test_a_search_beats_a_study_of_as_many_seconds(done: FrontRun) -> None:
     study = optimize(PROBLEM, proposer="none", n_total=60, seed=1)
     assert hypervolume(done.history.values, (5, 5)) > study.hypervolume[-1]
 
 
+@pytest.mark.slow
 def test_same_seed_same_front_and_resumed_equals_uninterrupted(done: FrontRun, tmp_path: Path) -> None:
     class StopError(Exception):
         pass
@@ -127,6 +129,7 @@ def test_same_seed_same_front_and_resumed_equals_uninterrupted(done: FrontRun, t
     assert hypervolume(longer.history.values, (5, 5)) >= hypervolume(run.history.values, (5, 5))
 
 
+@pytest.mark.slow
 def test_it_begins_with_a_run_or_a_proposer(tmp_path: Path) -> None:
     study = optimize(PROBLEM, proposer="rules", n_total=30, seed=0, out=tmp_path / "study")
     run = find_front(PROBLEM, budget="500", seed=0, initial_designs=tmp_path / "study", out=tmp_path / "a")
@@ -174,6 +177,7 @@ def test_a_damaged_state_is_said(tmp_path: Path) -> None:
     assert anew.summary["hypervolume"]["final"] >= hypervolume(before.values, (5, 5))
 
 
+@pytest.mark.slow
 def test_a_search_stopped_in_the_midst_of_a_generation_goes_on_as_if_not(
     done: FrontRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -273,6 +273,7 @@ def test_other_versions_are_noted(tmp_path: Path) -> None:
     assert run.config.earlier_versions[0]["optuna"] == f"0.{optuna.__version__}"
 
 
+@pytest.mark.slow
 def test_two_processes_cannot_write_one_run(tmp_path: Path) -> None:
     def second(progress: Progress) -> None:
         with pytest.raises(RunFolderError, match="in use by another"):

@@ -188,6 +188,7 @@ def test_too_many_boxes_are_refused() -> None:
         task(workspace=[CUBE] * 21)
 
 
+@pytest.mark.slow
 def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
     (in_folder / "cover.yaml").write_text(
         "name: cover\nworkspace: {low: [0.2, -0.3, 0.1], high: [0.5, 0.3, 0.4], points: 60}\n"
