@@ -185,7 +185,7 @@ def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str
 
 def _joint_labels(history: History, number: int) -> list[str]:
     """What each joint of a design's arm is called: as its module, of several there each with a letter."""
-    places = history.problem.space.joint_modules(history.trials[number].design)
+    places = history.trials[number].design.module_of_joint
     return [
         f"joint_{place + 1}" + ("" if places.count(place) == 1 else "abc"[places[:j].count(place)])
         for j, place in enumerate(places)

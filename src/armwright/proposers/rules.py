@@ -190,7 +190,7 @@ def scaled(history: History, member: FrontMember, scale: float) -> Design:
 
 def by_module(history: History, member: FrontMember, values: Array) -> Array:
     """(M,) the largest of the values (J,) of each module's joints."""
-    places = np.array(history.problem.space.joint_modules(member.design))
+    places = np.array(member.design.module_of_joint)
     return np.array([values[: len(places)][places == place].max() for place in range(len(member.design.joints))])
 
 

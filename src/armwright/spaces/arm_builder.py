@@ -4,13 +4,9 @@ from dataclasses import replace
 from typing import cast
 
 from armwright.robot.arm import Actuator, Arm, Joint, Link, Vector, uniform_link
-from armwright.spaces.design_parameters import checked_design
 from armwright.spaces.joint_modules import (
     DIRECTIONS,
-    MODULES,
     Direction,
-    JointType,
-    Module,
     Mount,
     mounted,
     mounted_vector,
@@ -21,28 +17,12 @@ from armwright.spaces.space_schema import SpaceSchema
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
-def build_arm(space: SpaceSchema, design: Design) -> Arm:
-    """Return the physical chain of a design.
-
-    Raises:
-        DesignError: If the design is not in the space.
-    """
-    if not space.min_joints <= len(design.joints) == len(design.links) <= space.max_joints:
-        checked_design(space, design.params)  # raises the reason
-    return _ArmBuilder(space, design).arm()
-
-
-def design_modules(design: Design) -> tuple[Module, ...]:
-    """Return the joint modules of a design, in order."""
-    return tuple(MODULES[letter] for letter in cast("list[JointType]", list(design.joints)))
-
-
-class _ArmBuilder:
-    """Joints and links of one design; modules are counted from 0."""
+class ArmBuilder:
+    """Builder of the joints and links of one design; modules are counted from 0."""
 
     def __init__(self, space: SpaceSchema, design: Design) -> None:
         self._space, self._design, self._params = space, design, design.params
-        self._modules = design_modules(design)
+        self._modules = design.modules
         self._lengths = design.links
         self._mount: Mount = cast("Mount", design.mount or space.mount[0])
         self._actuators = {actuator.name: actuator for actuator in space.arm_actuators}

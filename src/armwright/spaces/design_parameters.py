@@ -8,15 +8,14 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, cast
+from typing import cast
 
-from armwright.exceptions import DesignError, did_you_mean
+from armwright.exceptions import did_you_mean
 from armwright.spaces.joint_modules import MODULES
 from armwright.spaces.parameters import (
     GRID_DIGITS,
     GRID_ERROR,
     CategoricalParameter,
-    Design,
     FloatParameter,
     Parameter,
     ParameterValue,
@@ -58,10 +57,10 @@ class ConditionalParameter:
 
 # The caches are outside the model: a copy of a space with other ranges would inherit a cached property.
 @lru_cache(maxsize=CACHED_SPACES)
-def conditional_parameters(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
-    """Return all parameters of a space in their fixed order, restrictions and grids applied."""
+def conditional_parameters(space: SpaceSchema) -> dict[str, ConditionalParameter]:
+    """Return all parameters of a space by name, in their fixed order, restrictions and grids applied."""
     steps, restrictions = dict(space.grid), dict(space.restrict)
-    found: list[ConditionalParameter] = []
+    entries: dict[str, ConditionalParameter] = {}
     for entry in _unrestricted(space):
         parameter = entry.parameter
         if parameter.name in restrictions:
@@ -69,23 +68,10 @@ def conditional_parameters(space: SpaceSchema) -> tuple[ConditionalParameter, ..
         step = steps.get(parameter.name, steps.get(parameter.name.partition("_")[0], 0.0))
         if step > 0.0 and isinstance(parameter, FloatParameter):
             parameter = _on_grid(parameter, step)
-        found.append(replace(entry, parameter=parameter))
-    return tuple(found)
+        entries[entry.name] = replace(entry, parameter=parameter)
+    return entries
 
 
-@lru_cache(maxsize=CACHED_SPACES)
-def parameters_by_name(space: SpaceSchema) -> dict[str, ConditionalParameter]:
-    """Return the same by name."""
-    return {entry.name: entry for entry in conditional_parameters(space)}
-
-
-@lru_cache(maxsize=CACHED_SPACES)
-def parameters_of(space: SpaceSchema) -> tuple[Parameter, ...]:
-    """Return the parameters without their conditions."""
-    return tuple(entry.parameter for entry in conditional_parameters(space))
-
-
-@lru_cache(maxsize=CACHED_SPACES)
 def _unrestricted(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
     """Return the parameters without restrictions and grids."""
     revolute = tuple(letter for letter, module in MODULES.items() if module.is_revolute)
@@ -204,7 +190,7 @@ def _check_grid(space: SpaceSchema) -> None:
 
 
 def _check_ties(space: SpaceSchema) -> None:
-    known, ties = parameters_by_name(space), dict(space.tie)
+    known, ties = conditional_parameters(space), dict(space.tie)
     for name, other in ties.items():
         for used in (name, other):
             if used not in known:
@@ -216,33 +202,3 @@ def _check_ties(space: SpaceSchema) -> None:
             raise ValueError(f"tie: {name} and {other} have different ranges or choices")
         if free.types is not None or (free.module or 0) > (tied.module or 0):
             raise ValueError(f"tie: {other} may be inactive while {name} is active; reverse the tie")
-
-
-def checked_design(space: SpaceSchema, params: Mapping[str, Any]) -> Design:
-    """Return the design with these values, in the order of the space.
-
-    Tied values may be missing. Values of inactive parameters are left out.
-
-    Raises:
-        DesignError: If a value is unknown, missing or outside its range.
-    """
-    known = parameters_by_name(space)
-    for name in params:
-        if name not in known:
-            raise DesignError(f'unknown parameter "{name}". Parameters: {", ".join(known)}.{did_you_mean(name, known)}')
-    given = {**{name: params[other] for name, other in space.tie if other in params}, **params}
-    checked: dict[str, ParameterValue] = {}
-    missing: list[str] = []
-    for entry in conditional_parameters(space):
-        if not entry.is_active(checked, space.max_joints):
-            continue
-        if entry.name in given:
-            checked[entry.name] = entry.parameter.check(given[entry.name])
-        else:
-            missing.append(entry.name)
-    if missing:
-        raise DesignError(f"missing: {', '.join(missing)}")
-    for name, other in space.tie:
-        if name in checked and other in checked and checked[name] != checked[other]:
-            raise DesignError(f"{name} = {checked[name]} is tied to {other} = {checked[other]}")
-    return Design(checked)

@@ -1,20 +1,24 @@
-"""The design space: what the search may vary, and the arm that a design builds."""
+"""The design space: what the search may vary, and the arm that a design builds.
+
+A matrix of designs has one row per design and one column per parameter. A choice is represented by its index. Inactive
+parameters have their default value: the middle of a range, the first of the choices.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, cast
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import model_validator
 
 from armwright.arrays import Array
-from armwright.exceptions import SpaceError, did_you_mean
+from armwright.exceptions import DesignError, SpaceError, did_you_mean
 from armwright.robot.arm import Arm
-from armwright.spaces import design_matrix
-from armwright.spaces.arm_builder import build_arm, design_modules
-from armwright.spaces.design_parameters import check_parameters, checked_design, parameters_by_name, parameters_of
-from armwright.spaces.joint_modules import Module
-from armwright.spaces.parameters import Design, Parameter, ParameterValue
+from armwright.spaces.arm_builder import ArmBuilder
+from armwright.spaces.design_parameters import ConditionalParameter, check_parameters, conditional_parameters
+from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, ParameterValue
 from armwright.spaces.space_schema import SpaceSchema
 from armwright.yaml_documents import check_document, parse_document, read_document
 
@@ -37,15 +41,15 @@ class DesignSpace(SpaceSchema, frozen=True):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters in their fixed order: origin, joint types, link lengths, …; tied ones, too."""
-        return parameters_of(self)
+        return tuple(entry.parameter for entry in conditional_parameters(self).values())
 
     def is_free(self, name: str, params: Mapping[str, ParameterValue]) -> bool:
         """Return whether a parameter is active and not tied, given the values of the parameters before it."""
-        return name not in dict(self.tie) and parameters_by_name(self)[name].is_active(params, self.max_joints)
+        return name not in dict(self.tie) and conditional_parameters(self)[name].is_active(params, self.max_joints)
 
     def condition(self, name: str) -> tuple[int, str] | None:
         """Return the module that a parameter requires and the types it may have; None if it is always active."""
-        entry = parameters_by_name(self)[name]
+        entry = conditional_parameters(self)[name]
         if entry.module is None:
             return None
         return entry.module, "".join(self.joint_types if entry.types is None else sorted(entry.types))
@@ -58,7 +62,28 @@ class DesignSpace(SpaceSchema, frozen=True):
         Raises:
             DesignError: If a value is unknown, missing or outside its range.
         """
-        return checked_design(self, params)
+        known = conditional_parameters(self)
+        for name in params:
+            if name not in known:
+                raise DesignError(
+                    f'unknown parameter "{name}". Parameters: {", ".join(known)}.{did_you_mean(name, known)}'
+                )
+        given = self._with_ties(params)
+        checked: dict[str, ParameterValue] = {}
+        missing: list[str] = []
+        for name, entry in known.items():
+            if not entry.is_active(checked, self.max_joints):
+                continue
+            if name in given:
+                checked[name] = entry.parameter.check(given[name])
+            else:
+                missing.append(name)
+        if missing:
+            raise DesignError(f"missing: {', '.join(missing)}")
+        for name, other in self.tie:
+            if name in checked and other in checked and checked[name] != checked[other]:
+                raise DesignError(f"{name} = {checked[name]} is tied to {other} = {checked[other]}")
+        return Design(checked)
 
     def free_values(self, design: Design) -> dict[str, ParameterValue]:
         """Return the values of a design that are not tied."""
@@ -66,8 +91,12 @@ class DesignSpace(SpaceSchema, frozen=True):
 
     def from_free_values(self, params: Mapping[str, ParameterValue]) -> Design:
         """Return the design with these free values."""
-        given = {**params, **{name: params[other] for name, other in self.tie if other in params}}
-        return Design({p.name: given[p.name] for p in self.parameters if p.name in given})
+        given = self._with_ties(params)
+        return Design({name: given[name] for name in conditional_parameters(self) if name in given})
+
+    def _with_ties(self, params: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values with missing tied ones filled in."""
+        return {**{name: params[other] for name, other in self.tie if other in params}, **params}
 
     def clipped(
         self, origin: Iterable[float], joints: str, links: Iterable[float], like: Design | None = None
@@ -78,37 +107,82 @@ class DesignSpace(SpaceSchema, frozen=True):
             origin: (3,) base position [m].
             joints: The letters of the joint modules.
             links: (D,) link lengths [m].
-            like: The source of all other values; defaults for those that it lacks.
+            like: The source of all other values. Those that it lacks have their defaults; actuators are by default
+                the strongest at the base and the weakest at the tip.
         """
-        return design_matrix.clip(self, origin, joints, links, like)
+        known: dict[str, Any] = _default_motors(self)
+        known |= {} if like is None else like.params
+        known |= {f"origin_{axis}": value for axis, value in zip("xyz", origin, strict=True)}
+        known |= {f"joint_{j}": letter for j, letter in enumerate(joints, start=1)}
+        known |= {f"link_{j}": length for j, length in enumerate(links, start=1)}
+        known["n_joints"] = str(min(max(len(joints), self.min_joints), self.max_joints))
+        row = [p.encode(p.nearest(known[p.name]) if p.name in known else p.default) for p in self.parameters]
+        return self.designs(np.array([row], dtype=np.float64))[0]
 
     def matrix(self, designs: Sequence[Design]) -> Array:
-        """Return the (N, P) matrix of N designs; a choice is represented by its index."""
-        return design_matrix.encode(self, designs)
+        """Return the (N, P) matrix of N designs."""
+        parameters = self.parameters
+        defaults = [p.default for p in parameters]
+        columns = [
+            [p.encode(design.params.get(p.name, default)) for design in designs]
+            for p, default in zip(parameters, defaults, strict=True)
+        ]
+        return np.array(columns, dtype=np.float64).T.reshape(len(designs), len(parameters))
 
     def designs(self, matrix: Array) -> list[Design]:
         """Return the designs of the (N, P) rows of a matrix."""
-        return design_matrix.decode(self, matrix)
+        entries = conditional_parameters(self)
+        designs: list[Design] = []
+        for row in self.normalised(matrix).tolist():
+            params: dict[str, ParameterValue] = {}
+            for (name, entry), number in zip(entries.items(), row, strict=True):
+                if entry.is_active(params, self.max_joints):
+                    params[name] = entry.parameter.decode(number)
+            designs.append(Design(params))
+        return designs
 
     def normalised(self, matrix: Array) -> Array:
         """Return the (N, P) rows as `matrix` would: tied values equal, inactive parameters at their defaults."""
-        return design_matrix.normalise(self, matrix)
+        entries = conditional_parameters(self)
+        if not self.tie and all(entry.module is None for entry in entries.values()):
+            return matrix
+        rows = matrix.copy()
+        column = {name: i for i, name in enumerate(entries)}
+        for name, other in self.tie:
+            rows[:, column[name]] = rows[:, column[other]]
+        for name, entry in entries.items():
+            if entry.module is not None:
+                default = entry.parameter.encode(entry.parameter.default)
+                rows[~self._is_active(entry, rows, column), column[name]] = default
+        return rows
+
+    def _is_active(self, entry: ConditionalParameter, matrix: Array, column: Mapping[str, int]) -> NDArray[np.bool_]:
+        """Return the (N,) designs for which a parameter with a condition is active."""
+        active = np.ones(len(matrix), dtype=bool)
+        if "n_joints" in column:
+            active &= cast("int", entry.module) <= matrix[:, column["n_joints"]] + self.min_joints
+        if entry.types is not None:
+            joint = f"joint_{entry.module}"
+            letters = cast("CategoricalParameter", conditional_parameters(self)[joint].parameter).choices
+            active &= np.isin(letters, list(entry.types))[matrix[:, column[joint]].astype(np.intp)]
+        return active
 
     def sample(self, n: int, seed: int) -> list[Design]:
         """Return `n` designs, uniform in every parameter."""
-        return design_matrix.sample(self, n, seed)
-
-    def modules(self, design: Design) -> tuple[Module, ...]:
-        """Return the joint modules of a design, in order."""
-        return design_modules(design)
-
-    def joint_modules(self, design: Design) -> tuple[int, ...]:
-        """Return the index of its module for each joint of a design."""
-        return tuple(i for i, module in enumerate(design_modules(design)) for _ in module.joints)
+        rng = np.random.default_rng(seed)
+        parameters = self.parameters
+        rows = [[parameter.sample(rng) for parameter in parameters] for _ in range(n)]
+        return self.designs(np.array(rows, dtype=np.float64).reshape(n, len(parameters)))
 
     def arm(self, design: Design) -> Arm:
-        """Return the physical chain that a design builds."""
-        return build_arm(self, design)
+        """Return the physical chain that a design builds.
+
+        Raises:
+            DesignError: If the design is not in the space.
+        """
+        if not self.min_joints <= len(design.joints) == len(design.links) <= self.max_joints:
+            self.design(design.params)  # raises the reason
+        return ArmBuilder(self, design).arm()
 
     @property
     def is_toy(self) -> bool:
@@ -123,6 +197,14 @@ class DesignSpace(SpaceSchema, frozen=True):
         names = ", ".join(record.name for record in self.actuators)
         actuators = f"; actuators: {names}" if self.actuators else ""
         return f"links: {self.mass.description}{toy}{actuators}"
+
+
+def _default_motors(space: SpaceSchema) -> dict[str, str]:
+    """Return an actuator for each module, if there is a choice: from the strongest at the base to the weakest."""
+    if len(space.actuators) < 2:
+        return {}
+    ranked = sorted(space.arm_actuators, key=lambda actuator: -actuator.effort)
+    return {f"motor_{j + 1}": ranked[len(ranked) * j // space.max_joints].name for j in range(space.max_joints)}
 
 
 def paper_space(joints: int = 4) -> DesignSpace:

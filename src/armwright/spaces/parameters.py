@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from itertools import count, takewhile
 from typing import Any
 
+import numpy as np
+
 from armwright.exceptions import DesignError
+from armwright.spaces.joint_modules import MODULES, Module
 
 Range = tuple[float, float]
 ParameterValue = float | str
@@ -38,6 +41,11 @@ class FloatParameter:
         object.__setattr__(self, "low", self.low + 0.0)
         object.__setattr__(self, "high", self.high + 0.0)
 
+    @property
+    def default(self) -> float:
+        """The middle of the range."""
+        return self.nearest((self.low + self.high) / 2)
+
     def check(self, value: Any) -> float:
         """Return `value` as a float.
 
@@ -66,6 +74,18 @@ class FloatParameter:
             return inside
         return round(self.low + self.step * round((inside - self.low) / self.step), GRID_DIGITS)
 
+    def encode(self, value: Any) -> float:
+        """Return `value` as an entry of a design matrix."""
+        return value
+
+    def decode(self, number: float) -> float:
+        """Return the value that an entry of a design matrix stands for."""
+        return number
+
+    def sample(self, rng: np.random.Generator) -> float:
+        """Return the matrix entry of a uniformly drawn value."""
+        return self.nearest(float(rng.uniform(self.low, self.high)))
+
 
 @dataclass(frozen=True, slots=True)
 class CategoricalParameter:
@@ -73,6 +93,11 @@ class CategoricalParameter:
 
     name: str
     choices: tuple[str, ...]
+
+    @property
+    def default(self) -> str:
+        """The first of the choices."""
+        return self.choices[0]
 
     def check(self, value: Any) -> str:
         """Return `value`.
@@ -83,6 +108,22 @@ class CategoricalParameter:
         if value not in self.choices:
             raise DesignError(f"{self.name} = {value!r} is not one of {', '.join(self.choices)}")
         return value
+
+    def nearest(self, value: Any) -> str:
+        """Return `value` if it is one of the choices, else the default."""
+        return value if value in self.choices else self.default
+
+    def encode(self, value: Any) -> float:
+        """Return `value` as an entry of a design matrix: its index."""
+        return self.choices.index(value)
+
+    def decode(self, number: float) -> str:
+        """Return the value that an entry of a design matrix stands for."""
+        return self.choices[int(number)]
+
+    def sample(self, rng: np.random.Generator) -> float:
+        """Return the matrix entry of a uniformly drawn choice."""
+        return float(rng.integers(len(self.choices)))
 
 
 Parameter = FloatParameter | CategoricalParameter
@@ -105,6 +146,16 @@ class Design:
 
     def __hash__(self) -> int:
         return hash(frozenset(self.params.items()))
+
+    @property
+    def modules(self) -> tuple[Module, ...]:
+        """The joint modules in order."""
+        return tuple(MODULES[letter] for letter in self.joints)  # pyright: ignore[reportArgumentType]
+
+    @property
+    def module_of_joint(self) -> tuple[int, ...]:
+        """The index of each joint's module; a module may have two joints."""
+        return tuple(i for i, module in enumerate(self.modules) for _ in module.joints)
 
     @property
     def origin(self) -> tuple[float, float, float]:
