@@ -42,7 +42,7 @@ from armwright.search.front_search import FrontSearch
 from armwright.search.samplers import BlackBox
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
-from armwright.spaces.tolerance import moved
+from armwright.spaces.tolerance import perturbed
 from armwright.study.front_run import find_front
 from armwright.study.refine_run import polish_run
 from armwright.study.study import optimize
@@ -147,7 +147,7 @@ def test_rows_and_designs_have_the_same_constraints_and_the_worst_copy_counts() 
     exact = Problem(task(*BOUNDS))
     designs = SPACE.sample(20, 5)
     rows = SPACE.matrix(designs)
-    copies = [exact.evaluate_matrix(r).violations for r in (rows, *moved(SPACE, rows))]
+    copies = [exact.evaluate_matrix(r).violations for r in (rows, *perturbed(SPACE, rows))]
     assert np.array_equal(problem.evaluate_matrix(rows).violations, np.max(copies, axis=0))
     assert np.array_equal(problem.evaluate(designs).violations, np.max(copies, axis=0))
     assert np.array_equal(exact.evaluate(designs).violations, exact.evaluate_matrix(rows).violations)
@@ -276,7 +276,7 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     solid = summary["verification"]["solid_numbers"]
     designs = [history.trials[number].design for number in solid]
     rows = SPACE.matrix(designs)
-    off = np.max([problem.evaluate_matrix(copies).violations for copies in moved(SPACE, rows)], axis=0)
+    off = np.max([problem.evaluate_matrix(copies).violations for copies in perturbed(SPACE, rows)], axis=0)
     assert np.all(off <= 0.06)  # 5 % in float64
     # what is polished stays feasible
     polished = polish_run(tmp_path / "run", 240)

@@ -11,7 +11,7 @@ from armwright.runs.results import read_summary, verify_run
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import START_SPREAD, STARTS, verify
 from armwright.spaces.parameters import Design
-from armwright.spaces.tolerance import moved
+from armwright.spaces.tolerance import perturbed
 from armwright.study.study import optimize
 from armwright.tasks.task import Task, load_task
 from tests.support import reference_kinematics as reference
@@ -51,7 +51,7 @@ def test_exact_values_are_the_references(designs: list[Design]) -> None:
 @pytest.mark.slow
 def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None:
     rows = PROBLEM.space.matrix(designs)
-    copies = list(moved(PROBLEM.space, rows))
+    copies = list(perturbed(PROBLEM.space, rows))
     assert len(copies) == 2 * 7
     for copy in copies:
         off = np.abs(copy - rows)
@@ -96,7 +96,7 @@ def test_an_arm_that_needs_luck_is_fragile() -> None:
 def test_robust_values_are_the_worst_case(designs: list[Design]) -> None:
     robust = Problem(PROBLEM.task, tolerance=1e-3)
     rows = PROBLEM.space.matrix(designs)
-    worst = np.max([PROBLEM.evaluate_matrix(r).values for r in (rows, *moved(PROBLEM.space, rows))], axis=0)
+    worst = np.max([PROBLEM.evaluate_matrix(r).values for r in (rows, *perturbed(PROBLEM.space, rows))], axis=0)
     assert np.array_equal(robust.evaluate_matrix(rows).values, worst)
     assert np.array_equal(robust.evaluate(designs).values, worst)
 

@@ -24,7 +24,7 @@ from armwright.problem.objectives import (
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
-from armwright.spaces.tolerance import measured_columns
+from armwright.spaces.tolerance import length_columns
 from armwright.tasks.targets import REACHED, target_words
 from armwright.tasks.task import IN_ORDER, Task
 from armwright.text import one_line
@@ -105,7 +105,7 @@ def common_values(history: History, memory: str, proposals: int, form: str) -> d
         "sliding": [kind for kind in space.joint_types if MODULES[kind].is_prismatic],
         "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
         "asked": asked,
-        "n_copies": len(measured_columns(space)) * 2,
+        "n_copies": len(length_columns(space)) * 2,
         "joint_descriptions": JOINT_DESCRIPTIONS,
         "mount_descriptions": MOUNT_DESCRIPTIONS,
         "gravity": GRAVITY,

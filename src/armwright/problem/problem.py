@@ -24,7 +24,7 @@ from armwright.robot.arm import Arm
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
-from armwright.spaces.tolerance import moved
+from armwright.spaces.tolerance import perturbed
 from armwright.tasks.task import Task
 
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
@@ -237,7 +237,7 @@ class Problem:
 
     def _variants(self, matrix: Array) -> Iterator[Evaluation]:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
-        for rows in (matrix, *(moved(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
+        for rows in (matrix, *(perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
             yield self.physics(rows)
             for case in range(1, len(self.task.cases)):
                 yield self.physics_of_arms(stack_designs(self.space, rows), case)

@@ -20,7 +20,7 @@ from armwright.problem.problem import Outcomes, Problem, worst_case
 from armwright.runs.history import History
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.parameters import Design
-from armwright.spaces.tolerance import moved
+from armwright.spaces.tolerance import perturbed
 
 STARTS = 20
 START_SPREAD = 0.05  # [rad], of sliding joints [m], to either side of the straight start
@@ -68,7 +68,7 @@ def verify(
     """
     rows = problem.space.matrix(designs)
     exact = _outcomes(problem, rows)
-    off = worst_case([_outcomes(problem, copies) for copies in moved(problem.space, rows)])
+    off = worst_case([_outcomes(problem, copies) for copies in perturbed(problem.space, rows)])
     dof = stack_designs(problem.space, rows).dof
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), dof))
     started = worst_case([_outcomes(problem, rows, start) for start in starts])

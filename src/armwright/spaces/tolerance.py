@@ -1,34 +1,37 @@
-"""What a workshop makes of a design: copies of it whose base or one link is a little off."""
+"""Build tolerance: copies of designs whose base or one link is slightly off."""
 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import FloatParameter
 
 TOLERANCE = 1e-3  # [m]
-SHORTEST = 1e-6  # [m] of a link
+MIN_LENGTH = 1e-6  # [m] of a link or stroke
 
 
-def moved(space: DesignSpace, rows: NDArray[np.float64], tolerance: float = TOLERANCE) -> Iterator[NDArray[np.float64]]:
-    """Designs as rows (N, P) with one length or coordinate of the base off by ±tolerance [m], one after the other.
+def perturbed(space: DesignSpace, matrix: Array, tolerance: float = TOLERANCE) -> Iterator[Array]:
+    """Yield copies of designs with one length or base coordinate off by ±tolerance, one parameter after the other.
 
-    In the paper's space 2 (3 + D) times.
+    In the space of the paper these are 2 (3 + D) copies. They may lie outside the design space by the tolerance.
 
-    A copy may lie a tolerance outside the design space: what is built knows no ranges.
+    Args:
+        space: The design space.
+        matrix: (N, P) designs.
+        tolerance: The deviation [m].
     """
-    rows = space.normalised(rows)
-    for column in measured_columns(space):
+    matrix = space.normalised(matrix)
+    for column in length_columns(space):
         for offset in (-tolerance, tolerance):
-            copies = rows.copy()
+            copies = matrix.copy()
             copies[:, column] += offset
             if not space.parameters[column].name.startswith("origin_"):
-                copies[:, column] = np.maximum(copies[:, column], SHORTEST)
+                copies[:, column] = np.maximum(copies[:, column], MIN_LENGTH)
             yield copies
 
 
-def measured_columns(space: DesignSpace) -> list[int]:
-    """The places of the parameters that are lengths."""
+def length_columns(space: DesignSpace) -> list[int]:
+    """Return the columns of a design matrix that hold lengths and base coordinates."""
     return [i for i, p in enumerate(space.parameters) if isinstance(p, FloatParameter) and p.unit == "m"]
