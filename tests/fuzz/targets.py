@@ -310,23 +310,6 @@ def any_of(reads: Iterable[Callable[[], object]]) -> None:
         raise refusals[0]
 
 
-@cache
-def told() -> Any:
-    """Parameters of somebody's Optuna study, and its objectives."""
-    import optuna
-
-    from armwright.proposers.for_optuna.parameters import told_parameters
-
-    space: dict[str, Any] = {
-        "x": optuna.distributions.FloatDistribution(-1.0, 1.0),
-        "rate": optuna.distributions.FloatDistribution(1e-5, 1.0, log=True),
-        "layers": optuna.distributions.IntDistribution(1, 5),
-        "step": optuna.distributions.FloatDistribution(0.0, 1.0, step=0.25),
-        "kind": optuna.distributions.CategoricalDistribution(["a", "b", None, 3, True]),
-    }
-    return told_parameters(space)
-
-
 def draft_seeds() -> list[bytes]:
     task, space = RICH_TASK.decode(), RICH_SPACE.decode()
     plain = (ROOT / "examples" / "2-assembly-task.yaml").read_text()

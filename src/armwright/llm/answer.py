@@ -54,10 +54,7 @@ def answer_schema(problem: Problem, *, reasoning: bool, expected: bool, proposal
         content = {"designs": {"type": "array", "description": words, "items": object_schema(fields)}}
     else:
         content = fields
-    if reasoning:
-        content = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **content}
-    title = "NewDesign" if proposals == 1 else "NewDesigns"
-    return {"title": title, "description": "What to evaluate next.", **object_schema(content)}
+    return response_schema("NewDesign" if proposals == 1 else "NewDesigns", content, reasoning=reasoning)
 
 
 def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 1) -> list[Answer]:
@@ -77,9 +74,12 @@ def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 
 def written_answers(answers: Sequence[Answer], problem: Problem, reasoning: str = "") -> str:
     """Answers as JSON that `read_text` reads back to the same."""
     designs = [_content(answer, problem) for answer in answers]
-    content: dict[str, Any] = {"reasoning": reasoning} if reasoning else {}
-    content.update(designs[0] if len(designs) == 1 else {"designs": designs})
-    return json.dumps(content, ensure_ascii=False)
+    return answer_json(designs[0] if len(designs) == 1 else {"designs": designs}, reasoning)
+
+
+def answer_json(content: Mapping[str, Any], reasoning: str) -> str:
+    """Return an answer as JSON, with the reasoning first if there is any."""
+    return json.dumps({**({"reasoning": reasoning} if reasoning else {}), **content}, ensure_ascii=False)
 
 
 def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
@@ -129,6 +129,13 @@ def _property(parameter: Parameter) -> dict[str, Any]:
     if parameter.step > 0.0:
         words += f", in steps of {exact(parameter.step)}"
     return {"type": "number", "description": words}
+
+
+def response_schema(title: str, fields: Mapping[str, Any], *, reasoning: bool) -> dict[str, Any]:
+    """Return the JSON schema of a whole answer, with the model's analysis first if `reasoning` is set."""
+    if reasoning:
+        fields = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **fields}
+    return {"title": title, "description": "What to evaluate next.", **object_schema(fields)}
 
 
 def object_schema(fields: Mapping[str, Any], required: Sequence[str] | None = None) -> dict[str, Any]:

@@ -242,7 +242,7 @@ def test_trials_out_of_range_do_not_keep_a_genetic_study_from_proposals() -> Non
         ({"y": 2}, "y = 2 is between the steps of 1 <= y <= 9 in steps of 2"),
         ({"y": 2.5}, "y = 2.5 is not a whole number"),
         ({"kind": "c"}, "kind = 'c' is not one of a, b"),
-        ({"z": 1.0}, 'there is no parameter "z"'),
+        ({"z": 1.0}, 'unknown parameter "z"'),
     ],
 )
 def test_what_is_outside_the_space_never_enters_the_study(others: dict[str, Any], words: str, log: list[str]) -> None:

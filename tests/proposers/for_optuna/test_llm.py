@@ -17,9 +17,9 @@ from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.proposers.for_optuna.callback import ProposalCallback
 from armwright.proposers.for_optuna.llm import StudyLlmProposer
-from armwright.proposers.for_optuna.parameters import observed_space, told_parameters
+from armwright.proposers.for_optuna.parameters import observed_space, study_parameters
 from armwright.proposers.for_optuna.prompt import study_prompt
-from armwright.proposers.for_optuna.trials import best_trials
+from armwright.proposers.for_optuna.study_view import best_trials
 from tests.support.chat_server import Answer, ChatServer, Request
 
 GOOD = {"kernel": "RBF", "C": "10.0", "gamma": 0.01, "degree": None, "shrinking": "true"}
@@ -286,8 +286,8 @@ def test_wrong_settings_are_refused(chat_server: ChatServer, settings: dict[str,
 
 
 def shown(study: optuna.Study, seed: int, memory: str = "none") -> str:
-    parameters = told_parameters(observed_space(study), study.trials)
-    return study_prompt(study, study.trials, parameters, "d", seed, memory=memory, name="llm", form="then-schema")
+    parameters = study_parameters(observed_space(study), study.trials)
+    return study_prompt(study, study.trials, parameters, "d", seed, memory=memory, source="llm", form="then-schema")
 
 
 def test_which_trials_are_shown_depends_on_the_seed_alone() -> None:

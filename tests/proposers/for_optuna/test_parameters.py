@@ -11,20 +11,17 @@ from optuna.distributions import BaseDistribution, CategoricalDistribution, Floa
 
 from armwright.exceptions import DesignError
 from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
-from armwright.proposers.for_optuna.parameters import (
-    Parameter,
-    checked_params,
+from armwright.proposers.for_optuna.parameter_values import (
     checked_value,
     choice_texts,
-    described,
-    keys,
+    describe,
+    json_value,
     read_value,
-    told_parameters,
-    written_value,
 )
-from armwright.proposers.for_optuna.prompt import Told
+from armwright.proposers.for_optuna.parameters import Parameter, checked_params, study_parameters, unique_keys
+from armwright.proposers.for_optuna.prompt import StudyObjective
 
-OBJECTIVES = [Told("value", "value", "minimised")]
+OBJECTIVES = [StudyObjective("value", "value", "minimised")]
 CHOICES = st.one_of(st.none(), st.booleans(), st.integers(-9, 9), st.floats(-9, 9), st.text(max_size=6))
 
 
@@ -65,7 +62,7 @@ def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
 ) -> None:
     space = {name: distribution for name, (distribution, _) in drawn.items()}
     params = {name: value for name, (_, value) in drawn.items()}
-    parameters = told_parameters(space, [])
+    parameters = study_parameters(space, [])
     text = written_answer(StudyAnswer(params, "so", (1.5,)), parameters, OBJECTIVES)
     back = read_answer(json.loads(text), parameters, OBJECTIVES)
     assert dict(back.params) == params
@@ -80,11 +77,11 @@ def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
 @given(st.one_of(ints(), categories()))
 def test_the_schema_allows_what_is_written(drawn: tuple[BaseDistribution, Any]) -> None:
     distribution, value = drawn
-    (parameter,) = told_parameters({"x": distribution}, [])
+    (parameter,) = study_parameters({"x": distribution}, [])
     schema = answer_schema([parameter], OBJECTIVES, reasoning=True, expected=True)
     assert list(schema["properties"]) == ["reasoning", "parameters", "expected", "reason"]
     field = schema["properties"]["parameters"]["properties"]["x"]
-    written = written_value(value, distribution)
+    written = json_value(value, distribution)
     if isinstance(distribution, CategoricalDistribution):
         assert field["type"] == "string"
         assert written in field["enum"]
@@ -96,13 +93,13 @@ def test_the_schema_allows_what_is_written(drawn: tuple[BaseDistribution, Any]) 
 
 @given(st.lists(st.text(max_size=70), unique=True, max_size=8))
 def test_every_parameter_has_a_key_of_its_own_that_vendors_take(names: list[str]) -> None:
-    found = keys(names)
+    found = unique_keys(names)
     assert len(set(found)) == len(names)
     assert all(key.isascii() and 1 <= len(key) <= 64 and not set(key) & set(" /[](){}") for key in found)
 
 
 def test_a_plain_name_is_its_own_key() -> None:
-    assert keys(["lr", "layer/units", "layer_units", "学习率"]) == ["lr", "layer_units_2", "layer_units", "___"]
+    assert unique_keys(["lr", "layer/units", "layer_units", "学习率"]) == ["lr", "layer_units_2", "layer_units", "___"]
 
 
 @pytest.mark.parametrize(
@@ -177,9 +174,9 @@ def test_choices_of_the_same_text_are_told_apart() -> None:
 
 
 def test_a_distribution_is_described_by_kind_and_range() -> None:
-    assert described(IntDistribution(2, 8, step=2)) == "whole number, 2 to 8 in steps of 2"
-    assert described(FloatDistribution(1e-5, 0.1, log=True)) == "number, 1e-05 to 0.1, on a log scale"
-    assert described(CategoricalDistribution(["a", True])) == "one of a, true"
+    assert describe(IntDistribution(2, 8, step=2)) == "whole number, 2 to 8 in steps of 2"
+    assert describe(FloatDistribution(1e-5, 0.1, log=True)) == "number, 1e-05 to 0.1, on a log scale"
+    assert describe(CategoricalDistribution(["a", True])) == "one of a, true"
 
 
 PARAMETERS = [
@@ -219,7 +216,7 @@ def test_all_that_is_wrong_is_said_at_once() -> None:
     with pytest.raises(DesignError) as refusal:
         read_answer({"parameters": {"C": 1e3, "kernl": "rbf", "gamma": "big"}}, PARAMETERS, OBJECTIVES)
     words = str(refusal.value)
-    assert 'there is no parameter "kernl". Did you mean "kernel"?' in words
+    assert 'unknown parameter "kernl". Did you mean "kernel"?' in words
     assert "kernel is missing: one of rbf, linear" in words
     assert "C = 1000 is outside 0.01 <= C <= 100" in words
     assert "gamma = 'big' is not a finite number" in words

@@ -13,9 +13,9 @@ from optuna.trial import TrialState, create_trial
 
 import armwright as aw
 from armwright.exceptions import ProposalError
-from armwright.proposers.for_optuna.parameters import checked_value
-from armwright.proposers.for_optuna.rules import RULES, linear, most_promising, record, standing_of
-from armwright.proposers.for_optuna.unit_interval import from_unit, is_number, to_unit
+from armwright.proposers.for_optuna.parameter_values import checked_value, from_unit, is_number, to_unit
+from armwright.proposers.for_optuna.rules import RULES, draw_rule, ridge_slope, rule_successes
+from armwright.proposers.for_optuna.study_view import StudyView
 from tests.proposers.for_optuna.test_parameters import categories, floats, ints
 
 SPACE: dict[str, BaseDistribution] = {
@@ -49,8 +49,8 @@ TWO = ("minimize", "minimize")
 
 
 def made(rule: str, study: optuna.Study, seed: int) -> tuple[dict[str, Any], str]:
-    standing = standing_of(study, aw.StudyRulesProposer().space(study), "rules")
-    return RULES[rule](standing, np.random.default_rng(seed))
+    view = StudyView.of(study, aw.StudyRulesProposer().space(study), "rules")
+    return RULES[rule](view, np.random.default_rng(seed))
 
 
 @settings(deadline=None)
@@ -156,9 +156,9 @@ def test_the_trend_goes_downhill(direction: str) -> None:
 
 def test_the_slope_is_that_of_the_plane() -> None:
     units = np.random.default_rng(1).random((400, 2))
-    slope = linear(units, units @ [2.0, -1.0])
+    slope = ridge_slope(units, units @ [2.0, -1.0])
     assert slope[0] / slope[1] == pytest.approx(-2.0, rel=0.05)
-    assert np.all(linear(units[:1], np.ones(1)) == 0.0)
+    assert np.all(ridge_slope(units[:1], np.ones(1)) == 0.0)
 
 
 def test_infeasible_trials_are_no_parents_while_there_are_feasible_ones() -> None:
@@ -172,8 +172,8 @@ def test_infeasible_trials_are_no_parents_while_there_are_feasible_ones() -> Non
                 constraints={"too much": 1.0},
             )
         )
-    standing = standing_of(study, SPACE, "rules")
-    assert [standing.complete[row].number for row in standing.best] == [0, 1]
+    view = StudyView.of(study, SPACE, "rules")
+    assert [view.complete[row].number for row in view.best] == [0, 1]
 
 
 def test_nothing_is_proposed_twice_and_a_space_that_is_used_up_is_no_fault() -> None:
@@ -203,9 +203,9 @@ def test_rules_that_brought_more_come_more_often() -> None:
                 user_attrs={"source": "rules", "proposal": f"rules-{i:04d}-{'cross' if i % 2 else 'trend'}"},
             )
         )
-    standing = standing_of(study, SPACE, "rules")
-    assert record(standing) == {"fill": (0, 0), "extend": (0, 0), "cross": (6, 0), "swap": (0, 0), "trend": (0, 6)}
-    rules = [most_promising(standing, np.random.default_rng(seed)) for seed in range(200)]
+    view = StudyView.of(study, SPACE, "rules")
+    assert rule_successes(view) == {"fill": (0, 0), "extend": (0, 0), "cross": (6, 0), "swap": (0, 0), "trend": (0, 6)}
+    rules = [draw_rule(view, np.random.default_rng(seed)) for seed in range(200)]
     assert rules.count("cross") > 3 * rules.count("trend")
 
 
@@ -215,9 +215,9 @@ def test_ranges_that_changed_count_as_far_as_they_hold() -> None:
         for _ in range(5):
             trial = study.ask()
             study.tell(trial, trial.suggest_float("x", 0.0, high))
-    standing = standing_of(study, aw.StudyRulesProposer().space(study), "rules")
-    assert 5 <= len(standing.params) < 10
-    assert all(0.0 <= own["x"] <= 5.0 for own in standing.params)
+    view = StudyView.of(study, aw.StudyRulesProposer().space(study), "rules")
+    assert 5 <= len(view.params) < 10
+    assert all(0.0 <= own["x"] <= 5.0 for own in view.params)
     for seed in range(30):
         assert 0.0 <= aw.StudyRulesProposer().propose(study, seed, seed).params.get("x", 0.0) <= 5.0
 

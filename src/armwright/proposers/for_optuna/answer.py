@@ -1,25 +1,27 @@
-"""A model's answer turned into a trial's parameters: the schema it is asked for, and what is taken of what it gives."""
+"""A model's answer for an Optuna study: its JSON schema, and its values read and checked."""
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from optuna.distributions import CategoricalDistribution, IntDistribution
+
 from armwright.exceptions import DesignError
-from armwright.llm.answer import LONGEST_REASON, object_schema
-from armwright.proposers.for_optuna.parameters import Parameter, read_value, unknown, value_schema, written_value
-from armwright.proposers.for_optuna.prompt import Told
+from armwright.llm.answer import LONGEST_REASON, answer_json, object_schema, response_schema
+from armwright.proposers.for_optuna.parameter_values import choice_texts, json_value, read_value
+from armwright.proposers.for_optuna.parameters import Parameter, unknown_parameter
+from armwright.proposers.for_optuna.prompt import StudyObjective
 from armwright.text import one_line
 
-AROUND = ("parameters", "reasoning", "reason", "expected")  # what an answer holds beside the values
-MOST_REFUSALS = 10  # told at once
-LEFT_OUT = ("", "null", "none", "n/a", "-")  # how models say that a conditional parameter plays no part
+OTHER_KEYS = ("parameters", "reasoning", "reason", "expected")  # keys of an answer that are no parameters
+MOST_ERRORS = 10  # reported at once
+LEFT_OUT = ("", "null", "none", "n/a", "-")  # values that models write for conditional parameters they leave out
 
 
 @dataclass(frozen=True)
 class StudyAnswer:
-    """Parameters by their names, why they were chosen, and the values that were expected (where that was asked)."""
+    """Parameters by name, the reason for them, and the expected values if they were asked for."""
 
     params: Mapping[str, Any]
     reason: str = ""
@@ -27,83 +29,98 @@ class StudyAnswer:
 
 
 def answer_schema(
-    parameters: Sequence[Parameter], objectives: Sequence[Told], *, reasoning: bool, expected: bool
+    parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], *, reasoning: bool, expected: bool
 ) -> dict[str, Any]:
-    """JSON schema of an answer: one property a parameter, and the reason.
+    """Return the JSON schema of an answer: the parameters and the reason for them.
 
-    reasoning: whether the thoughts come first, in the same answer.
-    expected: whether the expected values are asked for.
+    Args:
+        parameters: what the model chooses; conditional parameters are optional.
+        objectives: the study's objectives.
+        reasoning: ask for the analysis first, in the same answer.
+        expected: ask for the expected values.
     """
-    fields = {parameter.key: value_schema(parameter) for parameter in parameters}
-    needed = [parameter.key for parameter in parameters if not parameter.conditional]
-    content: dict[str, Any] = {"parameters": object_schema(fields, needed)}
-    if reasoning:
-        content = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **content}
+    fields = {parameter.key: _property(parameter) for parameter in parameters}
+    required = [parameter.key for parameter in parameters if not parameter.conditional]
+    content: dict[str, Any] = {"parameters": object_schema(fields, required)}
     if expected:
         values = {o.key: {"type": "number", "description": f"that you expect; {o.direction}"} for o in objectives}
         content["expected"] = object_schema(values)
     content["reason"] = {"type": "string", "description": "the main reason for these parameters, in one sentence"}
-    return {"title": "NewTrial", "description": "What to evaluate next.", **object_schema(content)}
+    return response_schema("NewTrial", content, reasoning=reasoning)
 
 
-def read_answer(content: Mapping[str, Any], parameters: Sequence[Parameter], objectives: Sequence[Told]) -> StudyAnswer:
-    """The parameters of an answer; DesignError says all that is wrong with it."""
-    given, unknowns = _by_name(content, parameters)
-    refusals = [str(unknown(key, [p.key for p in parameters])) for key in unknowns]
+def read_answer(
+    content: Mapping[str, Any], parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]
+) -> StudyAnswer:
+    """Read the parameters of an answer.
+
+    Raises:
+        DesignError: Values are missing or invalid; the message lists all of them.
+    """
+    given, unknown = _by_name(content, parameters)
+    errors = [str(unknown_parameter(key, [p.key for p in parameters])) for key in unknown]
     params: dict[str, Any] = {}
     for parameter in parameters:
         value = given.get(parameter.name)
         if parameter.name not in given or _is_left_out(value, parameter):
             if not parameter.conditional:
-                refusals.append(f"{parameter.key} is missing: {parameter.words}")
+                errors.append(f"{parameter.key} is missing: {parameter.description}")
             continue
         try:
             params[parameter.name] = read_value(parameter.key, value, parameter.distribution)
-        except DesignError as refusal:
-            refusals.append(str(refusal))
-    if not params and not refusals:
-        refusals = ["no parameter is given"]
-    if refusals:
-        raise DesignError("; ".join(refusals[:MOST_REFUSALS]))
+        except DesignError as error:
+            errors.append(str(error))
+    if not params and not errors:
+        errors = ["no parameter is given"]
+    if errors:
+        raise DesignError("; ".join(errors[:MOST_ERRORS]))
     reason = one_line(str(content.get("reason") or ""), LONGEST_REASON)
     return StudyAnswer(params, reason, _expected(content.get("expected"), objectives))
 
 
 def written_answer(
-    answer: StudyAnswer, parameters: Sequence[Parameter], objectives: Sequence[Told], reasoning: str = ""
+    answer: StudyAnswer, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], reasoning: str = ""
 ) -> str:
-    """An answer as JSON that `read_answer` reads back to the same."""
-    content: dict[str, Any] = {"reasoning": reasoning} if reasoning else {}
-    content["parameters"] = {
-        p.key: written_value(answer.params[p.name], p.distribution) for p in parameters if p.name in answer.params
-    }
+    """Return an answer as JSON, which `read_answer` reads without loss."""
+    values = {p.key: json_value(answer.params[p.name], p.distribution) for p in parameters if p.name in answer.params}
+    content: dict[str, Any] = {"parameters": values}
     if answer.expected is not None:
         content["expected"] = {o.key: value for o, value in zip(objectives, answer.expected, strict=True)}
-    return json.dumps({**content, "reason": answer.reason}, ensure_ascii=False)
+    return answer_json({**content, "reason": answer.reason}, reasoning)
+
+
+def _property(parameter: Parameter) -> dict[str, Any]:
+    """Return the schema of a value. Ranges are described but not enforced: a refusal can say what is wrong."""
+    distribution = parameter.distribution
+    name = {} if parameter.key == parameter.name else {"description": parameter.name}
+    if isinstance(distribution, CategoricalDistribution):
+        return {"type": "string", "enum": list(dict.fromkeys(choice_texts(distribution))), **name}
+    kind = "integer" if isinstance(distribution, IntDistribution) else "number"
+    return {"type": kind, "description": ": ".join([*name.values(), parameter.description])}
 
 
 def _by_name(content: Mapping[str, Any], parameters: Sequence[Parameter]) -> tuple[dict[str, Any], list[str]]:
-    """An answer's values by the parameters' names, and its keys that are none.
+    """Return an answer's values by parameter name, and its unknown keys.
 
-    Models leave out the object around the parameters, and take other letters.
+    Models may leave out the object around the parameters, and write names in another case.
     """
     inner = content.get("parameters")
     given = cast("dict[str, Any]", inner) if isinstance(inner, dict) else content
-    among = {word.casefold(): p.name for p in parameters for word in (p.key, p.name)}
-    among |= {word: p.name for p in parameters for word in (p.name, p.key)}
-    found: dict[str, Any] = {}
-    unknowns: list[str] = []
+    names = {word.casefold(): p.name for p in parameters for word in (p.key, p.name)}
+    names |= {word: p.name for p in parameters for word in (p.name, p.key)}
+    values: dict[str, Any] = {}
+    unknown: list[str] = []
     for key, value in given.items():
-        name = among.get(key) or among.get(key.strip().casefold())
+        name = names.get(key) or names.get(key.strip().casefold())
         if name is not None:
-            found[name] = value
-        elif given is not content or key not in AROUND:
-            unknowns.append(key)
-    return found, unknowns
+            values[name] = value
+        elif given is not content or key not in OTHER_KEYS:
+            unknown.append(key)
+    return values, unknown
 
 
 def _is_left_out(value: Any, parameter: Parameter) -> bool:
-    """Whether a value says that its parameter plays no part; a choice of that name is a choice."""
+    """Return whether a value leaves a conditional parameter out; a choice called "none" does not."""
     if not parameter.conditional:
         return False
     try:
@@ -113,18 +130,11 @@ def _is_left_out(value: Any, parameter: Parameter) -> bool:
     return False
 
 
-def _expected(given: Any, objectives: Sequence[Told]) -> tuple[float, ...] | None:
-    """The expected values; None unless all are there."""
-    if not isinstance(given, dict):
+def _expected(given: Any, objectives: Sequence[StudyObjective]) -> tuple[float, ...] | None:
+    """Return the expected values; None unless all are finite numbers."""
+    values = cast("dict[str, Any]", given) if isinstance(given, dict) else {}
+    try:
+        numbers = tuple(float(values.get(o.key, values.get(o.name))) for o in objectives)  # pyright: ignore[reportArgumentType]
+    except (TypeError, ValueError, OverflowError):
         return None
-    values = cast("dict[str, Any]", given)
-    numbers: list[float] = []
-    for objective in objectives:
-        try:
-            number = float(values.get(objective.key, values.get(objective.name)))  # pyright: ignore[reportArgumentType]
-        except (TypeError, ValueError, OverflowError):
-            return None
-        if not math.isfinite(number):
-            return None
-        numbers.append(number)
-    return tuple(numbers)
+    return numbers if all(map(math.isfinite, numbers)) else None

@@ -12,8 +12,8 @@ from armwright.llm.backend import CHECK, Question, Reply
 from armwright.llm.prompt import Form
 from armwright.llm.session import LlmSession
 from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
-from armwright.proposers.for_optuna.parameters import Parameter, Space, stated_space, told_parameters
-from armwright.proposers.for_optuna.prompt import Told, parameters_prompt, study_prompt, told_objectives
+from armwright.proposers.for_optuna.parameters import Parameter, Space, stated_space, study_parameters
+from armwright.proposers.for_optuna.prompt import StudyObjective, parameters_prompt, study_objectives, study_prompt
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
 from armwright.proposers.prompted import ANSWERS, Asking
 
@@ -84,10 +84,10 @@ class StudyLlmProposer(LlmSession, StudyProposer):
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """The next trial, from what the study has found."""
         trials = study.get_trials(deepcopy=False)
-        parameters = told_parameters(self.space(study), trials)
+        parameters = study_parameters(self.space(study), trials)
         if not parameters:
             raise ProposalError("space", "no trial has shown a parameter yet; give StudyLlmProposer(space=…)")
-        objectives = told_objectives(study)
+        objectives = study_objectives(study)
         identity = f"{self.name}-{number:04d}"
         prompt = study_prompt(
             study,
@@ -96,7 +96,7 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             self.description,
             seed,
             memory=self.memory,
-            name=self.name,
+            source=self.name,
             form=self._form,
         )
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
@@ -109,7 +109,9 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         answer = read_answer(json.loads(text), parameters, objectives)
         return StudyProposal(answer.params, identity, answer.reason, answer.expected)
 
-    def _ask_for(self, question: Question, parameters: Sequence[Parameter], objectives: Sequence[Told]) -> Reply:
+    def _ask_for(
+        self, question: Question, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]
+    ) -> Reply:
         def read(content: Mapping[str, Any]) -> str:
             answer: StudyAnswer = read_answer(content, parameters, objectives)
             return written_answer(answer, parameters, objectives, str(content.get("reasoning") or ""))
