@@ -12,7 +12,7 @@ from pathlib import Path
 
 import armwright
 from armwright.experiments.baselines import BASELINES, baselines, baselines_of
-from armwright.files import as_csv
+from armwright.files import to_csv
 from armwright.runs.best_known import best_known_hypervolume
 from armwright.tasks.task import builtin_tasks
 
@@ -34,7 +34,7 @@ def main(folder: Path) -> None:
     ]
     made = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
     head = f"# armwright experiment suite, with {made} on Python {platform.python_version()}; benchmarks/baselines.py\n"
-    (PACKAGE / "experiments" / BASELINES).write_text(head + as_csv(records), encoding="utf-8")
+    (PACKAGE / "experiments" / BASELINES).write_text(head + to_csv(records), encoding="utf-8")
     baselines.cache_clear()
     PAGE.write_text(page(), encoding="utf-8")
 

@@ -33,7 +33,7 @@ SPACE = paper_space(6)
 def main() -> None:
     matrix = SPACE.matrix(SPACE.sample(N, seed=0))
     arms = stack_designs(SPACE, matrix)
-    q = evaluate_arrays(arms, TASK.points).q
+    q = evaluate_arrays(arms, TASK.target_positions).q
     paper = Problem(TASK, SPACE)
     with_clearance = Problem(TASK, SPACE, objectives=named_objectives(["position_error", "torque", "collision"]))
     work: dict[str, Callable[[], object]] = {

@@ -35,7 +35,7 @@ from armwright.spaces.design_space import paper_space
 from armwright.spaces.link_mass import MassPerMetre
 from armwright.tasks.task import load_task
 
-TARGETS = load_task("target-1").points
+TARGETS = load_task("target-1").target_positions
 PROBLEM = Problem(load_task("target-1"))
 ARMS = [paper_space().arm(design) for design in paper_space().sample(20_000, seed=0)]
 

@@ -33,7 +33,7 @@ def main() -> None:
         words: lambda problem=problem: problem.evaluate_matrix(matrix) for words, problem in problems.items()
     }
     rates = rates_in_turn(work, N, ROUNDS)
-    samples = sum(n + 1 for n in TASK.lines.steps(TASK.points))
+    samples = sum(n + 1 for n in TASK.straight_moves.steps(TASK.target_positions))
     print(
         f"Moves: designs/s on one core, D = 6, 8 targets, 7 moves, {samples} samples; median of {ROUNDS} (least, most)"
     )

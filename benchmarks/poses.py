@@ -44,9 +44,9 @@ def main() -> None:
         best = np.full(len(kinds), np.inf)
         for _ in range(5):
             for i, rows in enumerate(kinds):
-                goals = replace(position_targets(TARGETS), n_angular=np.array(rows), rotation=rotation)
+                target_arrays = replace(position_targets(TARGETS), n_angular=np.array(rows), rotation=rotation)
                 began = time.process_time()
-                solve_postures(arms, points, goals=goals)
+                solve_postures(arms, points, target_arrays=target_arrays)
                 best[i] = min(best[i], time.process_time() - began)
         points_, axes, orientations, mixed = ARMS / best
         print(

@@ -17,7 +17,8 @@ REAL = Task.model_validate(
     {
         "name": "real",
         "targets": [
-            {"position": list(point), "axis": [0.0, 0.0, -1.0]} for point in load_task("target-1").points.tolist()
+            {"position": list(point), "axis": [0.0, 0.0, -1.0]}
+            for point in load_task("target-1").target_positions.tolist()
         ],
         "payload": 0.2,
         "obstacles": [

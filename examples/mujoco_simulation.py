@@ -29,9 +29,9 @@ def follow(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
     model.dof_armature[:] = 1e-4  # [kg m²] of the rotors, without which joints of so light arms are stiff to compute
     data = mujoco.MjData(model)
     tip = model.site("tip").id
-    postures = aw.evaluate([arm], task.points).q[0, :, : model.nq]  # (T, D) [rad], by our inverse kinematics
+    postures = aw.evaluate([arm], task.target_positions).q[0, :, : model.nq]  # (T, D) [rad], by our inverse kinematics
     distance = work = 0.0
-    for target, posture in zip(task.points, postures, strict=True):
+    for target, posture in zip(task.target_positions, postures, strict=True):
         for _ in range(round(SECONDS / model.opt.timestep)):
             torque = STIFFNESS * (posture - data.qpos) - DAMPING * data.qvel
             data.qfrc_applied[:] = np.clip(torque, -LARGEST_TORQUE, LARGEST_TORQUE)

@@ -11,12 +11,12 @@ from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from armwright.pareto import (
     FrontTracker,
     default_reference_point,
+    front_indices,
     front_mask,
-    front_numbers,
     hypervolume,
     hypervolume_history,
-    knee_number,
-    solution_numbers,
+    knee_index,
+    paper_solution_indices,
 )
 
 REFERENCE = (5.0, 5.0)
@@ -56,7 +56,7 @@ def test_front_by_its_definition(values: np.ndarray) -> None:
 @EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_front_numbers_rise_in_the_first_objective_and_fall_in_the_second(values: np.ndarray) -> None:
-    front = values[front_numbers(values)]
+    front = values[front_indices(values)]
     assert np.all(np.diff(front[:, 0]) > 0)
     assert np.all(np.diff(front[:, 1]) < 0)
 
@@ -118,12 +118,12 @@ def test_inputs_are_left_as_they_are(values: np.ndarray) -> None:
     before = values.copy()
     values.flags.writeable = False
     front_mask(values)
-    front_numbers(values)
+    front_indices(values)
     hypervolume(values, REFERENCE)
     hypervolume_history(values, REFERENCE)
     default_reference_point(values)
-    knee_number(values, REFERENCE)
-    solution_numbers(values, REFERENCE)
+    knee_index(values, REFERENCE)
+    paper_solution_indices(values, REFERENCE)
     assert np.array_equal(values, before)
 
 
@@ -138,11 +138,11 @@ def test_closed_forms() -> None:
 def test_nothing_evaluated_yet() -> None:
     nothing = np.empty((0, 2))
     assert front_mask(nothing).shape == (0,)
-    assert front_numbers(nothing) == []
+    assert front_indices(nothing) == []
     assert hypervolume(nothing, REFERENCE) == 0.0
     assert hypervolume_history(nothing, REFERENCE).shape == (0,)
-    assert knee_number(nothing, REFERENCE) is None
-    assert solution_numbers(nothing, REFERENCE) is None
+    assert knee_index(nothing, REFERENCE) is None
+    assert paper_solution_indices(nothing, REFERENCE) is None
     assert FrontTracker(2, REFERENCE).size == 0
     assert FrontTracker(2, REFERENCE).hypervolume == 0.0
 
@@ -165,7 +165,7 @@ def test_default_reference_point_bounds_the_front(values: np.ndarray) -> None:
 def test_solutions_are_the_ends_of_the_front_in_the_box(values: np.ndarray) -> None:
     """docs/method.md §7: the front's designs of least E_pos and of least E_torque within the reference box."""
     inside = [i for i in np.flatnonzero(front_mask(values)) if np.all(values[i] < REFERENCE)]
-    solutions = solution_numbers(values, REFERENCE)
+    solutions = paper_solution_indices(values, REFERENCE)
     if not inside:
         assert solutions is None
         return
@@ -176,8 +176,8 @@ def test_solutions_are_the_ends_of_the_front_in_the_box(values: np.ndarray) -> N
 @EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_knee_is_farthest_below_the_line_between_the_ends(values: np.ndarray) -> None:
-    inside = [i for i in front_numbers(values) if np.all(values[i] < REFERENCE)]
-    knee = knee_number(values, REFERENCE)
+    inside = [i for i in front_indices(values) if np.all(values[i] < REFERENCE)]
+    knee = knee_index(values, REFERENCE)
     if len(inside) < 3:
         assert knee is None
         return
@@ -190,5 +190,5 @@ def test_knee_is_farthest_below_the_line_between_the_ends(values: np.ndarray) ->
 
 def test_knee_of_a_bent_front() -> None:
     values = np.array([[0.0, 4.0], [0.5, 0.5], [4.0, 0.0], [4.9, 4.9]])
-    assert knee_number(values, REFERENCE) == 1
-    assert knee_number(values, (0.6, 5.0)) is None
+    assert knee_index(values, REFERENCE) == 1
+    assert knee_index(values, (0.6, 5.0)) is None

@@ -42,7 +42,7 @@ def check_extra(extra: str, subject: str) -> None:
 
 
 @contextmanager
-def needed(extra: str, subject: str) -> Generator[None]:
+def requires_extra(extra: str, subject: str) -> Generator[None]:
     """Around imports of what `subject` needs; MissingExtraError where one fails."""
     try:
         yield
@@ -50,10 +50,10 @@ def needed(extra: str, subject: str) -> Generator[None]:
         raise _missing(extra, subject, missing_packages(extra) or [str(fault.name)]) from fault
     except ImportError as fault:  # another version
         words = " ".join(str(fault).split())
-        raise MissingExtraError(f"{subject} needs another {fault.name} ({words}): {command(extra)}") from fault
+        raise MissingExtraError(f"{subject} needs another {fault.name} ({words}): {install_command(extra)}") from fault
 
 
-def command(extra: str) -> str:
+def install_command(extra: str) -> str:
     """What installs an extra."""
     return f'pip install "armwright[{extra}]"'
 
@@ -61,4 +61,4 @@ def command(extra: str) -> str:
 def _missing(extra: str, subject: str, packages: list[str]) -> MissingExtraError:
     *others, last = packages
     named = f"{', '.join(others)} and {last}" if others else last
-    return MissingExtraError(f"{subject} needs {named}: {command(extra)}")
+    return MissingExtraError(f"{subject} needs {named}: {install_command(extra)}")

@@ -33,7 +33,7 @@ def replace_folder(target: Path, part: Path | None = None) -> None:
         shutil.rmtree(old)
 
 
-def writable(text: str) -> str:
+def replace_surrogates(text: str) -> str:
     """Return text without lone surrogates, which JSON and file names allow and UTF-8 does not."""
     return text.encode("utf-8", "replace").decode("utf-8")
 
@@ -45,7 +45,7 @@ def check_name(name: str) -> str:
     return name
 
 
-def as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
+def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     """Records of the same keys as CSV, with a first line of these; empty for none."""
     out = io.StringIO()
     writer: csv.DictWriter[str] | None = None

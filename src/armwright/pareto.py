@@ -31,7 +31,7 @@ def front_mask(values: Array) -> NDArray[np.bool_]:
     return moocore.is_nondominated(values, keep_weakly=False) & np.all(values < np.inf, axis=1)
 
 
-def front_numbers(values: Array) -> list[int]:
+def front_indices(values: Array) -> list[int]:
     """The rows on the front, by rising first objective."""
     numbers = np.flatnonzero(front_mask(values))
     return numbers[np.argsort(values[numbers, 0], kind="stable")].tolist()
@@ -104,16 +104,16 @@ def default_reference_point(values: Array) -> tuple[float, ...]:
     return tuple(np.maximum(worst, 1e-9).tolist())
 
 
-def knee_number(values: Array, reference_point: Sequence[float]) -> int | None:
+def knee_index(values: Array, reference_point: Sequence[float]) -> int | None:
     """The row on the front that is farthest below the straight line (plane) between its ends within the reference box.
 
     None where fewer than three designs of the front lie in the box.
 
     Examples:
-        >>> knee_number(np.array([[0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]), (5.0, 5.0))
+        >>> knee_index(np.array([[0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]), (5.0, 5.0))
         1
     """
-    numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
+    numbers = [n for n in front_indices(values) if np.all(values[n] < np.asarray(reference_point))]
     if len(numbers) < 3:
         return None
     front = values[numbers]
@@ -122,14 +122,14 @@ def knee_number(values: Array, reference_point: Sequence[float]) -> int | None:
     return numbers[int(np.argmin(scaled.sum(axis=1)))]
 
 
-def solution_numbers(values: Array, reference_point: Sequence[float]) -> tuple[int, int] | None:
+def paper_solution_indices(values: Array, reference_point: Sequence[float]) -> tuple[int, int] | None:
     """Solutions 1 and 2 of the paper's figures: least first, least last objective, within the reference box.
 
     (Of the paper's objectives: least position error, least torque.)
 
     None where the front lies wholly outside the box.
     """
-    numbers = [n for n in front_numbers(values) if np.all(values[n] < np.asarray(reference_point))]
+    numbers = [n for n in front_indices(values) if np.all(values[n] < np.asarray(reference_point))]
     return (numbers[0], min(numbers, key=lambda n: values[n, -1])) if numbers else None
 
 

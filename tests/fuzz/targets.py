@@ -166,7 +166,7 @@ tie: {link_2: link_1}
 
 def _postures(problem: Problem) -> int:
     task = problem.task
-    moves = sum(task.lines.steps(task.points)) + len(task.lines)
+    moves = sum(task.straight_moves.steps(task.target_positions)) + len(task.straight_moves)
     parts = len(task.targets) * (1 + task.restarts) + moves + sum(region.points for region in task.workspace)
     return parts * len(task.cases)
 

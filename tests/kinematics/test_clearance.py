@@ -190,7 +190,7 @@ def test_depth_is_that_of_the_axis_and_the_radius() -> None:
         (Ground(kind="ground", z=0.3), 0.3 - 0.04 + 0.02),
     ):
         found = clearances(stack_arms([rod]), np.zeros((1, 1, 1)), [obstacle])[1]
-        assert found[0, 0] == pytest.approx(-depth, abs=1e-6), obstacle.words()
+        assert found[0, 0] == pytest.approx(-depth, abs=1e-6), obstacle.describe()
     links = tuple(uniform_link((0.0, 0.0, long), 1.0, 0.02) for long in (0.5, 0.2, 0.5, 0.5))
     square = Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", "y", -3, 3) for _ in links), links)
     folded = np.array([[[0.0, np.pi / 2, np.pi / 2, np.pi / 2]]])  # the last crosses the first

@@ -27,7 +27,7 @@ from armwright.robot.link_geometry import inertia_tensor
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.tasks.moves import Moves, lines_of, moments, timing_of
+from armwright.tasks.moves import Moves, quintic_rates, sample_moves, time_samples
 from armwright.tasks.task import Task
 
 Array = NDArray[np.float64]
@@ -165,7 +165,7 @@ def test_the_jacobian_s_rate_is_its_difference() -> None:
 def test_a_move_begins_and_ends_at_rest_and_covers_its_line() -> None:
     t = np.linspace(0.0, 1.0, 2001)
     s = t**3 * (10 - 15 * t + 6 * t**2)
-    speed, acceleration = moments(s)
+    speed, acceleration = quintic_rates(s)
     assert speed == pytest.approx(np.gradient(s, t, edge_order=2), abs=1e-5)
     assert acceleration == pytest.approx(np.gradient(speed, t, edge_order=2), abs=1e-3)
     for ends in (speed[[0, -1]], acceleration[[0, -1]]):
@@ -177,8 +177,8 @@ def test_a_move_begins_and_ends_at_rest_and_covers_its_line() -> None:
 def test_short_moves_are_looked_at_between_their_samples() -> None:
     moves = Moves(((0, 1), (1, 2)), 0.02, (2.0, 0.5))
     targets = np.array([[0.0, 0, 0], [0.01, 0, 0], [1.01, 0, 0]])
-    lines = lines_of(moves, targets)
-    timing = timing_of(moves, lines)
+    lines = sample_moves(moves, targets)
+    timing = time_samples(moves, lines)
     assert np.array_equal(np.diff(timing.first), [33, 51])
     share = timing.between(lines.share[None, :, None])[0, :, 0]
     for first, end, time in zip(timing.first, timing.first[1:], moves.times, strict=False):
@@ -201,7 +201,7 @@ def by_differences(step: float, time: float) -> tuple[Array, Array]:
     paths, drives = evaluation.paths, evaluation.drives
     assert paths.error.max() < 1e-4
     model = pinocchio.buildModelFromXML(to_urdf(loaded(arm, 0.5)))
-    data, share, q = model.createData(), paths.lines.share, paths.q[0]
+    data, share, q = model.createData(), paths.samples.share, paths.q[0]
     slope = np.gradient(q, share, axis=0, edge_order=2)
     bend = np.zeros(q.shape)
     bend[1:-1] = (q[2:] - 2 * q[1:-1] + q[:-2]) / (share[1] - share[0]) ** 2
@@ -352,9 +352,9 @@ def test_they_need_moves_that_take_time(objective: str) -> None:
 
 
 def test_a_task_says_one_time_or_each() -> None:
-    assert task(move_time=2).lines.times == (2.0, 2.0)
-    assert task(move_time=[2, 0.5]).lines.times == (2.0, 0.5)
-    assert task().lines.times == ()
+    assert task(move_time=2).straight_moves.times == (2.0, 2.0)
+    assert task(move_time=[2, 0.5]).straight_moves.times == (2.0, 0.5)
+    assert task().straight_moves.times == ()
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ KINDS = pytest.mark.parametrize("rows", [2, 3])
 DOWN = (0.0, 0.0, -1.0)
 
 
-def goals(rows: list[int], seed: int = 0, restarts: int = 0) -> TargetArrays:
+def target_arrays(rows: list[int], seed: int = 0, restarts: int = 0) -> TargetArrays:
     """Targets of these kinds, with random orientations."""
     rng, plain = np.random.default_rng(seed), position_targets(len(rows), restarts)
     rotations = np.linalg.qr(rng.normal(size=(len(rows), 3, 3)))[0]
@@ -40,7 +40,7 @@ def goals(rows: list[int], seed: int = 0, restarts: int = 0) -> TargetArrays:
 
 def tooled_arms(n: int, dof: int, seed: int) -> list[Arm]:
     """General arms whose tools point anywhere."""
-    frames = goals([3] * n, seed + 1).rotation
+    frames = target_arrays([3] * n, seed + 1).rotation
     return [
         replace(arm, tool_axis=tuple(frame[:, 2].tolist()), tool_side=tuple(frame[:, 0].tolist()))
         for arm, frame in zip(general_arms(n, dof, seed), frames, strict=True)
@@ -74,9 +74,9 @@ def test_reference_agrees_with_pinocchio(dof: int) -> None:
 @KINDS
 def test_angles_left_agree_with_pinocchio(rows: int) -> None:
     """What is left to turn, and the angle that the kernels report, from Pinocchio's logarithm and arc cosine."""
-    arms, asked = tooled_arms(100, 5, 2), goals([rows] * 2, 3)
+    arms, asked = tooled_arms(100, 5, 2), target_arrays([rows] * 2, 3)
     points = np.array([[0.3, -0.2, 0.4], [0.1, 0.3, -0.2]])
-    postures = solve_postures(stack_arms(arms), points, goals=asked)
+    postures = solve_postures(stack_arms(arms), points, target_arrays=asked)
     for i, arm in enumerate(arms):
         model = pinocchio.buildModelFromXML(to_urdf(arm))
         data = model.createData()
@@ -102,7 +102,7 @@ def test_single_updates_in_float64_agree_with_the_reference(dof: int, rows: int)
     moving = [j for j, joint in enumerate(arms[0].joints) if joint.kind != "fixed"]
     chains, arrays = reference.chains(arms), stack_arms(arms, "float64")
     q, h_before, points = states(chains, dof)
-    asked = goals([rows], dof)
+    asked = target_arrays([rows], dof)
     wide_q, wide_h = np.zeros((2, *arrays.lower.shape))
     wide_q[:, moving], wide_h[:, moving] = q[:, 0], h_before[:, 0]
     after, gradient = update_once(arrays, points[:, 0], wide_q, wide_h, asked)
@@ -130,7 +130,7 @@ def test_single_updates_in_float32_agree_with_float64(dof: int, rows: int) -> No
     q[narrow.motion == FIXED] = 0.0
     h = np.zeros_like(q)
     points = np.float64(narrow.base) + np.float32(rng.uniform(-1.0, 1.0, (len(arms), 3)))
-    asked = goals([rows], dof)
+    asked = target_arrays([rows], dof)
     off = np.abs(
         update_once(narrow, points, q, h, asked)[0] - update_once(wide, points, np.float64(q), np.float64(h), asked)[0]
     ).max(axis=1)
@@ -155,13 +155,13 @@ def test_targets_of_all_kinds_side_by_side(dof: int) -> None:
     arms = tooled_arms(200, dof, 7)
     moving = [j for j, joint in enumerate(arms[0].joints) if joint.kind != "fixed"]
     chains, arrays = reference.chains(arms), stack_arms(arms, "float64")
-    asked, points = goals([2, 0, 3, 0, 2, 3], dof), np.random.default_rng(dof).uniform(-0.5, 0.5, (6, 3))
+    asked, points = target_arrays([2, 0, 3, 0, 2, 3], dof), np.random.default_rng(dof).uniform(-0.5, 0.5, (6, 3))
     asked = replace(asked, angle_tolerance=np.array([0.02, 0.02, 0.1, 0.02, 0.5, 0.01]))
     inside = np.random.default_rng(1).uniform(0.3, 0.7, (200, 6, dof))
     start = chains.lower + inside * (chains.upper - chains.lower)
     wide = np.zeros((200, 6, arrays.dof))
     wide[..., moving] = start
-    ours = solve_postures(arrays, points, 8, start=wide, goals=asked, precision="float64")
+    ours = solve_postures(arrays, points, 8, start=wide, target_arrays=asked, precision="float64")
     q, distance, angle = reference_poses.solve(chains, points, asked, *tools(arms), 8, start)
     agree = np.abs(ours.q[..., moving] - q).max(axis=-1) < 1e-6
     assert agree.mean() > 0.995
@@ -173,10 +173,10 @@ def test_targets_of_all_kinds_side_by_side(dof: int) -> None:
 def test_a_point_beside_others_is_solved_as_alone() -> None:
     """To rounding: after 5 updates in float64 the tips agree, after 100 as many are reached."""
     arms, points = stack_arms(paper_arms(400, 5, 3), "float64"), np.array([[0.3, 0.2, 0.4], [-0.2, 0.4, 0.1]])
-    asked = goals([0, 2])
+    asked = target_arrays([0, 2])
     for updates, most in ((5, 1e-8), (100, np.inf)):
         alone = solve_postures(arms, points, updates, precision="float64")
-        beside = solve_postures(arms, points, updates, goals=asked, precision="float64")
+        beside = solve_postures(arms, points, updates, target_arrays=asked, precision="float64")
         assert np.abs(alone.reached - beside.reached)[:, 0].max() < most
         reached = [np.linalg.norm(each.reached - points, axis=-1)[:, 0] < 1e-3 for each in (alone, beside)]
         assert abs(reached[0].mean() - reached[1].mean()) < 5e-3
@@ -184,7 +184,7 @@ def test_a_point_beside_others_is_solved_as_alone() -> None:
 
 def test_points_alone_take_the_kernels_for_points() -> None:
     arms, points = stack_arms(paper_arms(50, 4, 3)), np.array([[0.3, 0.2, 0.4]] * 3)
-    plain, asked = solve_postures(arms, points), solve_postures(arms, points, goals=position_targets(3))
+    plain, asked = solve_postures(arms, points), solve_postures(arms, points, target_arrays=position_targets(3))
     assert np.array_equal(plain.q, asked.q)
     assert np.array_equal(plain.torque, asked.torque)
     assert not asked.angle.any()
@@ -199,10 +199,12 @@ def test_what_an_arm_can_do_is_found(rows: int) -> None:
     arm = space.arm(space.clipped((0.0, 0.0, 0.0), "YPPYPY", (0.1, 0.3, 0.3, 0.05, 0.05, 0.05)))
     chains = reference.chains([arm])
     q = np.random.default_rng(2).uniform(-2.0, 2.0, (1, 40, 6))
-    asked = replace(goals([rows] * 40, restarts=20), rotation=reference_poses.tool(chains, q, *tools([arm]))[0])
-    found = evaluate([arm], reference.tip(chains, q)[0], goals=asked)
+    asked = replace(target_arrays([rows] * 40, restarts=20), rotation=reference_poses.tool(chains, q, *tools([arm]))[0])
+    found = evaluate([arm], reference.tip(chains, q)[0], target_arrays=asked)
     assert (~found.missed).mean() > 0.95
-    assert (~evaluate([arm], reference.tip(chains, q)[0], goals=replace(asked, restarts=0)).missed).mean() < 0.95
+    assert (
+        ~evaluate([arm], reference.tip(chains, q)[0], target_arrays=replace(asked, restarts=0)).missed
+    ).mean() < 0.95
 
 
 # Properties
@@ -211,35 +213,35 @@ def test_what_an_arm_can_do_is_found(rows: int) -> None:
 @pytest.mark.parametrize("lanes", [1, 2])
 @pytest.mark.slow
 def test_lanes_do_not_change_the_bits(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    arms, asked = stack_arms(tooled_arms(60, 6, 12)), goals([2, 3, 0, 3, 2, 2, 3, 0, 2])
+    arms, asked = stack_arms(tooled_arms(60, 6, 12)), target_arrays([2, 3, 0, 3, 2, 2, 3, 0, 2])
     points = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 3))
-    whole = solve_postures(arms, points, goals=asked)
+    whole = solve_postures(arms, points, target_arrays=asked)
     monkeypatch.setitem(solve.LANES, "cpu", lanes)
-    part = solve_postures(arms, points, goals=asked)
+    part = solve_postures(arms, points, target_arrays=asked)
     for name in ("q", "reached", "torque", "angle"):
         assert np.array_equal(getattr(whole, name), getattr(part, name))
 
 
 def test_result_does_not_depend_on_the_batch() -> None:
-    arms, asked = tooled_arms(60, 6, 12), goals([2, 3, 0, 3, 2], restarts=2)
+    arms, asked = tooled_arms(60, 6, 12), target_arrays([2, 3, 0, 3, 2], restarts=2)
     points = np.random.default_rng(1).uniform(-0.5, 0.5, (5, 3))
-    whole, alone = (evaluate(some, points, goals=asked) for some in (arms, arms[17:18]))
+    whole, alone = (evaluate(some, points, target_arrays=asked) for some in (arms, arms[17:18]))
     for name in ("q", "reached", "joint_torques", "angle_error"):
         assert np.array_equal(getattr(whole, name)[17:18], getattr(alone, name))
 
 
 @KINDS
 def test_kept_posture_does_not_get_worse_and_keeps_the_limits(rows: int) -> None:
-    arms, asked = stack_arms(tooled_arms(300, 6, 13)), goals([rows] * 2, 5)
+    arms, asked = stack_arms(tooled_arms(300, 6, 13)), target_arrays([rows] * 2, 5)
     points = np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     off = [
         np.hypot(np.linalg.norm(p.reached - points, axis=-1), asked.metres_per_radian * p.angle)
-        for p in (solve_postures(arms, points, updates, goals=asked) for updates in (0, 5, 50, 100))
+        for p in (solve_postures(arms, points, updates, target_arrays=asked) for updates in (0, 5, 50, 100))
     ]
     for before, after in pairwise(off):
         assert np.all(after <= before + 1e-6)
     assert (off[-1] < off[0]).mean() > 0.95
-    q = solve_postures(arms, points, goals=asked).q
+    q = solve_postures(arms, points, target_arrays=asked).q
     assert np.all((q >= arms.lower[:, None]) & (q <= arms.upper[:, None]))
 
 
@@ -247,12 +249,16 @@ def test_kept_posture_does_not_get_worse_and_keeps_the_limits(rows: int) -> None
 def test_world_turned_about_the_vertical(rows: int) -> None:
     """A quarter turn of base, tool and targets turns the result: x becomes y, and joints about y turn the other way."""
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    arms, points, asked = tooled_arms(300, 6, 14), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]]), goals([rows] * 2, 6)
+    arms, points, asked = (
+        tooled_arms(300, 6, 14),
+        np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]]),
+        target_arrays([rows] * 2, 6),
+    )
     turned_arms = [_turned_arm(arm) for arm in arms]
-    turned_goals = replace(asked, rotation=quarter @ asked.rotation)
-    plain = solve_postures(stack_arms(arms, "float64"), points, 10, goals=asked, precision="float64")
+    rotated_arrays = replace(asked, rotation=quarter @ asked.rotation)
+    plain = solve_postures(stack_arms(arms, "float64"), points, 10, target_arrays=asked, precision="float64")
     other = solve_postures(
-        stack_arms(turned_arms, "float64"), points @ quarter.T, 10, goals=turned_goals, precision="float64"
+        stack_arms(turned_arms, "float64"), points @ quarter.T, 10, target_arrays=rotated_arrays, precision="float64"
     )
     sign = np.array([[-1.0 if joint.axis == "y" else 1.0 for joint in arm.joints] for arm in arms])
     agree = np.abs(other.q - plain.q * sign[:, None]).max(axis=-1) < 1e-6
@@ -281,13 +287,17 @@ def _turned_arm(arm: Arm) -> Arm:
 def test_mirrored_arm_gives_the_mirrored_result() -> None:
     """In the xz-plane, axis targets, to the bit: a change of sign does not round, and no choice prefers a side."""
     mirror = np.array([1.0, -1.0, 1.0])
-    arms, points, asked = tooled_arms(300, 5, 13), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]]), goals([2, 2], 7)
+    arms, points, asked = (
+        tooled_arms(300, 5, 13),
+        np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]]),
+        target_arrays([2, 2], 7),
+    )
     z = asked.rotation[:, :, 2] * mirror
-    mirrored_goals = replace(asked, rotation=np.array([rotation_to_axis(tuple(axis)) for axis in z]))
-    mirrored_goals.rotation[:, :, 2] = z
+    mirrored_arrays = replace(asked, rotation=np.array([rotation_to_axis(tuple(axis)) for axis in z]))
+    mirrored_arrays.rotation[:, :, 2] = z
     sign = np.array([[1.0 if joint.axis == "y" else -1.0 for joint in arm.joints] for arm in arms])
-    plain = solve_postures(stack_arms(arms), points, goals=asked)
-    other = solve_postures(stack_arms([_mirrored(arm) for arm in arms]), points * mirror, goals=mirrored_goals)
+    plain = solve_postures(stack_arms(arms), points, target_arrays=asked)
+    other = solve_postures(stack_arms([_mirrored(arm) for arm in arms]), points * mirror, target_arrays=mirrored_arrays)
     assert np.array_equal(other.q, plain.q * sign[:, None])
     assert np.array_equal(other.reached, plain.reached * mirror)
     assert np.array_equal(other.angle, plain.angle)
@@ -323,10 +333,10 @@ def test_half_a_turn_is_defined(rows: int, precision: str) -> None:
     ]
     for half in halves:
         asked = replace(position_targets(1), n_angular=np.array([rows]), rotation=half[None])
-        found = solve_postures(stack_arms([pitch], precision), points, goals=asked, precision=precision)
+        found = solve_postures(stack_arms([pitch], precision), points, target_arrays=asked, precision=precision)
         assert all(np.isfinite(values).all() for values in (found.q, found.reached, found.torque, found.angle))
     asked = replace(position_targets(1), n_angular=np.array([2]), rotation=rotation_to_axis(DOWN)[None])
-    found = solve_postures(stack_arms([pitch], precision), points, 1, goals=asked, precision=precision)
+    found = solve_postures(stack_arms([pitch], precision), points, 1, target_arrays=asked, precision=precision)
     assert found.q[0, 0].max() > 0.1, "it turns about y, which its joints can"
     assert found.angle[0, 0] < np.pi - 0.1
 
@@ -349,11 +359,11 @@ def test_restarts_never_make_it_worse_and_begin_with_the_usual_start() -> None:
     arms, points = stack_arms(general_arms(100, 5, 3)), np.random.default_rng(3).uniform(-0.6, 0.6, (4, 3))
     least = evaluate_arrays(arms, points).position_error
     for restarts in (1, 3):
-        more = evaluate_arrays(arms, points, goals=position_targets(4, restarts))
+        more = evaluate_arrays(arms, points, target_arrays=position_targets(4, restarts))
         assert np.all(more.position_error <= least)
         assert (more.position_error < least - 1e-3).any()
         least = more.position_error
-        assert np.array_equal(more.q, evaluate_arrays(arms, points, goals=position_targets(4, restarts)).q)
+        assert np.array_equal(more.q, evaluate_arrays(arms, points, target_arrays=position_targets(4, restarts)).q)
     assert np.all(more.q[np.broadcast_to((arms.motion == FIXED)[:, None], more.q.shape)] == 0.0)
 
 
@@ -372,9 +382,9 @@ def test_whole_solves_agree_with_scikit_robot(dof: int, rows: int) -> None:
     arms = [replace(arm, base=(0.0, 0.0, 0.0)) for arm in paper_arms(25, dof, 8)]
     points, asked = (
         np.random.default_rng(3).uniform((-0.35, -0.35, -0.05), (0.35, 0.35, 0.65), (4, 3)),
-        goals([rows] * 4, 4),
+        target_arrays([rows] * 4, 4),
     )
-    ours = evaluate(arms, points, goals=asked)
+    ours = evaluate(arms, points, target_arrays=asked)
     theirs = np.array([scikit_robot_errors(arm, points, asked) for arm in arms])
     distance, angle = theirs[..., 0], theirs[..., 1]
     reached = (distance < asked.tolerance) & (angle < asked.angle_tolerance)

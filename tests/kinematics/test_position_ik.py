@@ -230,7 +230,7 @@ def test_float32_products_would_not_do() -> None:
 @pytest.mark.slow
 def test_whole_solves_agree_with_the_reference_in_distribution() -> None:
     """10,000 of the paper's arms at target-1: mean E_pos and E_torque within 0.5 %, share reached within 0.2 points."""
-    arms, targets = paper_arms(10_000, 4, 6), load_task("target-1").points
+    arms, targets = paper_arms(10_000, 4, 6), load_task("target-1").target_positions
     ours, chains = solve_postures(stack_arms(arms), targets), reference.chains(arms)
     parts = [reference.solve(chains[i : i + 250], targets) for i in range(0, len(arms), 250)]
     error, torque = (np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "torque"))
@@ -247,7 +247,7 @@ def test_whole_solves_in_float64_agree_with_the_reference(arms_of: ArmMaker) -> 
     the reference itself with the base moved by 1e-15 m (68 % of the paper's arms, 92 % of general ones). In float32 it
     is 57 % after 20.
     """
-    arms, targets = arms_of(100, 4, 6), load_task("target-1").points
+    arms, targets = arms_of(100, 4, 6), load_task("target-1").target_positions
     chains, arrays = reference.chains(arms), stack_arms(arms, "float64")
 
     def agreeing(ours: Array, theirs: Array) -> float:
@@ -287,7 +287,7 @@ def test_position_errors_agree_with_scikit_robot() -> None:
     over the arms within 0.5 %, the share of reached targets (1 mm) within 0.5 points; and for at least 90 % of the
     (arm, target) pairs the two errors differ by less than 1 % + 1 mm, the rest being the solver's chaos.
     """
-    arms, targets = paper_arms(100, 4, 8), load_task("target-1").points
+    arms, targets = paper_arms(100, 4, 8), load_task("target-1").target_positions
     ours = error_of(solve_postures(stack_arms(arms), targets), targets)
     theirs = np.array([scikit_robot_errors(arm, targets) for arm in arms])
     for statistic in (np.mean, np.median):
@@ -337,7 +337,7 @@ def test_earliest_of_equally_good_postures_is_kept() -> None:
 
 def test_result_does_not_depend_on_batch_or_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same bits alone, in another batch, beside other targets, and in any number of pieces."""
-    arms, targets = paper_arms(60, 4, 12), load_task("target-2").points
+    arms, targets = paper_arms(60, 4, 12), load_task("target-2").target_positions
     whole = solve_postures(stack_arms(arms), targets)
     same_bits(whole, solve_postures(stack_arms(arms[::-1]), targets), np.s_[::-1])
     same_bits(whole, solve_postures(stack_arms(arms[7:8]), targets), np.s_[7:8])
@@ -351,7 +351,7 @@ def test_result_does_not_depend_on_batch_or_threads(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize("lanes", [1, 2])
 def test_lanes_do_not_change_the_bits(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """On the CPU, whatever the vector's length: no operation mixes lanes, or is contracted across functions."""
-    targets = load_task("target-2").points
+    targets = load_task("target-2").target_positions
     stacked = [stack_arms(paper_arms(300, 4, 12)), stack_arms(general_arms(300, 6, 12))]
     whole = [solve_postures(arms, targets) for arms in stacked]
     monkeypatch.setitem(solve.LANES, "cpu", lanes)
@@ -461,7 +461,7 @@ def test_problem_turned_about_the_vertical() -> None:
     turned_after, _ = update_once(turned_arrays, turned_points(targets), turned_q, h_before.astype(np.float32))
     assert np.abs(turned_after - after * sign).max() < 1e-4
 
-    points = load_task("target-3").points
+    points = load_task("target-3").target_positions
     plain, other = solve_postures(arrays, points), solve_postures(turned_arrays, turned_points(points))
     assert abs(error_of(other, turned_points(points)).mean() / error_of(plain, points).mean() - 1.0) < 5e-3
     norms = [np.linalg.norm(postures.torque, axis=-1).mean() for postures in (plain, other)]

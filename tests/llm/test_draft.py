@@ -462,7 +462,7 @@ def test_the_prompt_knows_all_that_the_files_may_hold() -> None:
         assert json.dumps(" ".join((model.__doc__ or "").split()))[1:60] in " ".join(prompt.replace("\\n", " ").split())
     for objective in OBJECTIVES.values():
         assert f"- {objective.name} [{objective.unit}]: " in prompt
-        assert objective.words in prompt
+        assert objective.description in prompt
     for name in catalogue():
         assert f"- {name} (" in prompt
     assert task_template(Path("my-task.yaml")).strip() in prompt

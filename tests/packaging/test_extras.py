@@ -13,7 +13,7 @@ import pytest
 import armwright as aw
 from armwright import extras
 from armwright.exceptions import MissingExtraError, UsageError
-from armwright.extras import EXTRAS, missing_packages, needed
+from armwright.extras import EXTRAS, missing_packages, requires_extra
 from armwright.report.live_server import begin_server, serve
 from armwright.robot.robot_descriptions import find_urdf
 from tests import ROOT
@@ -82,7 +82,7 @@ def test_a_missing_package_is_named_with_its_command(asked: str, monkeypatch: py
 
 
 def test_another_version_is_named_as_one() -> None:
-    with pytest.raises(MissingExtraError) as fault, needed("live", "the page"):
+    with pytest.raises(MissingExtraError) as fault, requires_extra("live", "the page"):
         from json import no_such_name  # type: ignore[attr-defined] # noqa: F401
     words = str(fault.value)
     assert words.startswith("the page needs another json (cannot import name 'no_such_name'")

@@ -19,7 +19,7 @@ from armwright.exceptions import FailureError, RunConflictError, RunFolderError,
 from armwright.pareto import (
     default_reference_point,
     feasible_mask,
-    front_numbers,
+    front_indices,
     hypervolume,
     masked_objectives,
     penalised_objectives,
@@ -462,4 +462,4 @@ def test_optuna_itself_calls_feasible_what_is_not_above_0() -> None:
     values, broken = np.array([[1.0, 2.0], [2.0, 1.0], [0.5, 0.5]]), np.array([[0.0], [-1.0], [1e-12]])
     for row, by in zip(values, broken[:, 0], strict=True):
         study.add_trial(optuna.create_trial(values=row.tolist(), constraints={"b": float(by)}))
-    assert [trial.number for trial in study.best_trials] == front_numbers(masked_objectives(values, broken))
+    assert [trial.number for trial in study.best_trials] == front_indices(masked_objectives(values, broken))

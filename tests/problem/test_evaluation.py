@@ -77,7 +77,7 @@ def test_objectives_are_the_sums_of_the_method() -> None:
     values = problem.outcomes(result).values
     assert TORQUE_SCALE == 40.0
     assert values.shape == (20, 2)
-    assert np.allclose(values[:, 0], np.linalg.norm(result.reached - problem.task.points, axis=2).sum(axis=1))
+    assert np.allclose(values[:, 0], np.linalg.norm(result.reached - problem.task.target_positions, axis=2).sum(axis=1))
     assert np.allclose(values[:, 1], 40.0 * np.sqrt((result.joint_torques**2).sum(axis=2)).sum(axis=1))
     assert np.array_equal(problem.evaluate(designs).values, values)
     assert all(objective.each(result).shape == (20, 8) for objective in PAPER_OBJECTIVES)

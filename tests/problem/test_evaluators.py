@@ -35,7 +35,7 @@ def raising(fault: BaseException) -> aw.Evaluator:
 
 def test_objectives_are_those_that_the_function_names() -> None:
     problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
-    assert [(o.name, o.unit, o.label, o.words) for o in problem.objectives] == [
+    assert [(o.name, o.unit, o.label, o.description) for o in problem.objectives] == [
         ("reach", "m", "Reach", "How far it reaches."),
         ("joints_used", "", "Joints used", "How far it reaches."),
     ]

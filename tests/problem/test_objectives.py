@@ -39,7 +39,7 @@ SPREAD = Objective(
     label="Spread",
     unit="rad",
     symbol="E_spread",
-    words="how far the joints turn",
+    description="how far the joints turn",
     each=lambda evaluation: np.abs(evaluation.q).sum(axis=-1),
 )
 
@@ -233,7 +233,7 @@ def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: t
     prompt = CliRunner().invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
     assert "payloads, point masses of [kg], for each TARGET in this order: 0.5, 0.2, 0." in prompt
     for objective in history.problem.objectives:
-        assert objective.words in prompt
+        assert objective.description in prompt
     front = find_front(Problem(task), budget=2000, out=tmp_path / "front")
     values = np.array([member.values for member in front.front])
     point = front.summary["hypervolume"]["reference_point"]

@@ -24,7 +24,7 @@ ROBUST = PLAIN.model_copy(
 def alone() -> list[Task]:
     """Each case as a task of its own."""
     shifts = [sign * 0.004 * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
-    moved = [tuple(map(tuple, (PLAIN.points + shift).tolist())) for shift in shifts]
+    moved = [tuple(map(tuple, (PLAIN.target_positions + shift).tolist())) for shift in shifts]
     heavier = [tuple((factor * PLAIN.payloads).tolist()) for factor in (0.0, 1.5)]
     tasks = [PLAIN, *(PLAIN.model_copy(update={"payload": load}) for load in heavier)]
     tasks += [PLAIN.model_copy(update={"targets": targets}) for targets in moved]

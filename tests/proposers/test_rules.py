@@ -132,7 +132,7 @@ def test_before_there_is_a_reference_point_structures_are_proposed() -> None:
 def test_a_moved_task_moves_the_arm(structure: Any) -> None:
     wide = paper_space().model_copy(update=dict.fromkeys(("origin_x", "origin_y", "origin_z"), (-5.0, 5.0)))
     at, moved = random_task(1001), np.array([0.5, -0.7, 0.2])
-    there = task(*(tuple(p) for p in (at.points + moved).tolist()))
+    there = task(*(tuple(p) for p in (at.target_positions + moved).tolist()))
     a, b = (fitted(structure, Problem(t, wide), 5.0) for t in (at, there))
     assert b.joints == a.joints
     np.testing.assert_allclose(b.links, a.links, atol=1e-6)
@@ -150,7 +150,7 @@ def test_x_and_y_exchanged_exchange_the_axes(structure: Any) -> None:
 
 
 def test_the_shoulder_misses_less_than_places_beside_it() -> None:
-    targets = random_task(1003).points
+    targets = random_task(1003).target_positions
 
     def missed(place: np.ndarray) -> float:
         return float(np.maximum(np.linalg.norm(targets - place, axis=1) - 0.2, 0.0).sum())

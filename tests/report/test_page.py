@@ -17,7 +17,7 @@ from playwright.sync_api import Browser
 import armwright as aw
 from armwright.exceptions import RunFolderError
 from armwright.kinematics.forward import joint_positions
-from armwright.pareto import front_numbers
+from armwright.pareto import front_indices
 from armwright.report.page import program, write_report
 from armwright.runs.best_known import known_front
 from armwright.runs.folder import read_run
@@ -65,7 +65,7 @@ def place_of(tab: Tab, number: int) -> tuple[float, float]:
 
 def isolated(tab: Tab, history: History) -> int:
     """A design of the front within the box that no other is drawn near to."""
-    inside = [n for n in front_numbers(history.values) if np.all(history.values[n] < 4.9)]
+    inside = [n for n in front_indices(history.values) if np.all(history.values[n] < 4.9)]
     places = np.array([place_of(tab, n) for n in range(len(history))])
     apart = [np.sort(np.linalg.norm(places - places[n], axis=1))[1] for n in inside]
     return inside[int(np.argmax(apart))]
@@ -183,7 +183,7 @@ def test_the_slider_shows_earlier_iterations(run: Path, tab: Tab, history: Histo
         "(({x, y}) => [x, y])(document.getElementById('pareto').data.find((t) => t.name === 'Pareto front'))"
     )
     values = history.values[:24]
-    front = [n for n in front_numbers(values) if np.all(values[n] < 5.0)]
+    front = [n for n in front_indices(values) if np.all(values[n] < 5.0)]
     assert sorted({*line[0]} - {5.0}) == pytest.approx(sorted(values[front, 0]))
     tab.page.locator("#marks button").last.click()
     assert tab.text("#iteration-value") == "40"

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
-from armwright.robot.collision_pairs import segment_distance, settled_pairs
+from armwright.robot.collision_pairs import disabled_collision_pairs, segment_distance
 from armwright.robot.srdf import to_srdf
 from armwright.robot.urdf_writer import to_urdf
 from tests.support.arms import paper_arms
@@ -77,7 +77,7 @@ def test_what_is_proven_is_so() -> None:
     reasons: Counter[str] = Counter()
     for arm in PROVEN_OF:
         geometry = Geometry(arm)
-        settled = settled_pairs(arm)
+        settled = disabled_collision_pairs(arm)
         reasons.update(settled.values())
         lower, upper = geometry.model.lowerPositionLimit, geometry.model.upperPositionLimit
         for q in [*postures(arm, 200), lower, upper]:
@@ -98,7 +98,7 @@ def test_what_is_clear_is_proven() -> None:
     clear = 0
     for arm in short_arms(30, 54):
         geometry = Geometry(arm)
-        settled, least = settled_pairs(arm), dict[tuple[int, int], float]()
+        settled, least = disabled_collision_pairs(arm), dict[tuple[int, int], float]()
         for q in postures(arm, 1000):
             for pair, distance in geometry.distances(arm, q).items():
                 least[pair] = min(distance, least.get(pair, np.inf))
@@ -114,7 +114,7 @@ def test_neighbours_and_what_is_joined_rigidly_are_adjacent() -> None:
     turning, fixed = Joint("revolute", "y", -3.1, 3.1), Joint("fixed", "x")
     long, none = uniform_link((0.0, 0.0, 0.3), 1.0, 0.02), Link((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0), 0.02)
     arm = Arm((0.0, 0.0, 0.0), (turning, turning, turning, fixed, fixed), (long, none, long, long, long))
-    settled = settled_pairs(arm)
+    settled = disabled_collision_pairs(arm)
     assert settled.pop((0, 4)) == "Never"  # folded back, the last stands beyond the first
     assert settled == {(0, 2): "Adjacent", (2, 3): "Adjacent", (2, 4): "Adjacent", (3, 4): "Adjacent"}
 
@@ -122,14 +122,14 @@ def test_neighbours_and_what_is_joined_rigidly_are_adjacent() -> None:
 def test_of_what_folds_onto_itself_nothing_is_said() -> None:
     joints = tuple(Joint("revolute", "y", -3.1, 3.1) for _ in range(4))
     arm = Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4)
-    assert set(settled_pairs(arm).values()) == {"Adjacent"}
-    assert len(settled_pairs(arm)) == 3
+    assert set(disabled_collision_pairs(arm).values()) == {"Adjacent"}
+    assert len(disabled_collision_pairs(arm)) == 3
 
 
 def test_links_that_turn_about_their_own_line_never_meet_beyond_a_neighbour() -> None:
     """Only yaw, over any range: the line stays a line."""
     joints = tuple(Joint("revolute", "z", -6.0, 6.0) for _ in range(4))
-    settled = settled_pairs(Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4))
+    settled = disabled_collision_pairs(Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4))
     assert Counter(settled.values()) == {"Adjacent": 3, "Never": 3}
 
 
@@ -138,7 +138,7 @@ def test_pinocchio_takes_the_pairs_and_the_home(arm: Arm) -> None:
     geometry, text = Geometry(arm), to_srdf(arm)
     before = geometry.pairs()
     pinocchio.removeCollisionPairsFromXML(geometry.model, geometry.geometry, text)
-    assert geometry.pairs() == before - set(settled_pairs(arm))
+    assert geometry.pairs() == before - set(disabled_collision_pairs(arm))
     if moving(arm):
         pinocchio.loadReferenceConfigurationsFromXML(geometry.model, text)
         home = geometry.model.referenceConfigurations["home"]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armwright.pareto import front_numbers, hypervolume
+from armwright.pareto import front_indices, hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.attribution import credit_by_source, front_by_source, gained_by_source, hypervolume_gains
 from armwright.runs.history import History
@@ -58,7 +58,7 @@ def test_the_curves_add_up_at_every_iteration_and_end_at_the_credit(trials: list
         assert members[source][-1] == brought.front
     if credit:
         assert np.sum(list(gained.values()), axis=0)[1:] == pytest.approx(past.hypervolume)
-        sizes = [len(front_numbers(past.values[: N_INIT + i])) for i in range(1, counted + 1)]
+        sizes = [len(front_indices(past.values[: N_INIT + i])) for i in range(1, counted + 1)]
         assert np.sum(list(members.values()), axis=0)[1:].tolist() == sizes
 
 

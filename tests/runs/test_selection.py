@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import FailureError, SettingsError
-from armwright.pareto import knee_number
+from armwright.pareto import knee_index
 from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
@@ -46,7 +46,7 @@ def test_what_is_picked_meets_the_conditions_and_is_the_best(history: History) -
 
 
 def test_without_wishes_it_is_the_knee(history: History) -> None:
-    assert pick(history)[0].number == knee_number(history.values, (5.0, 5.0))
+    assert pick(history)[0].number == knee_index(history.values, (5.0, 5.0))
     assert len(pick(history)) == len(history.front)
 
 

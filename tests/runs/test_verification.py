@@ -23,10 +23,10 @@ BOX = (5.0, 5.0)
 def values_of(problem: Problem, designs: list[Design], start: np.ndarray | None = None) -> np.ndarray:
     """(N, 2) by the reference, in float64."""
     chains = reference.chains([problem.arm(design) for design in designs])
-    solution = reference.solve(chains, problem.task.points, start=start)
+    solution = reference.solve(chains, problem.task.target_positions, start=start)
     return np.column_stack(
         [
-            np.linalg.norm(solution.reached - problem.task.points, axis=-1).sum(axis=1),
+            np.linalg.norm(solution.reached - problem.task.target_positions, axis=-1).sum(axis=1),
             40.0 * np.linalg.norm(solution.torque, axis=-1).sum(axis=1),
         ]
     )

@@ -39,7 +39,7 @@ EVERYTHING: dict[str, Any] = {
     "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
 }
 MIXED = DesignSpace.model_validate(EVERYTHING)
-TARGETS = load_task("target-2").points
+TARGETS = load_task("target-2").target_positions
 
 
 def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:

@@ -16,9 +16,9 @@ from armwright.runs.trial import FinishedTrial
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
-from armwright.tasks.moves import lines_of
+from armwright.tasks.moves import sample_moves
 from armwright.tasks.task import Task
-from armwright.tasks.workspace import points_of
+from armwright.tasks.workspace import sample_regions
 
 
 class FixedProblem(Problem):
@@ -26,7 +26,7 @@ class FixedProblem(Problem):
 
     def physics(self, designs: Sequence[Design] | Array) -> Evaluation:
         rows = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
-        targets = self.task.points
+        targets = self.task.target_positions
         built = self.space.designs(rows)
         n, t, d = len(built), len(targets), self.space.max_joints
         reach = np.array([sum(design.links) for design in built])
@@ -44,18 +44,20 @@ class FixedProblem(Problem):
         arms = stack_designs(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
         angle = np.zeros_like(error)
-        known = (arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.goals)
-        evaluation = Evaluation(*known, self.task.obstacles, moves=self.task.lines, workspace=self.task.workspace)
+        known = (arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.target_arrays)
+        evaluation = Evaluation(
+            *known, self.task.obstacles, moves=self.task.straight_moves, workspace=self.task.workspace
+        )
         if evaluation.moves:
             vars(evaluation)["paths"] = _fixed_paths(evaluation)
-        ways = np.linalg.norm(points_of(self.task.workspace) - base[:, None], axis=-1)
+        ways = np.linalg.norm(sample_regions(self.task.workspace) - base[:, None], axis=-1)
         vars(evaluation)["workspace_error"] = np.maximum(0.0, ways - reach[:, None])
         return evaluation
 
 
 def _fixed_paths(evaluation: Evaluation) -> Paths:
     """Between two targets, all is between what it is at them, but for a bow of the tip."""
-    lines = lines_of(evaluation.moves, evaluation.targets)
+    lines = sample_moves(evaluation.moves, evaluation.targets)
     start, end = np.array(evaluation.moves.pairs)[lines.move].T
     share = lines.share[:, None]
     q, reached, torques = (
@@ -72,7 +74,7 @@ LENGTH = Objective(
     label="Length",
     unit="m",
     symbol="E_length",
-    words="the distance of the tip from the world's origin, which stands for the room that the arm takes",
+    description="the distance of the tip from the world's origin, which stands for the room that the arm takes",
     each=lambda evaluation: np.linalg.norm(evaluation.reached, axis=-1),
 )
 

@@ -36,20 +36,20 @@ def rotation_vector(matrix: Array) -> Array:
     return skew * (angle / np.where(sine > 0.0, sine, 1.0))[..., None]
 
 
-def turn_left(frame: Array, goals: TargetArrays) -> Array:
+def turn_left(frame: Array, target_arrays: TargetArrays) -> Array:
     """(N, T, 3) the rotation in the world that is left to do [rad]; 0 of a point."""
-    whole = rotation_vector(goals.rotation @ np.swapaxes(frame, -1, -2))
-    z, wanted = frame[..., :, 2], np.broadcast_to(goals.rotation[..., :, 2], frame[..., :, 2].shape)
+    whole = rotation_vector(target_arrays.rotation @ np.swapaxes(frame, -1, -2))
+    z, wanted = frame[..., :, 2], np.broadcast_to(target_arrays.rotation[..., :, 2], frame[..., :, 2].shape)
     across = np.cross(z, wanted)
     sine = np.linalg.norm(across, axis=-1)
     angle = np.arctan2(sine, (z * wanted).sum(axis=-1))
     shortest = across * (angle / np.where(sine > 0.0, sine, 1.0))[..., None]
-    rows = goals.n_angular[..., None]
+    rows = target_arrays.n_angular[..., None]
     return np.where(rows == 0, 0.0, np.where(rows == AXIS, shortest, whole))
 
 
 def update(
-    arms: Chains, targets: Array, goals: TargetArrays, axis: Array, side: Array, q: Array, h_before: Array
+    arms: Chains, targets: Array, target_arrays: TargetArrays, axis: Array, side: Array, q: Array, h_before: Array
 ) -> tuple[Array, Array]:
     """(q, H) after one update, target by target with as many rows as it has."""
     after, gradient = np.empty_like(q), reference.limit_gradient(arms, q)
@@ -57,10 +57,10 @@ def update(
     middle, half_range = (arms.upper + arms.lower) / 2, (arms.upper - arms.lower) / 2
     y = reference.CENTRING_GAIN * w * np.sign(middle - q) * ((middle - q) / half_range) ** 2
     frame, e = tool(arms, q, axis, side), targets - reference.tip(arms, q)
-    turn = np.einsum("...ba,...b->...a", frame, turn_left(frame, goals))  # in the tool's own frame
+    turn = np.einsum("...ba,...b->...a", frame, turn_left(frame, target_arrays))  # in the tool's own frame
     linear = reference.jacobian(arms, q)
     angular = np.einsum("...ba,...bd->...ad", frame, angular_jacobian(arms, q))
-    for t, rows in enumerate(goals.n_angular):
+    for t, rows in enumerate(target_arrays.n_angular):
         J = np.concatenate([linear[:, t], angular[:, t, :rows]], axis=-2)
         dx = np.concatenate([_short(e[:, t], reference.LONGEST_STEP), _short(turn[:, t], LONGEST_TURN)[:, :rows]], -1)
         Jt = np.swapaxes(J, -1, -2)
@@ -76,26 +76,26 @@ def update(
 
 
 def solve(
-    arms: Chains, targets: Array, goals: TargetArrays, axis: Array, side: Array, updates: int, start: Array
+    arms: Chains, targets: Array, target_arrays: TargetArrays, axis: Array, side: Array, updates: int, start: Array
 ) -> tuple[Array, Array, Array]:
     """(q, distance, angle) of the earliest posture with the least distance² + (trade x angle)². targets: (T, 3)."""
     q, h = start, np.full(start.shape, np.inf)
     kept, least = q, np.full(start.shape[:2], np.inf)
     for update_number in range(updates + 1):
         if update_number:
-            q, h = update(arms, targets, goals, axis, side, q, h)
-        distance, angle = errors(arms, targets, goals, axis, side, q)
-        far = distance**2 + (goals.metres_per_radian * angle) ** 2
+            q, h = update(arms, targets, target_arrays, axis, side, q, h)
+        distance, angle = errors(arms, targets, target_arrays, axis, side, q)
+        far = distance**2 + (target_arrays.metres_per_radian * angle) ** 2
         kept = np.where((far < least)[..., None], q, kept)
         least = np.minimum(far, least)
-    return kept, *errors(arms, targets, goals, axis, side, kept)
+    return kept, *errors(arms, targets, target_arrays, axis, side, kept)
 
 
 def errors(
-    arms: Chains, targets: Array, goals: TargetArrays, axis: Array, side: Array, q: Array
+    arms: Chains, targets: Array, target_arrays: TargetArrays, axis: Array, side: Array, q: Array
 ) -> tuple[Array, Array]:
     """(N, T) distance [m] and angle [rad] from the targets."""
-    angle = np.linalg.norm(turn_left(tool(arms, q, axis, side), goals), axis=-1)
+    angle = np.linalg.norm(turn_left(tool(arms, q, axis, side), target_arrays), axis=-1)
     return np.linalg.norm(targets - reference.tip(arms, q), axis=-1), angle
 
 

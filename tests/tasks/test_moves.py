@@ -23,7 +23,7 @@ from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.tasks.moves import Moves, lines_of
+from armwright.tasks.moves import Moves, sample_moves
 from armwright.tasks.obstacles import Sphere
 from armwright.tasks.task import Task, load_task
 from armwright.yaml_documents import parse_document
@@ -57,7 +57,7 @@ def pinocchio_of(arm: Arm, payload: float) -> tuple[Any, Any]:
 
 def test_lines_are_cut_into_equal_steps() -> None:
     targets = np.array(CORNERS)
-    lines = lines_of(Moves(((0, 1), (1, 2), (2, 0)), 0.03), targets)
+    lines = sample_moves(Moves(((0, 1), (1, 2), (2, 0)), 0.03), targets)
     lengths = [np.linalg.norm(np.subtract(CORNERS[a], CORNERS[b])) for a, b in ((0, 1), (1, 2), (2, 0))]
     assert np.array_equal(np.diff(lines.first), [np.ceil(length / 0.03) + 1 for length in lengths])
     for (start, end), first, beyond in zip(((0, 1), (1, 2), (2, 0)), lines.first, lines.first[1:], strict=False):
@@ -68,7 +68,9 @@ def test_lines_are_cut_into_equal_steps() -> None:
         assert way == pytest.approx(way[0])
         assert way[0] <= 0.03
         assert way[0] * len(way) / (len(way) - 1) > 0.03, "no more of them than are needed"
-    assert len(lines_of(Moves(((0, 1),), 0.1), np.array([[0.0, 0, 0], [0.3, 0, 0]]))) == 4, "a whole number of steps"
+    assert len(sample_moves(Moves(((0, 1),), 0.1), np.array([[0.0, 0, 0], [0.3, 0, 0]]))) == 4, (
+        "a whole number of steps"
+    )
 
 
 # What an arm does along them
@@ -79,8 +81,8 @@ def test_tip_and_torque_along_a_move_are_pinocchio_s(arms: list[Arm]) -> None:
     payload = np.array([0.3, 1.2, 0.0])
     evaluation = evaluate(arms, CORNERS, payload=payload, moves=Moves(((0, 1), (2, 0))))
     paths = evaluation.paths
-    assert np.array_equal(np.unique(paths.payload[: paths.lines.first[1]]), [1.2]), "the heavier of both"
-    assert np.array_equal(np.unique(paths.payload[paths.lines.first[1] :]), [0.3])
+    assert np.array_equal(np.unique(paths.payload[: paths.samples.first[1]]), [1.2]), "the heavier of both"
+    assert np.array_equal(np.unique(paths.payload[paths.samples.first[1] :]), [0.3])
     for row, arm in enumerate(arms):
         moving = np.array([joint.kind != "fixed" for joint in arm.joints])
         load = 9.81 * (sum(link.total_mass for link in arm.links) + 1.2) * max(1.0, arm.reach)
@@ -93,7 +95,7 @@ def test_tip_and_torque_along_a_move_are_pinocchio_s(arms: list[Arm]) -> None:
                 torque = pinocchio.computeGeneralizedGravity(model, data, q)
                 ours = paths.joint_torques[row, k, : len(arm.joints)][moving]
                 assert ours == pytest.approx(torque, abs=1e-5 * load)
-    assert paths.error == pytest.approx(np.linalg.norm(paths.reached - paths.lines.points, axis=-1))
+    assert paths.error == pytest.approx(np.linalg.norm(paths.reached - paths.samples.points, axis=-1))
 
 
 def test_two_links_in_a_plane_turn_as_the_closed_form_says() -> None:
@@ -102,7 +104,7 @@ def test_two_links_in_a_plane_turn_as_the_closed_form_says() -> None:
     targets = np.array([[0.2, 0.0, 0.2], [0.35, 0.0, -0.2]])
     evaluation = evaluate([planar(a, b)], targets, moves=Moves(((0, 1),), 0.01))
     paths = evaluation.paths
-    x, z = paths.lines.points[:, 0], paths.lines.points[:, 2]
+    x, z = paths.samples.points[:, 0], paths.samples.points[:, 2]
     elbow = np.arccos((x**2 + z**2 - a**2 - b**2) / (2 * a * b))
     elbow *= np.sign(evaluation.q[0, 0, 1])
     shoulder = np.arctan2(x, z) - np.arctan2(b * np.sin(elbow), a + b * np.cos(elbow))
@@ -130,7 +132,7 @@ def test_a_flip_is_a_jump() -> None:
     arm = Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -3.1, 3.1) for axis in axes), links)
     targets = [[0.3, 0.02, 0.4], [-0.3, 0.02, 0.4], [0.3, 0.3, 0.4]]
     paths = evaluate([arm], targets, moves=Moves(((0, 1), (0, 2)))).paths
-    turn = paths.lines.first[1]
+    turn = paths.samples.first[1]
     flips, calm = paths.jumps[0, :turn].max(), paths.jumps[0, turn:].max()
     assert flips > 0.5
     assert calm < 0.15
@@ -144,16 +146,16 @@ def test_moves_begin_in_the_kept_posture_and_go_on_from_sample_to_sample() -> No
     targets, pairs = np.array(CORNERS), ((0, 1), (2, 1), (1, 0))
     evaluation = Problem(task(moves=[(a + 1, b + 1) for a, b in pairs], move_step=0.05), space).physics_of_arms(arms)
     paths = evaluation.paths
-    for (start, _), first, beyond in zip(pairs, paths.lines.first, paths.lines.first[1:], strict=False):
+    for (start, _), first, beyond in zip(pairs, paths.samples.first, paths.samples.first[1:], strict=False):
         q = evaluation.q[:, start][:, None]
         assert np.array_equal(paths.q[:, first], q[:, 0])
         assert np.array_equal(paths.reached[:, first], evaluation.reached[:, start])
         assert np.array_equal(paths.joint_torques[:, first], evaluation.joint_torques[:, start])
         for k in range(first + 1, beyond):
-            by_hand = solve_postures(arms, paths.lines.points[[k]], UPDATES_OF_STEP, start=q)
+            by_hand = solve_postures(arms, paths.samples.points[[k]], UPDATES_OF_STEP, start=q)
             assert np.array_equal(paths.q[:, k], by_hand.q[:, 0])
             q = by_hand.q
-    assert targets[0] == pytest.approx(paths.lines.points[0])
+    assert targets[0] == pytest.approx(paths.samples.points[0])
 
 
 def test_one_arm_is_as_one_of_many() -> None:
@@ -217,7 +219,7 @@ def test_a_target_s_share_counts_the_moves_that_end_there() -> None:
     still, moving = of_all(arms, obstacles=[ball])
     paths = moving.paths
     own, clear = clearances(moving.arms, paths.q, [ball])
-    first = paths.lines.first
+    first = paths.samples.first
     nearest = np.minimum(own, clear)
     assert np.array_equal(moving.clearance[:, 0], still.clearance[:, 0]), "no move ends at the first"
     assert np.array_equal(moving.clearance[:, 1], np.minimum(still.clearance[:, 1], nearest[:, : first[1]].min(axis=1)))
@@ -280,8 +282,8 @@ def test_a_task_file_says_moves_in_either_way() -> None:
     text = "name: x\ntargets: [[0.1, 0, 0], [0.2, 0, 0], [0.3, 0.1, 0]]\nmoves: {}\nmove_step: 0.01"
     in_order = parse_document(text.format("in_order"), Task, TaskError, "it")
     pairs = parse_document(text.format("[[1, 2], [2, 3]]"), Task, TaskError, "it")
-    assert in_order.lines == pairs.lines == Moves(((0, 1), (1, 2)), 0.01)
-    assert not load_task("target-1").lines
+    assert in_order.straight_moves == pairs.straight_moves == Moves(((0, 1), (1, 2)), 0.01)
+    assert not load_task("target-1").straight_moves
 
 
 FAULTS = {

@@ -37,7 +37,7 @@ RECORDS: list[dict[str, Any]] = [
     {"kind": "cylinder", "name": "pole", "center": [0.3, 0.0, 0.1], "radius": 0.03, "height": 0.4, "axis": [1, 2, 2]},
 ]
 POINTS = [[0.4, 0.2, 0.1], [0.4, -0.2, 0.1], [0.3, 0.1, 0.5]]
-WORDS = [
+DESCRIPTIONS = [
     "table: ground, solid everywhere below z = -0.1 m",
     "shelf: box of 0.2 x 0.5 x 0.04 m (along x, y, z) about (0.4, 0.1, 0.3), turned by roll, pitch, yaw "
     "(0.3, -0.2, 0.5) rad",
@@ -56,11 +56,11 @@ def task_of(records: Sequence[object], **more: object) -> Task:
 
 def test_what_may_be_written() -> None:
     task = task_of(RECORDS)
-    assert [obstacle.words() for obstacle in task.obstacles] == WORDS
+    assert [obstacle.describe() for obstacle in task.obstacles] == DESCRIPTIONS
     assert task_of(task.model_dump(mode="json")["obstacles"]) == task
     assert Task(name="none", targets=((0.0, 0.0, 0.0),)).obstacles == ()
     yawed = task_of([{"kind": "box", "center": [0, 0, 0], "size": [1, 1, 1], "yaw": 0.5}]).obstacles[0]
-    assert yawed.words() == "box of 1 x 1 x 1 m (along x, y, z) about (0, 0, 0), turned by yaw 0.5 rad"
+    assert yawed.describe() == "box of 1 x 1 x 1 m (along x, y, z) about (0, 0, 0), turned by yaw 0.5 rad"
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
         assert result.exit_code == 0, result.output
         return result.output
 
-    assert all(f"  obstacle: {words}\n" in armwright("tasks", file) for words in WORDS)
+    assert all(f"  obstacle: {words}\n" in armwright("tasks", file) for words in DESCRIPTIONS)
     size = ["--n-init", 5, "--n-total", 10]
     output = armwright("optimize", file, *size, "--out", tmp_path / "run")
     assert "count in none of the objectives" not in output
@@ -168,7 +168,7 @@ def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
     assert config.task.obstacles == load_task(file).obstacles
     assert np.array_equal(history.problem.evaluate([trial.design for trial in history]).values, history.values)
     prompt = armwright("prompt", "--after", tmp_path / "run")
-    assert all(f"\n- {words}\n" in prompt for words in WORDS)
+    assert all(f"\n- {words}\n" in prompt for words in DESCRIPTIONS)
     assert "Orientation does not matter. The inverse kinematics steers around nothing" in prompt
     assert repeat_command(config).startswith("armwright optimize TASK.yaml")
     options = ["--objectives", "position_error", *size, "--no-figures", "--out", tmp_path / "other"]
@@ -214,7 +214,7 @@ def test_the_page_draws_them_where_they_are(tmp_path: Path, browser: Browser) ->
         tab.open(tmp_path / "report.html")
         parts = [np.array(part) for part in tab.ask("armwright.drawnObstacles()")]
         assert "obstacle" in tab.text("#arm-legend")
-        assert all(words in tab.text("#design-note") for words in WORDS)
+        assert all(words in tab.text("#design-note") for words in DESCRIPTIONS)
         assert not tab.faults
     finally:
         tab.close()

@@ -32,7 +32,7 @@ def has(normals: np.ndarray, normal: np.ndarray) -> bool:
 
 def directions(name: str) -> set[tuple[int, ...]]:
     """Normals in units of their least component that is not 0."""
-    found = symmetry_planes(load_task(name).points)
+    found = symmetry_planes(load_task(name).target_positions)
     return {tuple(np.round(n / np.abs(n[np.abs(n) > 1e-6]).min()).astype(int).tolist()) for n in found}
 
 
@@ -47,7 +47,7 @@ def test_the_planes_of_target_2_are_its_two_and_its_own() -> None:
 
 def test_the_planes_of_target_3_are_an_octagons_and_its_own() -> None:
     """Its file has six digits, and is symmetric within 1e-6 m."""
-    normals = symmetry_planes(load_task("target-3").points)
+    normals = symmetry_planes(load_task("target-3").target_positions)
     angles = np.degrees(np.arctan2(normals[:, 2], normals[:, 1])) % 180.0
     own = np.abs(normals[:, 0]) > 0.5
     assert np.sort(angles[~own]) == pytest.approx(22.5 * np.arange(8), abs=1e-3)
@@ -100,7 +100,7 @@ def test_order_and_points_given_twice_mean_nothing(points: np.ndarray, random: o
 
 def test_random_sets_have_no_plane() -> None:
     for seed in range(30):
-        assert len(symmetry_planes(random_task(seed).points)) == 0
+        assert len(symmetry_planes(random_task(seed).target_positions)) == 0
 
 
 def test_a_point_moved_by_more_than_the_tolerance_breaks_the_symmetry() -> None:
@@ -138,7 +138,7 @@ def test_many_points() -> None:
 
 @pytest.mark.parametrize("name", builtin_names())
 def test_a_plane_that_is_asked_for_is_one_that_is_found(name: str) -> None:
-    points = load_task(name).points
+    points = load_task(name).target_positions
     planes = symmetry_planes(points)
     for normal in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.5**0.5, -(0.5**0.5), 0.0)):
         found = any(abs(abs(plane @ np.array(normal)) - 1.0) < 1e-9 for plane in planes)

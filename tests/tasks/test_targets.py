@@ -42,15 +42,15 @@ def task(text: str = RECORDS) -> Task:
 def test_records_become_positions_and_goals() -> None:
     one = task()
     assert one.targets == ((0.3, 0.0, 0.1), (0.3, 0.1, 0.4), (0.3, -0.2, 0.3), (0.2, -0.2, 0.3))
-    assert one.points.shape == (4, 3)
-    goals = one.goals
-    assert goals.n_angular.tolist() == [2, 0, 3, 0]
-    assert goals.tolerance.tolist() == [1e-3, 1e-3, 2e-3, 1e-3]
-    assert goals.angle_tolerance == pytest.approx([np.pi / 180, np.pi / 180, 0.05, np.pi / 180])
-    assert goals.weight.tolist() == [1, 1, 2, 1]
-    assert goals.rotation[0][:, 2] == pytest.approx([0, 0, -1])
-    assert np.allclose(goals.rotation @ goals.rotation.swapaxes(1, 2), np.eye(3))
-    assert (goals.restarts, one.is_plain) == (1, False)
+    assert one.target_positions.shape == (4, 3)
+    target_arrays = one.target_arrays
+    assert target_arrays.n_angular.tolist() == [2, 0, 3, 0]
+    assert target_arrays.tolerance.tolist() == [1e-3, 1e-3, 2e-3, 1e-3]
+    assert target_arrays.angle_tolerance == pytest.approx([np.pi / 180, np.pi / 180, 0.05, np.pi / 180])
+    assert target_arrays.weight.tolist() == [1, 1, 2, 1]
+    assert target_arrays.rotation[0][:, 2] == pytest.approx([0, 0, -1])
+    assert np.allclose(target_arrays.rotation @ target_arrays.rotation.swapaxes(1, 2), np.eye(3))
+    assert (target_arrays.restarts, one.is_plain) == (1, False)
 
 
 def test_roll_pitch_yaw_are_those_of_urdf() -> None:
@@ -65,7 +65,7 @@ def test_a_task_is_written_as_it_was_read() -> None:
     assert written["targets"][3] == [0.2, -0.2, 0.3], "a record that says no more than a point is one"
     assert Task(**written) == one
     assert one != task(RECORDS.replace("-2]", "2]"))
-    assert one.model_copy(update={"name": "other"}).entries == one.entries
+    assert one.model_copy(update={"name": "other"}).target_specs == one.target_specs
 
 
 def test_a_record_without_more_is_the_point() -> None:
@@ -118,11 +118,15 @@ def test_objectives_heed_weights_and_tolerances() -> None:
     assert np.array_equal(OBJECTIVES["worst_angle"](found), found.angle_error.max(axis=1))
     assert np.array_equal(OBJECTIVES["worst_error"](found), found.position_error.max(axis=1))
     assert not found.angle_error[:, [1, 3]].any()
-    missed = (found.position_error >= [1e-3, 1e-3, 2e-3, 1e-3]) | (found.angle_error >= found.goals.angle_tolerance)
+    missed = (found.position_error >= [1e-3, 1e-3, 2e-3, 1e-3]) | (
+        found.angle_error >= found.target_arrays.angle_tolerance
+    )
     assert np.array_equal(UNREACHED_TARGETS(found), missed.sum(axis=1))
     anywhere = Task(name="a", targets=(Target(position=(0.3, 0.0, 0.3), axis=(0, 0, -1), tolerance=100.0),))
     found = evaluate(
-        [problem.arm(design) for design in problem.space.sample(50, 0)], anywhere.points, goals=anywhere.goals
+        [problem.arm(design) for design in problem.space.sample(50, 0)],
+        anywhere.target_positions,
+        target_arrays=anywhere.target_arrays,
     )
     assert found.position_error.max() > 0.1
     assert 0.5 < 1.0 - UNREACHED_TARGETS(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
@@ -153,7 +157,7 @@ def test_reasons_of_missed_targets() -> None:
             Target(position=(0.3, 0.0, 0.3), axis=(0, 1, 0)),
         ),
     )
-    found = evaluate([arm], one.points, goals=one.goals)
+    found = evaluate([arm], one.target_positions, target_arrays=one.target_arrays)
     reached, far, limited, askew = (why_missed(arm, found, 0, target) for target in range(4))
     assert reached == ""
     assert far.startswith(f"{1e3 * found.position_error[0, 1]:.1f} mm: out of reach by 0.400 m")

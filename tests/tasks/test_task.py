@@ -27,7 +27,9 @@ def test_the_built_in_tasks() -> None:
         assert task.provenance
         assert task.description
         assert len(set(task.targets)) == len(task.targets)
-        assert np.abs(task.points).max() <= 1.3, "within reach of some arm of the paper's space: base ±1 m, 1.2 m long"
+        assert np.abs(task.target_positions).max() <= 1.3, (
+            "within reach of some arm of the paper's space: base ±1 m, 1.2 m long"
+        )
         if not name.startswith("target-"):
             assert task.reference_point == (0.625 * len(task.targets),) * 2  # target-1's, target by target
     for name in ("target-1", "target-2", "target-3"):
@@ -37,12 +39,12 @@ def test_the_built_in_tasks() -> None:
 
 def test_the_symmetries_that_the_paper_states() -> None:
     def points(name: str) -> set[tuple[float, ...]]:
-        return {tuple(row) for row in np.round(load_task(name).points, 6).tolist()}
+        return {tuple(row) for row in np.round(load_task(name).target_positions, 6).tolist()}
 
     assert points("target-1") == {(-x, -y, -z) for x, y, z in points("target-1")}  # symmetric about the origin
     assert points("target-2") == {(x, -y + 0.0, z) for x, y, z in points("target-2")}  # about the xz-plane
     assert {z for _, _, z in points("target-2")} == {0.5}  # at one height
-    circle = np.linalg.norm(load_task("target-3").points - (0.3, 0.0, 0.3), axis=1)
+    circle = np.linalg.norm(load_task("target-3").target_positions - (0.3, 0.0, 0.3), axis=1)
     assert circle == pytest.approx(np.full(8, 0.55), abs=1e-6)
 
 
@@ -50,7 +52,7 @@ def test_the_least_task_file(tmp_path: Path) -> None:
     file = tmp_path / "shelf.yaml"
     file.write_text("name: shelf\ntargets: [[0.45, 0.0, 0.1]]\n")
     task = load_task(file)
-    assert task.points.tolist() == [[0.45, 0.0, 0.1]]
+    assert task.target_positions.tolist() == [[0.45, 0.0, 0.1]]
     assert task.reference_point is None
 
 
@@ -151,5 +153,5 @@ def test_random_tasks_follow_their_recipe() -> None:
         task = random_task(seed)
         assert task == random_task(seed)
         assert 6 <= len(task.targets) <= 12
-        assert np.all(np.ptp(task.points, axis=0) <= 1.2)
+        assert np.all(np.ptp(task.target_positions, axis=0) <= 1.2)
     assert random_task(0) != random_task(1)

@@ -18,7 +18,7 @@ from armwright.problem.problem import Outcomes, Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.task import Task, load_task, random_task
-from armwright.tasks.workspace import Region, points_of
+from armwright.tasks.workspace import Region, sample_regions
 from armwright.yaml_documents import parse_document
 
 Array = NDArray[np.float64]
@@ -39,9 +39,9 @@ def task(**more: Any) -> Task:
 
 
 def test_points_are_halton_s() -> None:
-    assert points_of((region(points=3000),)) == pytest.approx(qmc.Halton(3, scramble=False).random(3001)[1:])
+    assert sample_regions((region(points=3000),)) == pytest.approx(qmc.Halton(3, scramble=False).random(3001)[1:])
     by_chance = np.mean([qmc.discrepancy(np.random.default_rng(i).random((200, 3))) for i in range(10)])
-    assert qmc.discrepancy(points_of((region(points=200),))) < 0.2 * by_chance
+    assert qmc.discrepancy(sample_regions((region(points=200),))) < 0.2 * by_chance
 
 
 def test_each_region_has_its_points_and_they_lie_in_it() -> None:
@@ -50,12 +50,12 @@ def test_each_region_has_its_points_and_they_lie_in_it() -> None:
         region(low=(0.2, -1.0, 0.5), high=(0.4, 1.0, 0.5)),
         region(high=(0, 0, 0), points=3),
     )
-    points = points_of((one, flat, spot))
+    points = sample_regions((one, flat, spot))
     assert points.shape == (253, 3)
-    assert np.array_equal(points[:50], points_of((one,)))
+    assert np.array_equal(points[:50], sample_regions((one,)))
     assert np.all((points[50:250] >= flat.low) & (points[50:250] <= flat.high))
     assert np.all(points[250:] == 0.0)
-    assert np.array_equal(points_of((region(points=10),)), points[:10]), "more points keep those that are there"
+    assert np.array_equal(sample_regions((region(points=10),)), points[:10]), "more points keep those that are there"
 
 
 # What is reached
@@ -67,7 +67,7 @@ def test_a_ball_joint_reaches_a_shell() -> None:
     links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (1e-4, a, b))
     joints = tuple(Joint("revolute", axis, -3.1, 3.1) for axis in ("z", "y", "y"))
     cube = region(low=(-0.8, -0.8, -0.8), high=(0.8, 0.8, 0.8), points=2000)
-    points = points_of((cube,))
+    points = sample_regions((cube,))
     far = np.linalg.norm(points, axis=1)
     evaluation = evaluate([Arm((0.0, 0.0, 0.0), joints, links)], [[0.3, 0.2, 0.1]], workspace=[cube])
     inside = (far < a + b - 2e-4) & (far > a - b + 2e-4)
@@ -82,7 +82,7 @@ def test_points_are_tried_like_targets() -> None:
     problem = Problem(task(objectives=["uncovered_fraction"]))
     designs = problem.space.sample(30, 2)
     arms = [problem.arm(design) for design in designs]
-    as_targets = evaluate(arms, points_of(problem.task.workspace))
+    as_targets = evaluate(arms, sample_regions(problem.task.workspace))
     assert np.array_equal(problem.physics(designs).workspace_error, as_targets.position_error)
     assert problem.evaluate(designs).values[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
 
@@ -103,7 +103,7 @@ def test_longer_arms_cover_no_less() -> None:
     one, other = (
         evaluate(arms, [[0.1, 0.2, 0.3]], workspace=[box]) for box, arms in zip(boxes, (small, large), strict=True)
     )
-    points = points_of((boxes[0],))
+    points = sample_regions((boxes[0],))
     reach = np.array([arm.reach for arm in small])
     beyond = np.linalg.norm(points - np.array([arm.base for arm in small])[:, None], axis=-1) > reach[:, None] + 1e-3
     for evaluation in (one, other):

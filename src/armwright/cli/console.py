@@ -20,7 +20,7 @@ from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
 from armwright.experiments.plan import Cell, Skipped
 from armwright.experiments.runner import Outcome
-from armwright.extras import command, missing_packages
+from armwright.extras import install_command, missing_packages
 from armwright.llm.draft import Draft
 from armwright.problem.objectives import (
     OF_CLEARANCE,
@@ -39,7 +39,7 @@ from armwright.study.front_run import FrontProgress, FrontRun
 from armwright.study.refine_run import Polished
 from armwright.study.study import Progress as StudyProgress
 from armwright.study.study import Run
-from armwright.tasks.targets import target_words
+from armwright.tasks.targets import describe_targets
 from armwright.tasks.task import Task as DesignTask
 
 EVERY = 10  # counted trials between two plain lines
@@ -175,7 +175,7 @@ def show_plan(
     parts = [f"{len(due)} to run {where}" if due else "nothing to run", f"{finished} finished before"]
     console.print(f"{len(due) + finished + len(skipped)} cells: {', '.join(parts)}, {len(skipped)} skipped")
     if len(due) > 1 and missing_packages("distributed"):
-        console.print(f"several at a time: {command('distributed')}")
+        console.print(f"several at a time: {install_command('distributed')}")
     for note in notes_on_cells(skipped, ()):
         console.print(note)
     asking = [cell for cell in due if cell.plan.asks_a_model and cell.replay is None]
@@ -299,7 +299,7 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
     reference = "chosen from the first random trials" if task.reference_point is None else _point(task.reference_point)
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
     console.print(f"  {len(task.targets)} targets [m]: " + " ".join(_point(target) for target in task.targets))
-    for words in target_words(task.entries):
+    for words in describe_targets(task.target_specs):
         console.print(Text(f"  {words}"))
     if task.restarts:
         console.print(f"  {task.restarts + 1} starts of the inverse kinematics at each")
@@ -309,18 +309,18 @@ def show_task(console: Console, task: DesignTask, known: float | None, stored: S
         console.print(f"  constraints: {', '.join(task.constraints)}")
     if task.payloads.any():
         console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
-    if task.case_words:
-        console.print(f"  the worst counts of this, {task.case_words}")
+    if task.cases_description:
+        console.print(f"  the worst counts of this, {task.cases_description}")
     for obstacle in task.obstacles:
-        console.print(f"  obstacle: {obstacle.words()}")
-    if task.lines:
-        listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.lines.pairs)
+        console.print(f"  obstacle: {obstacle.describe()}")
+    if task.straight_moves:
+        listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.straight_moves.pairs)
         timed = ""
         if task.move_time is not None:
             timed = f"; in {', '.join(f'{time:g}' for time in np.atleast_1d(task.move_time))} s"
         console.print(f"  straight moves between targets: {listed}; a step of {1e3 * task.move_step:g} mm{timed}")
     for region in task.workspace:
-        console.print(f"  workspace: {region.words()}")
+        console.print(f"  workspace: {region.describe()}")
     console.print(f"  reference point: {reference}")
     console.print(f"  provenance: {task.provenance}")
     if known is not None:
@@ -444,7 +444,7 @@ def _obstacle_note(problem: Problem) -> str:
 
 def _move_note(problem: Problem) -> str:
     """That a task's moves count for nothing, where that is so."""
-    if not problem.task.lines or problem.uses(*OF_MOVES):
+    if not problem.task.straight_moves or problem.uses(*OF_MOVES):
         return ""
     names = ", ".join(objective.name for objective in OF_MOVES)
     return f"; the task's moves count in none of the objectives (these heed them: {names})"

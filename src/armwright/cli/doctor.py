@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import metadata
 
 from armwright.exceptions import ArmwrightError, ModelError
-from armwright.extras import EXTRAS, command, is_installed, missing_packages
+from armwright.extras import EXTRAS, install_command, is_installed, missing_packages
 from armwright.llm.backend import CallError
 from armwright.llm.configuration import configuration_path, configured_model
 from armwright.runs.config import versions
@@ -77,7 +77,7 @@ def _kernels() -> Finding:
 def _extra(extra: str) -> Finding:
     missing = missing_packages(extra)
     if missing:
-        return Finding(MISSING, f"extra {extra}", f"{', '.join(missing)} not installed: {command(extra)}")
+        return Finding(MISSING, f"extra {extra}", f"{', '.join(missing)} not installed: {install_command(extra)}")
     found = (f"{name} {metadata.version(name)}" for name in EXTRAS[extra].values())
     return Finding(OK, f"extra {extra}", ", ".join(found))
 
@@ -85,7 +85,7 @@ def _extra(extra: str) -> Finding:
 def _vendors() -> Iterator[Finding]:
     for vendor, package, variables in VENDORS:
         if not (is_installed(package) and is_installed("pydantic_ai")):
-            yield Finding(MISSING, vendor, f"not installed: {command('llm')}")
+            yield Finding(MISSING, vendor, f"not installed: {install_command('llm')}")
             continue
         found = {names: next(filter(os.environ.get, names.split(" or ")), None) for names in variables}
         unset = [names for names, name in found.items() if name is None]

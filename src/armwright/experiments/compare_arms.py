@@ -16,7 +16,7 @@ from pydantic import BaseModel, TypeAdapter
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
-from armwright.pareto import front_numbers, knee_number, solution_numbers
+from armwright.pareto import front_indices, knee_index, paper_solution_indices
 from armwright.problem.constraints import Quantity
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import (
@@ -137,7 +137,7 @@ def compare_arms(
         if not len(history):
             raise RunFolderError(f"{run} has no finished trial yet, so there is nothing to compare with")
         if not (
-            np.array_equal(wanted.points, problem.task.points)
+            np.array_equal(wanted.target_positions, problem.task.target_positions)
             and np.array_equal(wanted.payloads, problem.task.payloads)
         ):
             raise TaskError(f"{run} is a run of the task {problem.task.name}, with other targets or payloads")
@@ -238,7 +238,7 @@ def _searched(problem: Problem, arm: Arm, seed: int) -> Vector:
 
     def evaluate(places: Array) -> Array:
         """(N, 1) from 1 on where targets are missed, below it by torque."""
-        size = max(1, POSTURES_AT_ONCE[problem.device] // len(problem.task.points))
+        size = max(1, POSTURES_AT_ONCE[problem.device] // len(problem.task.target_positions))
         losses = np.empty((len(places), 1))
         for first in range(0, len(places), size):
             rows = slice(first, first + size)
@@ -301,11 +301,11 @@ def _known(quantity: Quantity, evaluation: Evaluation) -> float | None:
 def _of_front(history: History) -> list[ComparedArm]:
     """Of the front its most precise design, its knee, and the one with least of the last objective."""
     reference = history.reference_point or (np.inf,) * len(history.problem.objectives)
-    numbers = front_numbers(history.masked_objectives)
+    numbers = front_indices(history.masked_objectives)
     if not numbers:
         return []
-    first, last = solution_numbers(history.masked_objectives, reference) or (numbers[0], numbers[-1])
-    knee = knee_number(history.masked_objectives, reference)
+    first, last = paper_solution_indices(history.masked_objectives, reference) or (numbers[0], numbers[-1])
+    knee = knee_index(history.masked_objectives, reference)
     chosen = [number for number in dict.fromkeys((first, knee, last)) if number is not None]
     return [_of_design(history, history.member(number)) for number in chosen]
 

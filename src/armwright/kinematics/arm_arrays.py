@@ -56,7 +56,7 @@ class Bodies:
     offset: Array  # (N, D, 3) along the cylinder, from its joint to the next or to the end of the last link [m]
     radius: Array  # (N, D) [m]
     end_mass: Array  # (N, D) [kg]
-    end_place: Array  # (N, D, 3) of the point mass, from the link's joint [m]
+    end_mass_position: Array  # (N, D, 3) of the point mass, from the link's joint [m]
 
     @property
     def total_mass(self) -> Array:
@@ -67,7 +67,7 @@ class Bodies:
     def total_com(self) -> Array:
         """(N, D, 3) centre of mass of cylinder and point mass, from the joint [m]."""
         total = self.total_mass[..., None]
-        both = self.mass[..., None] * self.com + self.end_mass[..., None] * self.end_place
+        both = self.mass[..., None] * self.com + self.end_mass[..., None] * self.end_mass_position
         return both / np.where(total > 0.0, total, 1.0)
 
     @property
@@ -81,7 +81,7 @@ class Bodies:
         around_axis = (self.mass * self.radius**2 / 2.0)[..., None, None]
         tensor = across_axis * (np.eye(3) - along) + around_axis * along
         centre = self.total_com
-        for mass, place in ((self.mass, self.com), (self.end_mass, self.end_place)):
+        for mass, place in ((self.mass, self.com), (self.end_mass, self.end_mass_position)):
             away = place - centre
             squared = (away**2).sum(axis=-1)[..., None, None] * np.eye(3)
             tensor += mass[..., None, None] * (squared - away[..., :, None] * away[..., None, :])

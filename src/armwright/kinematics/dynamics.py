@@ -18,7 +18,7 @@ from armwright.kinematics.forward import Frames, forward_kinematics
 from armwright.kinematics.jacobian import jacobian_of, jacobian_rate
 from armwright.kinematics.paths import Paths, largest_of
 from armwright.robot.arm import GRAVITY
-from armwright.tasks.moves import Moves, Timing, timing_of
+from armwright.tasks.moves import Moves, MoveTiming, time_samples
 
 DAMPING = 0.005  # of an arm's size, docs/method.md §17
 AT_ONCE = 2**12  # postures, whose arrays stay in a core's cache
@@ -81,7 +81,7 @@ class Drives:
     """What the joints of N arms do along timed moves, at F moments, those of the samples and some between."""
 
     moves: Moves
-    timing: Timing
+    timing: MoveTiming
     torques: Array  # (N, F, D) [N m], or forces [N]
     speeds: Array  # (N, F, D) [rad/s], or [m/s]
 
@@ -92,18 +92,18 @@ class Drives:
 
 def driven(arms: ArmArrays, paths: Paths) -> Drives:
     """The arms along their moves, each in its time."""
-    timing = timing_of(paths.moves, paths.lines)
-    starts, ends = (paths.lines.points[places] for places in (paths.lines.first[:-1], paths.lines.first[1:] - 1))
-    line = (ends - starts)[paths.lines.move]
+    timing = time_samples(paths.moves, paths.samples)
+    starts, ends = (paths.samples.points[places] for places in (paths.samples.first[:-1], paths.samples.first[1:] - 1))
+    line = (ends - starts)[paths.samples.move]
     torques, speeds = np.empty((2, len(arms), len(timing.sample), arms.dof))
-    size = max(1, AT_ONCE // len(paths.lines))
+    size = max(1, AT_ONCE // len(paths.samples))
     for first in range(0, len(arms), size):
         some = slice(first, first + size)
         torques[some], speeds[some] = _driven(arms[some], paths, some, line, timing)
     return Drives(paths.moves, timing, torques, speeds)
 
 
-def _driven(arms: ArmArrays, paths: Paths, rows: slice, line: Array, timing: Timing) -> tuple[Array, Array]:
+def _driven(arms: ArmArrays, paths: Paths, rows: slice, line: Array, timing: MoveTiming) -> tuple[Array, Array]:
     """(N, F, D) torques and speeds of the arms in these rows of the paths; line: (S, 3) [m]."""
     q = paths.q[rows]
     frames = forward_kinematics(arms, q)

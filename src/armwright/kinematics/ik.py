@@ -58,7 +58,7 @@ def solve_postures(
     *,
     start: ArrayLike | None = None,
     payload: NDArray[np.float64] | None = None,
-    goals: TargetArrays | None = None,
+    target_arrays: TargetArrays | None = None,
     precision: Precision = "float32",
     device: Device = "cpu",
 ) -> Postures:
@@ -68,7 +68,7 @@ def solve_postures(
     start: values [rad] or [m] that broadcast to (N, T, D); one beyond a joint's limit is moved to that limit. Without
     it all arms start straight, at 0; fixed joints stay there.
     payload: (T,) point masses that the tip carries at the targets [kg]; without it none.
-    goals: which way the tool should point, of T targets; without them, or where none says so, points alone count.
+    target_arrays: which way the tool should point, of T targets; without them, or if none says so, only points count.
     precision: of the results. "float64" takes arms of either precision, "float32" only its own.
     The same arm, target and start give the same bits on the same device, whatever is solved beside them.
     """
@@ -81,8 +81,8 @@ def solve_postures(
     starts = None
     if start is not None:
         starts = np.where(arms.motion[:, None] == FIXED, 0.0, _broadcast(start, (n, t, dof)))
-    kind = _kind_of(goals)
-    wanted = _wanted(targets, np.zeros(t) if payload is None else payload, goals)
+    kind = _kind_of(target_arrays)
+    wanted = _wanted(targets, np.zeros(t) if payload is None else payload, target_arrays)
     q, reached, torque = (np.empty((n, t, columns), dtype=precision) for columns in (dof, 3, dof))
     solved = Postures(q, reached, torque, angle=np.zeros((n, t), dtype=precision))
     parts = _parts(n, t, LANES[device])
@@ -107,12 +107,16 @@ def solve_postures(
 
 
 def update_once(
-    arms: ArmArrays, targets: NDArray[np.float64], q: Floats, h_before: Floats, goals: TargetArrays | None = None
+    arms: ArmArrays,
+    targets: NDArray[np.float64],
+    q: Floats,
+    h_before: Floats,
+    target_arrays: TargetArrays | None = None,
 ) -> tuple[Floats, Floats]:
     """One update of the inverse kinematics of each arm at a target of its own, from given angles, on the CPU.
 
     targets: (N, 3) [m].  q, the limit gradients h_before, and both results: (N, D). All is of the arms' precision.
-    goals: of one target, for all arms.
+    target_arrays: of one target, for all arms.
     """
     shape = (len(arms), arms.dof)
     if q.shape != shape or h_before.shape != shape:
@@ -120,8 +124,8 @@ def update_once(
     # Only the target's place relative to the base matters, so each arm is moved and all share the target 0.
     moved = replace(arms, base=np.asarray(arms.base - targets, dtype=arms.precision))
     lanes = LANES["cpu"]
-    wp, kernels = load(arms.precision, lanes, arms.motions, _kind_of(goals), "cpu")
-    wanted = _wanted(np.zeros((1, 3)), np.zeros(1), goals)
+    wp, kernels = load(arms.precision, lanes, arms.motions, _kind_of(target_arrays), "cpu")
+    wanted = _wanted(np.zeros((1, 3)), np.zeros(1), target_arrays)
     at, q_last, h_last = (
         wp.array(_in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
         for values in (wanted[None], q[:, None], h_before[:, None])
@@ -130,20 +134,20 @@ def update_once(
     return _from_lanes(q_last.numpy())[:, 0], _from_lanes(h_last.numpy())[:, 0]
 
 
-def _kind_of(goals: TargetArrays | None) -> TargetKind:
-    return "pose" if goals is not None and goals.oriented else "position"
+def _kind_of(target_arrays: TargetArrays | None) -> TargetKind:
+    return "pose" if target_arrays is not None and target_arrays.oriented else "position"
 
 
 def _wanted(
-    targets: NDArray[np.float64], payload: NDArray[np.float64], goals: TargetArrays | None
+    targets: NDArray[np.float64], payload: NDArray[np.float64], target_arrays: TargetArrays | None
 ) -> NDArray[np.float64]:
     """(T, C) what the kernels are told of each target: C = 4 numbers of a point, 16 where any says more."""
     points = [targets, payload]
-    if goals is None or not goals.oriented:
+    if target_arrays is None or not target_arrays.oriented:
         return np.column_stack(points)
-    frame = goals.rotation.swapaxes(1, 2).reshape(-1, 9)  # the x, then y, then z that the tool should have
-    asks, whole = np.float64(goals.n_angular > 0), np.float64(goals.n_angular == ORIENTATION)
-    return np.column_stack([*points, frame, asks, whole, goals.metres_per_radian])
+    frame = target_arrays.rotation.swapaxes(1, 2).reshape(-1, 9)  # the x, then y, then z that the tool should have
+    asks, whole = np.float64(target_arrays.n_angular > 0), np.float64(target_arrays.n_angular == ORIENTATION)
+    return np.column_stack([*points, frame, asks, whole, target_arrays.metres_per_radian])
 
 
 def _parts(n: int, t: int, lanes: int) -> list[tuple[slice, int]]:

@@ -9,7 +9,7 @@ from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik import solve_postures
-from armwright.tasks.moves import Lines, Moves, lines_of
+from armwright.tasks.moves import Moves, MoveSamples, sample_moves
 
 UPDATES_OF_STEP = 10  # of the inverse kinematics from one sample to the next, docs/method.md §14
 
@@ -19,7 +19,7 @@ class Paths:
     """N arms of up to J joints at the S samples of M moves."""
 
     moves: Moves
-    lines: Lines
+    samples: MoveSamples
     payload: Array  # (S,) that the tip carries [kg]: the heavier of the payloads at the move's two targets
     q: Array  # (N, S, J) joint angles [rad], or ways [m]
     reached: Array  # (N, S, 3) position of the tip [m]
@@ -31,7 +31,7 @@ class Paths:
         """(N, S) the largest change of any joint since the sample before [rad] or [m]; 0 at a move's start."""
         changes = np.zeros(self.error.shape)
         changes[:, 1:] = np.abs(np.diff(self.q, axis=1)).max(axis=-1)
-        changes[:, self.lines.first[:-1]] = 0.0
+        changes[:, self.samples.first[:-1]] = 0.0
         return changes
 
     def with_largest(self, at_targets: Array, along: Array) -> Array:
@@ -39,7 +39,7 @@ class Paths:
 
         at_targets: (N, T).  along: (N, S) of the samples.
         """
-        return largest_of(self.moves, self.lines.first, at_targets, along)
+        return largest_of(self.moves, self.samples.first, at_targets, along)
 
 
 def largest_of(moves: Moves, first: NDArray[np.intp], at_targets: Array, along: Array) -> Array:
@@ -59,7 +59,7 @@ def follow(arms: ArmArrays, q: Array, targets: Array, payload: Array, moves: Mov
     q: (N, T, J) the kept postures at the targets, from which moves begin [rad] or [m].
     targets: (T, 3) [m].  payload: (T,) [kg].
     """
-    lines = lines_of(moves, targets)
+    lines = sample_moves(moves, targets)
     carried = np.array([payload[list(pair)].max() for pair in moves.pairs])
     n, s = len(arms), len(lines)
     found, reached, torques = (np.empty((n, s, columns)) for columns in (arms.dof, 3, arms.dof))

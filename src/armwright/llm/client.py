@@ -17,12 +17,12 @@ from typing import Any, Literal, TypeVar, get_args
 from urllib.parse import urlsplit
 
 from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
-from armwright.extras import needed
+from armwright.extras import requires_extra
 from armwright.llm.answer import without_words_around
 from armwright.llm.backend import CHECK, MOST_REQUESTS, CallError, Interrupted, LlmBackend, Question, Reader, Reply
 from armwright.llm.redaction import WithoutKeys, redacted, without_keys
 
-with needed("llm", "a language model"):
+with requires_extra("llm", "a language model"):
     from genai_prices import Usage, calc_price
     from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages

@@ -101,7 +101,7 @@ class Feedback:
 
     def _missed(self, number: int, row: int, shown: list[int]) -> str:
         """Why targets are missed, counted as shown; empty for points alone, whose reasons stand in the other lists."""
-        if not self._evaluation.goals.oriented:
+        if not self._evaluation.target_arrays.oriented:
             return ""
         arm = self._history.problem.arm(self._history.trials[number].design)
         reasons = [why_missed(arm, self._evaluation, row, target) for target in shown]
@@ -206,11 +206,11 @@ def _limits(evaluation: Evaluation, row: int, joints: Sequence[str]) -> str:
 
 def _angles(evaluation: Evaluation, row: int, shown: list[int]) -> str:
     """By how many degrees the tool is off at targets, "-" where any direction will do; empty where no target asks."""
-    goals = evaluation.goals
-    if not goals.oriented:
+    target_arrays = evaluation.target_arrays
+    if not target_arrays.oriented:
         return ""
     degrees = np.degrees(evaluation.angle_error[row])
-    return "(" + ", ".join(f"{degrees[t]:.1f}" if goals.n_angular[t] else "-" for t in shown) + ")"
+    return "(" + ", ".join(f"{degrees[t]:.1f}" if target_arrays.n_angular[t] else "-" for t in shown) + ")"
 
 
 def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:

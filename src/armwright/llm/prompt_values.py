@@ -25,7 +25,7 @@ from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.spaces.tolerance import length_columns
-from armwright.tasks.targets import REACHED, target_words
+from armwright.tasks.targets import REACHED, describe_targets
 from armwright.tasks.task import IN_ORDER, Task
 from armwright.text import one_line
 
@@ -65,7 +65,7 @@ VARIABLES = {
     "target_low": "the least x, y and z of all targets",
     "target_high": "the largest x, y and z of all targets",
     "updates": "updates of the inverse kinematics",
-    "objectives": "what is minimised, each with symbol, label, unit, words, over (sum, max, mean square or arm)",
+    "objectives": "what is minimised, each with symbol, label, unit, description, over (sum, max, mean square or arm)",
     "constraints": "what a design has to keep, each with quantity (as an objective), relation, bound",
     "n_feasible": "how many of the evaluated designs keep all of these",
     "cases": "what the task may come to beside what it says, as text; empty for nothing",
@@ -113,21 +113,23 @@ def common_values(history: History, memory: str, proposals: int, form: str) -> d
         "description": one_line(problem.task.description, LONGEST_DESCRIPTION),
         "restricted": [p for p in problem.space.parameters if p.name in dict(problem.space.restrict)],
         "payload": _payload_words(problem.task),
-        "obstacles": [obstacle.words() for obstacle in problem.task.obstacles],
+        "obstacles": [obstacle.describe() for obstacle in problem.task.obstacles],
         "collisions": problem.uses(*OF_CLEARANCE),
-        "oriented": problem.task.goals.oriented,
+        "oriented": problem.task.target_arrays.oriented,
         "restarts": problem.task.restarts,
         "moves": _move_words(problem.task) if problem.uses(*OF_MOVES) else "",
         "move_times": _time_words(problem.task) if problem.uses(*OF_TIME) else "",
-        "workspace": [region.words() for region in problem.task.workspace] if problem.uses(UNCOVERED_FRACTION) else [],
+        "workspace": [region.describe() for region in problem.task.workspace]
+        if problem.uses(UNCOVERED_FRACTION)
+        else [],
         "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.uses(quantity)],
         "updates_of_step": UPDATES_OF_STEP,
-        "n_targets": len(problem.task.points),
+        "n_targets": len(problem.task.target_positions),
         "updates": UPDATES,
         "objectives": [_spoken(objective, problem.task) for objective in problem.objectives],
         "constraints": problem.constraints,
         "n_feasible": int(history.feasible.sum()),
-        "cases": problem.task.case_words,
+        "cases": problem.task.cases_description,
         "tolerance": problem.tolerance,
         "reference_point": history.reference_point,
         "n_finished": len(history),
@@ -140,12 +142,14 @@ def common_values(history: History, memory: str, proposals: int, form: str) -> d
 
 def _spoken(objective: Objective, task: Task) -> Objective:
     """An objective whose words say what this task's tolerances and weights make of it."""
-    goals = task.goals
-    if objective == UNREACHED_TARGETS and (goals.oriented or np.any(goals.tolerance != REACHED)):
-        angle = " or the tool's direction by its angle tolerance" if goals.oriented else ""
-        return replace(objective, words=f"1 where the tip misses the target by its tolerance{angle} or more, else 0")
-    if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(goals.weight != 1.0):
-        return replace(objective, words=f"{objective.words}, times the target's weight")
+    target_arrays = task.target_arrays
+    if objective == UNREACHED_TARGETS and (target_arrays.oriented or np.any(target_arrays.tolerance != REACHED)):
+        angle = " or the tool's direction by its angle tolerance" if target_arrays.oriented else ""
+        return replace(
+            objective, description=f"1 where the tip misses the target by its tolerance{angle} or more, else 0"
+        )
+    if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(target_arrays.weight != 1.0):
+        return replace(objective, description=f"{objective.description}, times the target's weight")
     return objective
 
 
@@ -164,7 +168,7 @@ def _payload_words(task: Task) -> str:
 
 def _move_words(task: Task) -> str:
     """The straight moves, by numbers of targets; empty where there are none."""
-    pairs = task.lines.pairs
+    pairs = task.straight_moves.pairs
     if task.moves == IN_ORDER:
         return "from each target to the next, in the order of the list"
     shown = [pairs[i] for i in spread(len(pairs), MOST_TARGETS)]
@@ -175,7 +179,7 @@ def _move_words(task: Task) -> str:
 
 def _time_words(task: Task) -> str:
     """How long the moves take; empty where that is not said."""
-    times = task.lines.times
+    times = task.straight_moves.times
     if not times:
         return ""
     if len(set(times)) == 1:
@@ -194,13 +198,13 @@ def shown_values(
     most_proposed: int,
 ) -> dict[str, Any]:
     """At most so many targets, designs of the front, other designs, and earlier proposals."""
-    points_, decimals = history.problem.task.points, feedback.digits.length
+    points_, decimals = history.problem.task.target_positions, feedback.digits.length
     shown = spread(len(points_), most_targets)
     front = [feedback.front[place] for place in spread(len(feedback.front), most_designs)]
     others = [feedback.others[place] for place in spread(len(feedback.others), most_designs)]
     return {
         "targets": points(points_[shown], decimals),
-        "asks": target_words([history.problem.task.entries[place] for place in shown]),
+        "asks": describe_targets([history.problem.task.target_specs[place] for place in shown]),
         "target_low": vector(points_.min(axis=0), decimals),
         "target_high": vector(points_.max(axis=0), decimals),
         "n_targets_shown": len(shown),

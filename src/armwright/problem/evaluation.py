@@ -20,7 +20,7 @@ from armwright.robot.arm import Arm
 from armwright.tasks.moves import NO_MOVES, Moves
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import TargetArrays, position_targets
-from armwright.tasks.workspace import Region, points_of
+from armwright.tasks.workspace import Region, sample_regions
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Evaluation:
     position_error: Array  # (N, T) distance from the target [m]
     angle_error: Array  # (N, T) of the tool from the target's axis or orientation [rad]; 0 where it has none
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
-    goals: TargetArrays  # how the targets are to be reached
+    target_arrays: TargetArrays  # how the targets are to be reached
     obstacles: tuple[Obstacle, ...] = ()
     device: Device = "cpu"
     moves: Moves = NO_MOVES
@@ -117,15 +117,15 @@ class Evaluation:
                 "uncovered_fraction needs a workspace in the task: "
                 "workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
             )
-        points = points_of(self.workspace)
+        points = sample_regions(self.workspace)
         reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
 
     @property
     def missed(self) -> NDArray[np.bool_]:
         """(N, T) whether the tip or the tool's direction is off by a target's tolerance or more."""
-        goals = self.goals
-        return (self.position_error >= goals.tolerance) | (self.angle_error >= goals.angle_tolerance)
+        target_arrays = self.target_arrays
+        return (self.position_error >= target_arrays.tolerance) | (self.angle_error >= target_arrays.angle_tolerance)
 
     @property
     def self_clearance(self) -> Array:
@@ -161,7 +161,7 @@ def evaluate(
     device: Device = "cpu",
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
-    goals: TargetArrays | None = None,
+    target_arrays: TargetArrays | None = None,
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
@@ -169,7 +169,7 @@ def evaluate(
 
     targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
     obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
-    goals: how they are to be reached (`Task.goals`); without them, as points.
+    target_arrays: how they are to be reached (`Task.target_arrays`); without them, as points.
     moves: lines between targets that the tip goes along.
     workspace: boxes to cover.
 
@@ -180,7 +180,7 @@ def evaluate(
         >>> aw.evaluate(arms, [[0.3, 0.0, 0.2], [0.0, 0.3, 0.2]]).position_error.shape
         (3, 2)
     """
-    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, goals, moves, workspace)
+    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, target_arrays, moves, workspace)
 
 
 def evaluate_arrays(
@@ -190,7 +190,7 @@ def evaluate_arrays(
     start: ArrayLike | None = None,
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
-    goals: TargetArrays | None = None,
+    target_arrays: TargetArrays | None = None,
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
@@ -202,13 +202,13 @@ def evaluate_arrays(
     if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
         raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
     loads = _payloads(payload, len(targets))
-    goals = position_targets(len(targets)) if goals is None else goals
-    if len(goals) != len(targets):
-        raise TaskError(f"goals are of {len(goals)} targets, not of the {len(targets)} that are given")
-    postures = _postures(arrays, targets, loads, goals, device, start)
-    for other in _restarts(arrays, goals.restarts):
-        again = _postures(arrays, targets, loads, goals, device, other)
-        postures = _nearer(postures, again, targets, goals)
+    target_arrays = position_targets(len(targets)) if target_arrays is None else target_arrays
+    if len(target_arrays) != len(targets):
+        raise TaskError(f"target_arrays are of {len(target_arrays)} targets, not of the {len(targets)} that are given")
+    postures = _postures(arrays, targets, loads, target_arrays, device, start)
+    for other in _restarts(arrays, target_arrays.restarts):
+        again = _postures(arrays, targets, loads, target_arrays, device, other)
+        postures = _nearer(postures, again, targets, target_arrays)
     reached = postures.reached.astype(np.float64)
     return Evaluation(
         arms=arrays,
@@ -219,7 +219,7 @@ def evaluate_arrays(
         position_error=np.linalg.norm(reached - targets, axis=-1),
         angle_error=postures.angle.astype(np.float64),
         joint_torques=postures.torque.astype(np.float64),
-        goals=goals,
+        target_arrays=target_arrays,
         obstacles=tuple(obstacles),
         device=device,
         moves=moves,
@@ -228,10 +228,21 @@ def evaluate_arrays(
 
 
 def _postures(
-    arrays: ArmArrays, targets: Array, loads: Array, goals: TargetArrays, device: Device, start: ArrayLike | None
+    arrays: ArmArrays,
+    targets: Array,
+    loads: Array,
+    target_arrays: TargetArrays,
+    device: Device,
+    start: ArrayLike | None,
 ) -> Postures:
     return solve_postures(
-        arrays, targets, start=start, payload=loads, goals=goals, precision=arrays.precision, device=device
+        arrays,
+        targets,
+        start=start,
+        payload=loads,
+        target_arrays=target_arrays,
+        precision=arrays.precision,
+        device=device,
     )
 
 
@@ -245,12 +256,12 @@ def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
         yield np.where(arrays.motion == FIXED, 0.0, lower + share * (upper - lower))[:, None]
 
 
-def _nearer(first: Postures, second: Postures, targets: Array, goals: TargetArrays) -> Postures:
+def _nearer(first: Postures, second: Postures, targets: Array, target_arrays: TargetArrays) -> Postures:
     """Of each arm and target the posture of the smaller distance, angles counted; the first of equals."""
 
     def off(postures: Postures) -> Array:
         distance = np.linalg.norm(postures.reached.astype(np.float64) - targets, axis=-1)
-        return np.hypot(distance, goals.metres_per_radian * postures.angle)
+        return np.hypot(distance, target_arrays.metres_per_radian * postures.angle)
 
     better = off(second) < off(first)
     return Postures(

@@ -25,7 +25,7 @@ def why_missed(arm: Arm, evaluation: Evaluation, row: int, target: int) -> str:
 def miss_words(evaluation: Evaluation, row: int, target: int) -> str:
     """By how much: the distance, and the angle where the target asks for one."""
     words = f"{1e3 * evaluation.position_error[row, target]:.1f} mm"
-    if not evaluation.goals.n_angular[target]:
+    if not evaluation.target_arrays.n_angular[target]:
         return words
     return f"{words} and {math.degrees(evaluation.angle_error[row, target]):.1f}°"
 

@@ -25,7 +25,7 @@ class Objective:
     """A number per arm that should be small.
 
     symbol: its name in formulas and prompts.
-    words: what its share of one target is, for a reader who knows nothing of this program; of "arm", what it is.
+    description: what its share of one target is, for a reader who knows nothing of this program; of "arm", what it is.
     each: its share per target, (N, T); of "arm" what the arm itself is, (N,), whatever the targets.
     over: what is made of the shares: their sum, the largest, the least, or the root of their mean square.
     """
@@ -34,7 +34,7 @@ class Objective:
     label: str
     unit: str
     symbol: str
-    words: str
+    description: str
     each: Callable[[Evaluation], Array]
     over: Over = "sum"
 
@@ -60,11 +60,11 @@ class Objective:
 
 
 def _position_error(evaluation: Evaluation) -> Array:
-    return evaluation.goals.weight * evaluation.position_error
+    return evaluation.target_arrays.weight * evaluation.position_error
 
 
 def _orientation_error(evaluation: Evaluation) -> Array:
-    return evaluation.goals.weight * evaluation.angle_error
+    return evaluation.target_arrays.weight * evaluation.angle_error
 
 
 def _torque_norm(evaluation: Evaluation) -> Array:
@@ -126,7 +126,7 @@ POSITION_ERROR = Objective(
     label="Position error",
     unit="m",
     symbol="E_pos",
-    words="the distance between the tip and the target in the kept posture",
+    description="the distance between the tip and the target in the kept posture",
     each=_position_error,
 )
 TORQUE = Objective(
@@ -134,8 +134,8 @@ TORQUE = Objective(
     label="Torque",
     unit=f"N m x {TORQUE_SCALE:g}",
     symbol="E_torque",
-    words=f"{TORQUE_SCALE:g} times the Euclidean norm of the joint torques [N m] that hold the kept posture up against "
-    "gravity",
+    description=f"{TORQUE_SCALE:g} times the Euclidean norm of the joint torques [N m] that hold the kept posture up "
+    "against gravity",
     each=lambda evaluation: TORQUE_SCALE * _torque_norm(evaluation),
 )
 WORST_ERROR = Objective(
@@ -143,7 +143,7 @@ WORST_ERROR = Objective(
     label="Worst position error",
     unit="m",
     symbol="E_worst",
-    words="the distance between the tip and the target in the kept posture",
+    description="the distance between the tip and the target in the kept posture",
     each=lambda evaluation: evaluation.position_error,
     over="max",
 )
@@ -152,7 +152,7 @@ UNREACHED_TARGETS = Objective(
     label="Unreached targets",
     unit="targets",
     symbol="E_unreached",
-    words=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
+    description=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
     each=lambda evaluation: evaluation.missed.astype(np.float64),
 )
 ORIENTATION_ERROR = Objective(
@@ -160,7 +160,8 @@ ORIENTATION_ERROR = Objective(
     label="Orientation error",
     unit="rad",
     symbol="E_rot",
-    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    description="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has "
+    "none",
     each=_orientation_error,
 )
 WORST_ANGLE = Objective(
@@ -168,7 +169,8 @@ WORST_ANGLE = Objective(
     label="Worst orientation error",
     unit="rad",
     symbol="E_angle",
-    words="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has none",
+    description="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has "
+    "none",
     each=lambda evaluation: evaluation.angle_error,
     over="max",
 )
@@ -177,7 +179,7 @@ PEAK_TORQUE = Objective(
     label="Peak torque",
     unit="N m",
     symbol="E_peak",
-    words="the largest of the joint torques' absolute values [N m] that hold the kept posture up against gravity",
+    description="the largest of the joint torques' absolute values [N m] that hold the kept posture up against gravity",
     each=lambda evaluation: evaluation.worst_torques(lambda torques: np.abs(torques).max(axis=-1)),
     over="max",
 )
@@ -186,7 +188,7 @@ RMS_TORQUE = Objective(
     label="RMS torque",
     unit="N m",
     symbol="E_rms",
-    words="the Euclidean norm of the joint torques [N m] that hold the kept posture up against gravity",
+    description="the Euclidean norm of the joint torques [N m] that hold the kept posture up against gravity",
     each=_torque_norm,
     over="mean square",
 )
@@ -195,7 +197,7 @@ MASS = Objective(
     label="Mass",
     unit="kg",
     symbol="E_mass",
-    words="the mass of the arm, its actuators included, without its payload",
+    description="the mass of the arm, its actuators included, without its payload",
     each=_mass,
     over="arm",
 )
@@ -204,7 +206,7 @@ TORQUE_UTILISATION = Objective(
     label="Torque utilisation",
     unit="of allowed",
     symbol="E_util",
-    words="the largest share of its actuator's torque that any joint needs to hold the kept posture up against "
+    description="the largest share of its actuator's torque that any joint needs to hold the kept posture up against "
     "gravity; above 1 the arm cannot hold it",
     each=_torque_utilisation,
     over="max",
@@ -214,7 +216,7 @@ PRICE = Objective(
     label="Price",
     unit="USD",
     symbol="E_price",
-    words="the price of all actuators",
+    description="the price of all actuators",
     each=_price,
     over="arm",
 )
@@ -223,7 +225,7 @@ JOINTS = Objective(
     label="Joints",
     unit="joints",
     symbol="E_joints",
-    words="the number of joints that move",
+    description="the number of joints that move",
     each=lambda evaluation: (evaluation.arms.motion < FIXED).sum(axis=1).astype(np.float64),
     over="arm",
 )
@@ -232,7 +234,7 @@ LENGTH = Objective(
     label="Length",
     unit="m",
     symbol="E_length",
-    words="the sum of the lengths of all links",
+    description="the sum of the lengths of all links",
     each=lambda evaluation: evaluation.arms.length,
     over="arm",
 )
@@ -241,7 +243,8 @@ COLLISION = Objective(
     label="Collision",
     unit="m",
     symbol="E_collision",
-    words="how deep the arm in the kept posture is in an obstacle or in itself, at the worst place; 0 where it is free",
+    description="how deep the arm in the kept posture is in an obstacle or in itself, at the worst place; 0 where it "
+    "is free",
     each=lambda evaluation: np.maximum(0.0, -evaluation.clearance),
 )
 CLEARANCE_SHORTFALL = Objective(
@@ -249,8 +252,8 @@ CLEARANCE_SHORTFALL = Objective(
     label="Clearance shortfall",
     unit="m",
     symbol="E_shortfall",
-    words=f"by how much the arm in the kept posture comes nearer than {COMFORTABLE:g} m to an obstacle or to itself; "
-    f"above {COMFORTABLE:g} it is in it",
+    description=f"by how much the arm in the kept posture comes nearer than {COMFORTABLE:g} m to an obstacle or to "
+    f"itself; above {COMFORTABLE:g} it is in it",
     each=lambda evaluation: np.maximum(0.0, COMFORTABLE - evaluation.clearance),
     over="max",
 )
@@ -259,8 +262,8 @@ PATH_ERROR = Objective(
     label="Path error",
     unit="m",
     symbol="E_path",
-    words="the largest distance between the tip and where it should be on the straight moves that end at the target; 0 "
-    "where none does",
+    description="the largest distance between the tip and where it should be on the straight moves that end at the "
+    "target; 0 where none does",
     each=_path_error,
     over="max",
 )
@@ -269,8 +272,8 @@ MAX_JOINT_STEP = Objective(
     label="Largest joint step",
     unit="rad",
     symbol="E_step",
-    words="the largest change of any joint [rad, of sliding ones m] from one step of the moves that end at the target "
-    "to the next, large where the arm flips into another posture on the way; 0 where no move ends there",
+    description="the largest change of any joint [rad, of sliding ones m] from one step of the moves that end at the "
+    "target to the next, large where the arm flips into another posture on the way; 0 where no move ends there",
     each=_max_joint_step,
     over="max",
 )
@@ -279,7 +282,7 @@ UNCOVERED_FRACTION = Objective(
     label="Uncovered fraction",
     unit="fraction",
     symbol="E_uncovered",
-    words=f"the share of the workspace's points that the tip misses by {1e3 * REACHED:g} mm or more",
+    description=f"the share of the workspace's points that the tip misses by {1e3 * REACHED:g} mm or more",
     each=lambda evaluation: (evaluation.workspace_error >= REACHED).mean(axis=1),
     over="arm",
 )
@@ -288,8 +291,8 @@ ANISOTROPY = Objective(
     label="Anisotropy",
     unit="fraction",
     symbol="E_anisotropy",
-    words="1 less the tip's speed in the direction in which the joints move it worst over that in the best, in the "
-    "kept posture: 0 where all directions are alike, 1 where there is one in which the tip cannot move at all",
+    description="1 less the tip's speed in the direction in which the joints move it worst over that in the best, in "
+    "the kept posture: 0 where all directions are alike, 1 where there is one in which the tip cannot move at all",
     each=lambda evaluation: 1.0 - evaluation.dexterity,
     over="max",
 )
@@ -298,8 +301,8 @@ DYNAMIC_TORQUE = Objective(
     label="Dynamic torque",
     unit="N m",
     symbol="E_dynamic",
-    words="the largest absolute torque of any motor along the timed moves that end at the target, gravity and inertia "
-    "included",
+    description="the largest absolute torque of any motor along the timed moves that end at the target, gravity and "
+    "inertia included",
     each=_dynamic_torque,
     over="max",
 )
@@ -308,7 +311,8 @@ DYNAMIC_UTILISATION = Objective(
     label="Dynamic utilisation",
     unit="of allowed",
     symbol="E_dynutil",
-    words="the largest share of any actuator's torque along the timed moves that end at the target; above 1 it cannot",
+    description="the largest share of any actuator's torque along the timed moves that end at the target; above 1 it "
+    "cannot",
     each=_dynamic_utilisation,
     over="max",
 )
@@ -317,8 +321,8 @@ SPEED_UTILISATION = Objective(
     label="Speed utilisation",
     unit="of allowed",
     symbol="E_speed",
-    words="the largest share of any actuator's no-load speed along the timed moves that end at the target; above 1 it "
-    "cannot",
+    description="the largest share of any actuator's no-load speed along the timed moves that end at the target; "
+    "above 1 it cannot",
     each=_speed_utilisation,
     over="max",
 )
@@ -342,14 +346,14 @@ RENAMED = {
 }
 
 
-def _clearance(name: str, words: str, each: Callable[[Evaluation], Array]) -> Objective:
+def _clearance(name: str, description: str, each: Callable[[Evaluation], Array]) -> Objective:
     """Of which more is better, so that it can only be bounded."""
     return Objective(
         name=name,
         label=name.replace("_", " ").capitalize(),
         unit="m",
         symbol=name,
-        words=f"{words}; below 0 it is in it, and {FAR:g} where there is nothing near",
+        description=f"{description}; below 0 it is in it, and {FAR:g} where there is nothing near",
         each=lambda evaluation: np.minimum(each(evaluation), FAR),
         over="min",
     )
@@ -373,7 +377,7 @@ MANIPULABILITY = Objective(
     label="Manipulability",
     unit="m³",
     symbol="manipulability",
-    words="the square root of det(J J^T) in the kept posture, with the position Jacobian J",
+    description="the square root of det(J J^T) in the kept posture, with the position Jacobian J",
     each=lambda evaluation: evaluation.manipulability,
     over="min",
 )

@@ -131,7 +131,7 @@ class Problem:
                 f"a tolerance does not go with the evaluator {self.evaluator.name}, which measures an arm as it is"
             )
         for objective in self.objectives:
-            if objective in OF_ORIENTATION and not self.task.goals.oriented:
+            if objective in OF_ORIENTATION and not self.task.target_arrays.oriented:
                 raise SettingsError(
                     f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has "
                     "an axis or an orientation. Give one to a target, or take another objective"
@@ -145,7 +145,7 @@ class Problem:
             return named_objectives(self.task.objectives)
         if self.evaluator is not None:
             return self.evaluator.objectives
-        return (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.goals.oriented else PAPER_OBJECTIVES
+        return (*PAPER_OBJECTIVES, ORIENTATION_ERROR) if self.task.target_arrays.oriented else PAPER_OBJECTIVES
 
     def _check_reference_point(self) -> None:
         point, names = self.reference_point, [objective.name for objective in self.objectives]
@@ -203,7 +203,7 @@ class Problem:
         """Return the kinematics and statics of arms at all targets, in one case of the task."""
         task = self.task
         points, payloads = task.cases[case]
-        known = (payloads, task.obstacles, task.goals, task.lines, task.workspace)
+        known = (payloads, task.obstacles, task.target_arrays, task.straight_moves, task.workspace)
         return evaluate_arrays(arms, points, self.device, None, *known)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
@@ -246,8 +246,8 @@ class Problem:
     def _postures(self) -> int:
         """Return the largest number of postures of one arm."""
         task = self.task
-        along = sum(task.lines.steps(task.points)) + len(task.lines)
-        return len(task.points) + along + sum(region.points for region in task.workspace)
+        along = sum(task.straight_moves.steps(task.target_positions)) + len(task.straight_moves)
+        return len(task.target_positions) + along + sum(region.points for region in task.workspace)
 
     def _measure(self, designs: Sequence[Design]) -> tuple[Mapping[str, Array], Mapping[int, str]]:
         """Return (N,) of each objective that the custom evaluator measures, and its failures by row."""

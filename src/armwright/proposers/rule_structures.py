@@ -78,7 +78,7 @@ def fitted(structure: Structure, problem: Problem, torque: float) -> Design:
 
     torque: the α-scaled budget; inf where there is none.
     """
-    space, points = problem.space, problem.task.points
+    space, points = problem.space, problem.task.target_positions
     reach = sized(structure.share, problem, torque)
     joints, offset = structure.joints, np.array(structure.offset)
     if across(points):
@@ -89,7 +89,7 @@ def fitted(structure: Structure, problem: Problem, torque: float) -> Design:
 
 def sized(share: float, problem: Problem, torque: float) -> float:
     """The reach [m]: this share of what the torque affords, but little more than what the targets need."""
-    points = problem.task.points
+    points = problem.task.target_positions
     need = needed_length(points)
     afforded = share * affordable_length(problem.space, len(points), torque, LONGEST * (need + SLACK))
     return min(afforded, (0.6 + 0.5 * share) * need + SLACK)

@@ -119,7 +119,7 @@ def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[i
     """Draw the moves that end at these targets: the straight line, and the path of the tip."""
     if not evaluation.moves:
         return
-    lines = evaluation.paths.lines
+    lines = evaluation.paths.samples
     for (_, end), first, beyond in zip(evaluation.moves.pairs, lines.first, lines.first[1:], strict=False):
         if end in targets:
             axes.plot(*lines.points[first:beyond].T, color=TARGET, linewidth=1.2)
@@ -137,18 +137,18 @@ def _draw_workspace(axes: Any, workspace: Sequence[Region]) -> None:
 
 def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
     """Draw the required tool direction: an arrow along its z axis, and for a full orientation also along x and y."""
-    goal, rows = evaluation.targets[target], evaluation.goals.n_angular[target]
+    goal, rows = evaluation.targets[target], evaluation.target_arrays.n_angular[target]
     if not rows:
         return
     for k in (2,) if rows == AXIS else (0, 1, 2):
         colour = TARGET if rows == AXIS else JOINT["xyz"[k]]
-        way = (1.0 if k == 2 else 0.6) * size * evaluation.goals.rotation[target, :, k]
+        way = (1.0 if k == 2 else 0.6) * size * evaluation.target_arrays.rotation[target, :, k]
         axes.quiver(*goal, *way, color=colour, linewidth=1.4, arrow_length_ratio=0.3)
 
 
 def _describe_miss(evaluation: Evaluation, target: int) -> str:
     words = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
-    if not evaluation.goals.n_angular[target]:
+    if not evaluation.target_arrays.n_angular[target]:
         return words
     return f"{words}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
 

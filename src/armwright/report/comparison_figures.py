@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.run_summary import RunSummary
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
-from armwright.pareto import front_numbers, hypervolume, solution_numbers
+from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.report.arm_figures import draw_arm, frame
 from armwright.report.drawing import one_panel, several_panels, write_drawn
 from armwright.report.figures import axis_label, draw_samples
@@ -89,7 +89,7 @@ def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[s
         history = runs[0].history()
         if len(history.problem.objectives) > 1:
             yield f"samples-{task}", draw_samples(history)
-        solutions = solution_numbers(history.masked_objectives, comparison.reference_point(task))
+        solutions = paper_solution_indices(history.masked_objectives, comparison.reference_point(task))
         for i, number in enumerate(dict.fromkeys(solutions or ()), start=1):
             title = f"{task}, {shown}, seed {runs[0].seed}: Solution {i}"
             yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number))
@@ -106,7 +106,7 @@ def draw_targets(comparison: Comparison) -> Figure:
     figure = Figure(figsize=(3.2 * columns, 3.3 * rows))
     figure.subplots_adjust(left=0.02, right=0.95, bottom=0.06 / rows, top=1 - 0.1 / rows, wspace=0.1, hspace=0.16)
     for place, task in enumerate(shown, start=1):
-        points = next(run for run in comparison.runs if run.task == task).config.task.points
+        points = next(run for run in comparison.runs if run.task == task).config.task.target_positions
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
         axes.scatter(*points.T, marker="*", s=90, color=TARGET, edgecolors=FRONT, linewidths=0.5, depthshade=False)
         low, high = points.min(axis=0), points.max(axis=0)
@@ -134,7 +134,7 @@ def draw_area(comparison: Comparison) -> Figure:
     values = history.values[: config.study.n_trials, :2]
     figure, axes = one_panel(4.4, 3.8)
     kept = history.masked_objectives[: config.study.n_trials, :2]
-    inside = values[[n for n in front_numbers(kept) if np.all(values[n] < reference[:2])]]
+    inside = values[[n for n in front_indices(kept) if np.all(values[n] < reference[:2])]]
     axes.scatter(*values.T, s=12, color="#9A9A9A", label="designs")
     if len(inside):
         x = [inside[0, 0], *inside[:, 0], reference[0]]
@@ -370,7 +370,7 @@ def _name_axes(axes: Any, config: RunConfig) -> None:
 def _front(run: RunSummary) -> np.ndarray:
     """Return the front of a run in the first two objectives, (K, 2)."""
     counted = run.history().masked_objectives
-    return counted[front_numbers(counted)][:, :2]
+    return counted[front_indices(counted)][:, :2]
 
 
 def _stairs(surface: np.ndarray, reference: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:

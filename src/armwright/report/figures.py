@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from armwright.exceptions import RunFolderError
 from armwright.experiments.compare_arms import ComparedArm, read_existing_arms
-from armwright.pareto import front_numbers, hypervolume, knee_number, solution_numbers
+from armwright.pareto import front_indices, hypervolume, knee_index, paper_solution_indices
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, Objective
 from armwright.report.arm_figures import draw_arm, draw_arms
 from armwright.report.drawing import one_panel, several_panels, write_drawn
@@ -86,11 +86,11 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     to feasibility is returned.
     """
     reference, objectives = _reference(history), history.problem.objectives
-    numbers = front_numbers(history.masked_objectives)
+    numbers = front_indices(history.masked_objectives)
     if not numbers:
         return [("Nearest to feasible", history.member(number)) for number in history.nearest(1)]
     first, last = (f"least {objective.label.lower()}" for objective in (objectives[0], objectives[-1]))
-    solutions = solution_numbers(history.masked_objectives, reference)
+    solutions = paper_solution_indices(history.masked_objectives, reference)
     if solutions is None:
         lowest = min(numbers, key=lambda n: history.values[n, -1])
         titled = {numbers[0]: f"{first.capitalize()} of all", lowest: f"{last.capitalize()} of all"}
@@ -99,7 +99,7 @@ def chosen_members(history: History) -> list[tuple[str, FrontMember]]:
     if numbers[0] != solutions[0]:
         best = "Most precise" if objectives[0] is POSITION_ERROR else first.capitalize()
         titled = {numbers[0]: f"{best} of all, beyond the reference point", **titled}
-    knee = knee_number(history.masked_objectives, reference)
+    knee = knee_index(history.masked_objectives, reference)
     if knee is not None:
         titled.setdefault(knee, "Knee of the front")
     titled.setdefault(solutions[1], f"Solution 2: {last}")
@@ -288,7 +288,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
             zorder=3,
             **_paint(style),
         )
-    front = values[front_numbers(history.masked_objectives)]
+    front = values[front_indices(history.masked_objectives)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # more than two objectives have no front line
         x = [inside[0, 0], *inside[:, 0], reference[0]]

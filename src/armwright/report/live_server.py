@@ -27,7 +27,7 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from armwright.exceptions import ArmwrightError, FailureError, SettingsError
 from armwright.extras import check_extra
-from armwright.files import writable
+from armwright.files import replace_surrogates
 from armwright.report.page import render_page
 from armwright.runs.control import (
     LONGEST_HINT,
@@ -113,7 +113,7 @@ def live_app(folder: Path, token: str, is_allowed: Callable[[str], bool], pages:
         watching.cancel()
 
     async def page(request: Request) -> Response:
-        html = render_page(writable(f"{folder.resolve().name}: armwright, live"), token=token)
+        html = render_page(replace_surrogates(f"{folder.resolve().name}: armwright, live"), token=token)
         return Response(html, media_type="text/html; charset=utf-8")
 
     async def packed(request: Request) -> Response:

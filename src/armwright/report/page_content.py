@@ -217,11 +217,11 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
         "targets": [list(target) for target in task.targets],
         "payloads": task.payloads.tolist(),
-        "cases": task.case_words,
+        "cases": task.cases_description,
         "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
-        "goals": _goals(task.goals),
-        "workspace": [{"low": list(r.low), "high": list(r.high), "words": r.words()} for r in task.workspace],
-        "moves": [list(pair) for pair in task.lines.pairs],
+        "target_arrays": _target_arrays(task.target_arrays),
+        "workspace": [{"low": list(r.low), "high": list(r.high), "description": r.describe()} for r in task.workspace],
+        "moves": [list(pair) for pair in task.straight_moves.pairs],
         "reference_point": None if reference is None else list(reference),
         "objectives": [objective.model_dump() for objective in config.objectives],
         "constraints": [
@@ -274,18 +274,18 @@ def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
         "centre": list(solid.centre),
         "rotation": solid.rotation.tolist(),
         "half": list(solid.half),
-        "words": obstacle.words(),
+        "description": obstacle.describe(),
     }
 
 
-def _goals(goals: TargetArrays) -> dict[str, Any]:
+def _target_arrays(target_arrays: TargetArrays) -> dict[str, Any]:
     """Return the targets' orientation requirements; frames: tool axes as columns, stored row by row."""
     return {
-        "oriented": goals.oriented,
-        "rows": goals.n_angular.tolist(),
-        "frames": goals.rotation.reshape(-1, 9).tolist() if goals.oriented else [],
-        "tolerance": goals.tolerance.tolist(),
-        "angle_tolerance": goals.angle_tolerance.tolist(),
+        "oriented": target_arrays.oriented,
+        "rows": target_arrays.n_angular.tolist(),
+        "frames": target_arrays.rotation.reshape(-1, 9).tolist() if target_arrays.oriented else [],
+        "tolerance": target_arrays.tolerance.tolist(),
+        "angle_tolerance": target_arrays.angle_tolerance.tolist(),
     }
 
 

@@ -7,7 +7,7 @@ from armwright.exceptions import RunFolderError
 from armwright.experiments.compare_runs import Comparison, MethodResult
 from armwright.experiments.run_summary import RunSummary
 from armwright.experiments.statistics import Interval, least_p
-from armwright.files import as_csv, replace_file
+from armwright.files import replace_file, to_csv
 from armwright.report.table_records import (
     Published,
     contrast_records,
@@ -37,13 +37,13 @@ def write_tables(
     published = published or {}
     files = {
         "table.md": markdown(comparison, title, published, published_in, notes),
-        "table.csv": as_csv(row_records(comparison, published)),
+        "table.csv": to_csv(row_records(comparison, published)),
         "table.tex": latex(comparison, published, published_in),
-        "contrasts.csv": as_csv(contrast_records(comparison)),
-        "overall.csv": as_csv(overall_records(comparison)),
-        "time-to.csv": as_csv(time_records(comparison)),
-        "proposers.csv": as_csv(proposer_records(comparison)),
-        "runs.csv": as_csv(run_records(comparison)),
+        "contrasts.csv": to_csv(contrast_records(comparison)),
+        "overall.csv": to_csv(overall_records(comparison)),
+        "time-to.csv": to_csv(time_records(comparison)),
+        "proposers.csv": to_csv(proposer_records(comparison)),
+        "runs.csv": to_csv(run_records(comparison)),
     }
     written: list[Path] = []
     for name, text in files.items():

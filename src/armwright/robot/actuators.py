@@ -70,7 +70,7 @@ def catalogue() -> Mapping[str, ActuatorRecord]:
     return {record.name: record for record in records}
 
 
-def resolved(entry: Any) -> Any:
+def resolve_actuator(entry: Any) -> Any:
     """Return the record of a named actuator; anything else unchanged, to be validated as a record."""
     if not isinstance(entry, str):
         return entry

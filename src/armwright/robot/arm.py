@@ -124,7 +124,7 @@ class Link:
         """The centre of the total mass, from this joint [m]."""
         if self.end_mass == 0.0:
             return self.com
-        (x, y, z), (u, v, w), total = self.com, self.end_place, self.total_mass
+        (x, y, z), (u, v, w), total = self.com, self.end_mass_position, self.total_mass
         return (
             (self.mass * x + self.end_mass * u) / total,
             (self.mass * y + self.end_mass * v) / total,
@@ -132,7 +132,7 @@ class Link:
         )
 
     @property
-    def end_place(self) -> Vector:
+    def end_mass_position(self) -> Vector:
         """The position of the end mass, from this joint [m]."""
         (x, y, z), (u, v, w) = self.offset, self.end_shift
         return (x + u, y + v, z + w)

@@ -25,7 +25,7 @@ MARGIN = 1e-6  # [m]; files have ten digits, and float64 rounds
 MOST_BOXES = 50_000  # for a pair; beyond it nothing is proven
 
 
-def settled_pairs(arm: Arm) -> dict[tuple[int, int], Reason]:
+def disabled_collision_pairs(arm: Arm) -> dict[tuple[int, int], Reason]:
     """Pairs of links with a length, counted from 0, and why nothing has to be looked for between them.
 
     Adjacent: nothing solid or nothing that moves is between them. Never, Always: they meet in no posture, or in every

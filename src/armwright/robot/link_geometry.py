@@ -99,7 +99,7 @@ def inertia_tensor(link: Link) -> Array:
     around = np.outer(axis, axis)
     tensor = across * (np.eye(3) - around) + link.mass * r2 / 2.0 * around
     centre = np.array(link.total_com)
-    for mass, place in ((link.mass, link.com), (link.end_mass, link.end_place)):
+    for mass, place in ((link.mass, link.com), (link.end_mass, link.end_mass_position)):
         away = np.array(place) - centre
         tensor += mass * (away @ away * np.eye(3) - np.outer(away, away))
     return tensor
@@ -116,10 +116,10 @@ def inertia_moments(link: Link) -> dict[str, str]:
         across, around = cylinder_inertia(link)
         return {"ixx": across, "iyy": across, "izz": around, "ixy": "0", "ixz": "0", "iyz": "0"}
     tensor = inertia_tensor(link)
-    return {name: f"{tensor[place]:.17g}" for name, place in TENSOR_PLACES.items()}
+    return {name: f"{tensor[place]:.17g}" for name, place in TENSOR_INDICES.items()}
 
 
-TENSOR_PLACES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+TENSOR_INDICES = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
 
 
 def rpy_along(offset: Vector) -> Vector:

@@ -7,7 +7,7 @@ from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     COLOURS,
     MIN_INERTIA,
-    TENSOR_PLACES,
+    TENSOR_INDICES,
     cylinder_inertia,
     inertia_tensor,
     marker_radius,
@@ -91,7 +91,7 @@ def _add_link(body: Element, joint: Joint, link: Link) -> None:
         inertial |= {"euler": euler, "diaginertia": f"{across} {across} {around}"}
     else:
         tensor = inertia_tensor(link)
-        inertial["fullinertia"] = " ".join(f"{tensor[place]:.17g}" for place in TENSOR_PLACES.values())
+        inertial["fullinertia"] = " ".join(f"{tensor[place]:.17g}" for place in TENSOR_INDICES.values())
     SubElement(body, "inertial", inertial)
     if link.length > 0.0:
         cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}

@@ -3,7 +3,7 @@
 from xml.etree.ElementTree import Element, SubElement
 
 from armwright.robot.arm import Arm
-from armwright.robot.collision_pairs import settled_pairs
+from armwright.robot.collision_pairs import disabled_collision_pairs
 from armwright.robot.link_geometry import home_position, moving_joints, number, to_xml
 
 GROUP = "arm"
@@ -13,8 +13,8 @@ def to_srdf(arm: Arm, name: str = "arm") -> str:
     """Return the SRDF for the URDF of the same arm and name: the group `arm` from `base` to `tip`, and its home.
 
     Home is all joints at 0, or at the limit closest to it. Collision checks are disabled between neighbours, and for
-    links that provably never or always collide (`settled_pairs`). There is no end effector, since an arm ends at its
-    tip, and no virtual joint, since the URDF itself has `world`.
+    links that provably never or always collide (`disabled_collision_pairs`). There is no end effector, since an
+    arm ends at its tip, and no virtual joint, since the URDF itself has `world`.
     """
     robot = Element("robot", name=name)
     group = SubElement(robot, "group", name=GROUP)
@@ -22,7 +22,7 @@ def to_srdf(arm: Arm, name: str = "arm") -> str:
     state = SubElement(robot, "group_state", name="home", group=GROUP)
     for n, joint in moving_joints(arm):
         SubElement(state, "joint", name=f"joint_{n}", value=number(home_position(joint)))
-    for (first, second), reason in settled_pairs(arm).items():
+    for (first, second), reason in disabled_collision_pairs(arm).items():
         pair = {"link1": f"link_{first + 1}", "link2": f"link_{second + 1}", "reason": reason}
         SubElement(robot, "disable_collisions", pair)
     return to_xml(robot)

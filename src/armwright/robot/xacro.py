@@ -8,7 +8,7 @@ from armwright.robot.arm import Arm, Link, Vector
 from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     MARKER_SCALE,
-    TENSOR_PLACES,
+    TENSOR_INDICES,
     Segment,
     joint_limits,
     number,
@@ -134,7 +134,7 @@ def _add_macro(robot: Element) -> None:
     centre = " ".join(f"${{com[{i}] + share * d[{i}]}}" for i in range(3))
     SubElement(inertial, "origin", xyz=centre, rpy="0 0 0")
     SubElement(inertial, "mass", value="${total}")
-    SubElement(inertial, "inertia", {name: _moment(*place) for name, place in TENSOR_PLACES.items()})
+    SubElement(inertial, "inertia", {name: _moment(*place) for name, place in TENSOR_INDICES.items()})
 
 
 def _direction(link: Link) -> Vector:

@@ -146,8 +146,8 @@ def _recorded(record: ObjectiveRecord) -> Objective:
             f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
         )
 
-    words = record.label.lower()
-    return Objective(record.name, record.label, record.unit, record.symbol, words=words, each=each, over="arm")
+    description = record.label.lower()
+    return Objective(record.name, record.label, record.unit, record.symbol, description, each, over="arm")
 
 
 def versions(evaluator: Evaluator | None = None) -> dict[str, str]:

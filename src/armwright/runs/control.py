@@ -18,7 +18,7 @@ from filelock import FileLock
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.files import replace_file, writable
+from armwright.files import replace_file, replace_surrogates
 
 CONTROL = "control.json"
 STATUS = "status.json"
@@ -108,7 +108,7 @@ def stop_study(folder: Path) -> None:
 
 def add_hint(folder: Path, text: str) -> Hint:
     """Gives the language model a hint for its next prompt; SettingsError where the text cannot be one."""
-    words = writable(text).strip()
+    words = replace_surrogates(text).strip()
     if not 1 <= len(words) <= LONGEST_HINT:
         raise SettingsError(f"a hint of {len(words):,} characters: from 1 to {LONGEST_HINT:,} are possible")
 
@@ -171,7 +171,7 @@ class Channel:
         if self._folder is None:
             return
         before = self._said
-        words = before.fault if before is not None and fault is None else writable(fault or "")
+        words = before.fault if before is not None and fault is None else replace_surrogates(fault or "")
         if before is not None and (doing, words) == (before.doing, before.fault):
             return
         since = before.since if before is not None and doing == before.doing else time.time()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.files import as_csv
+from armwright.files import to_csv
 from armwright.problem.miss_reasons import why_missed
 from armwright.robot.build_sheet import SheetRow, sheet_markdown, sheet_rows
 from armwright.robot.mjcf import to_mjcf
@@ -51,7 +51,7 @@ def _sheet(history: History, member: FrontMember) -> str:
     if task.payloads.any():
         notes.append(f"Torques with the payload of {task.payloads.max():g} kg at most; of the arm alone they are less.")
     evaluation = history.evaluation([member.number])
-    angle = f" and {np.degrees(evaluation.angle_error.max()):.2f}°" if evaluation.goals.oriented else ""
+    angle = f" and {np.degrees(evaluation.angle_error.max()):.2f}°" if evaluation.target_arrays.oriented else ""
     notes.append(f"Targets are missed by {1e3 * evaluation.position_error.max():.2f} mm{angle} at most.")
     for target in np.flatnonzero(evaluation.missed[0]):
         notes.append(f"Target {target + 1} is missed by {why_missed(member.arm, evaluation, 0, int(target))}.")
@@ -62,7 +62,7 @@ def _sheet_csv(history: History, member: FrontMember) -> str:
     rows = [asdict(row) for row in _rows(history, member)]
     for row in rows:
         row["used_low"], row["used_high"] = row.pop("used")
-    return as_csv(rows)
+    return to_csv(rows)
 
 
 def mass_per_metre(space: DesignSpace) -> float:

@@ -14,8 +14,8 @@ from armwright.pareto import (
     FrontTracker,
     default_reference_point,
     feasible_mask,
+    front_indices,
     front_mask,
-    front_numbers,
     masked_objectives,
     total_violation,
 )
@@ -133,7 +133,7 @@ class History:
         known, new = self._known("front", [])
         members = {member.number: member for member in known}
         numbers = [*sorted(members), *range(len(self) - len(new), len(self))]
-        on_front = [numbers[place] for place in front_numbers(self.masked_objectives[numbers])] if numbers else []
+        on_front = [numbers[place] for place in front_indices(self.masked_objectives[numbers])] if numbers else []
         return [members[number] if number in members else self.member(number) for number in on_front]
 
     @cached_property

@@ -22,7 +22,7 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, create_trial
 
 from armwright.exceptions import RunFolderError, SettingsError
-from armwright.files import replace_file, writable
+from armwright.files import replace_file, replace_surrogates
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_run
@@ -112,7 +112,7 @@ class _Export:
             storage.engine.dispose()
 
     def _new_study(self, storage: RDBStorage) -> optuna.Study:
-        name = writable(self.run.resolve().name)
+        name = replace_surrogates(self.run.resolve().name)
         objectives = self.history.problem.objectives
         with quietly(), catch_warnings():
             simplefilter("ignore", ExperimentalWarning)  # metric names

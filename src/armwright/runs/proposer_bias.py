@@ -66,7 +66,7 @@ class Diagnostics:
 
 def diagnose(history: History, proposer: str) -> Diagnostics:
     """The habits of the trials whose source is `proposer`, and of the black box's."""
-    planes = symmetry_planes(history.problem.task.points)
+    planes = symmetry_planes(history.problem.task.target_positions)
     return Diagnostics(
         symmetry_planes=len(planes),
         proposer=habits(history, proposer, planes),
@@ -83,7 +83,7 @@ def habits(history: History, source: str, planes: Array) -> Habits | None:
     mine = masks_by_source(history).get(source)
     if mine is None:
         return None
-    points = history.problem.task.points
+    points = history.problem.task.target_positions
     designs = [trial.design for trial in history if trial.source == source]
     on_plane = [distance_to_planes(np.array(design.origin), points, planes) <= TOLERANCE for design in designs]
     repeats, near_repeats = repeated(history)

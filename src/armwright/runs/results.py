@@ -18,7 +18,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
-from armwright.files import as_csv, replace_folder
+from armwright.files import replace_folder, to_csv
 from armwright.pareto import hypervolume, total_violation
 from armwright.problem.miss_reasons import why_missed
 from armwright.robot.urdf_writer import to_urdf
@@ -49,10 +49,10 @@ def write_results(
     verification: of the front, by rising position error; None where none was made.
     """
     verdicts = _verdicts(history, verification)
-    folder.write_text("trials.csv", as_csv(_rows(history)))
+    folder.write_text("trials.csv", to_csv(_rows(history)))
     on_front = {member.number for member in history.front}
     rows = [row | _flat_verdict(verdicts.get(row["number"])) for row in _rows(history) if row["number"] in on_front]
-    folder.write_text("front.csv", as_csv(rows))
+    folder.write_text("front.csv", to_csv(rows))
     _write_designs(folder, history, verdicts)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
@@ -341,7 +341,11 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
                     "q": evaluation.q[row, t, : len(member.arm.joints)].tolist(),
                     "reached": evaluation.reached[row, t].tolist(),
                     "position_error": float(evaluation.position_error[row, t]),
-                    **({"angle_error": float(evaluation.angle_error[row, t])} if evaluation.goals.n_angular[t] else {}),
+                    **(
+                        {"angle_error": float(evaluation.angle_error[row, t])}
+                        if evaluation.target_arrays.n_angular[t]
+                        else {}
+                    ),
                     "missed": why_missed(member.arm, evaluation, row, t) or None,
                     "joint_torques": evaluation.joint_torques[row, t, : len(member.arm.joints)].tolist(),
                 }

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
-from armwright.pareto import knee_number
+from armwright.pareto import knee_index
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.results import read_summary, unmet
@@ -122,9 +122,7 @@ def pick(
     if weights is not None:
         heavy = np.array([weights.get(name, 0.0) for name in objectives]) / scale
         return sorted(left, key=lambda member: float(heavy @ np.array(member.values)))
-    knee = knee_number(
-        np.array([member.values for member in left]), history.reference_point or (math.inf,) * len(scale)
-    )
+    knee = knee_index(np.array([member.values for member in left]), history.reference_point or (math.inf,) * len(scale))
     first = [] if knee is None else [left[knee]]
     others = [member for member in left if member not in first]
     return first + sorted(others, key=lambda member: float(np.linalg.norm(np.array(member.values) / scale)))

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
 
-from armwright.files import writable
+from armwright.files import replace_surrogates
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design, ParameterValue
 
@@ -22,7 +22,7 @@ _Params = Annotated[  # a design is written as its parameters
     PlainValidator(lambda params: Design(_PARAMS.validate_python(params))),
     PlainSerializer(lambda design: dict(design.params)),
 ]
-_Text = Annotated[str, PlainSerializer(writable)]
+_Text = Annotated[str, PlainSerializer(replace_surrogates)]
 
 
 @dataclass(frozen=True)

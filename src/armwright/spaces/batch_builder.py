@@ -213,12 +213,14 @@ def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Ca
     direction = _rotate(_VECTORS[directions], columns.mount)  # (N, M, 3)
     middle = direction * (links / 2)[..., None]
     offset = direction * links[..., None]
-    end_place = offset + _end_shift(space, columns, joints.plan, carried)
+    end_mass_position = offset + _end_shift(space, columns, joints.plan, carried)
     total = mass + end_mass
-    both = (mass[..., None] * middle + end_mass[..., None] * end_place) / np.where(total > 0.0, total, 1.0)[..., None]
+    both = (mass[..., None] * middle + end_mass[..., None] * end_mass_position) / np.where(total > 0.0, total, 1.0)[
+        ..., None
+    ]
     radius = np.where(columns.present, space.link_radius, 0.0)
     com = np.where(end_mass[..., None] > 0.0, both, middle)
-    return Bodies(mass, middle, offset, radius, end_mass, end_place), com
+    return Bodies(mass, middle, offset, radius, end_mass, end_mass_position), com
 
 
 def _end_shift(space: DesignSpace, columns: _Columns, plan: Indices, carried: _Carried) -> Array | float:

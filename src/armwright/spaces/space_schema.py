@@ -6,7 +6,7 @@ from typing import Any, Self, cast
 
 from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
 
-from armwright.robot.actuators import ActuatorRecord, TorqueKind, resolved
+from armwright.robot.actuators import ActuatorRecord, TorqueKind, resolve_actuator
 from armwright.robot.arm import Actuator, Vector
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
 from armwright.spaces.link_mass import MassModel, MassPerMetre
@@ -89,7 +89,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     def _look_up_actuators(cls, value: Any) -> Any:
         if not isinstance(value, (list, tuple)):
             raise ValueError("expected a list of names, or of records with name, mass and stall_torque")
-        return [resolved(entry) for entry in cast("list[Any]", value)]
+        return [resolve_actuator(entry) for entry in cast("list[Any]", value)]
 
     @field_validator("mass", mode="before")
     @classmethod

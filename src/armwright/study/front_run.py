@@ -298,7 +298,7 @@ def _beginning(problem: Problem, initial_designs: str | Path | Proposer | None) 
         return nothing, {"proposer": {"name": initial_designs.name, **initial_designs.settings()}}
     _, run = read_run(initial_designs)
     space = run.problem.space.model_copy(update={"name": problem.space.name})
-    if space != problem.space or run.problem.task.entries != problem.task.entries:
+    if space != problem.space or run.problem.task.target_specs != problem.task.target_specs:
         raise SettingsError(
             f"{initial_designs} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"

@@ -56,7 +56,7 @@ def preview_after(
     number: the prompt for this trial instead, as it was then.
     """
     config, history = read_run(run)
-    if task is not None and task.entries != config.task.entries:
+    if task is not None and task.target_specs != config.task.target_specs:
         raise SettingsError(f"{run} is a run of another task: {config.task.name}")
     if space is not None and space != config.space:
         raise SettingsError(f"{run} is a run of another space: {config.space.name}")

@@ -32,14 +32,16 @@ class Moves:
 
     def steps(self, targets: Array) -> list[int]:
         """Into how many equal steps each line is cut; targets: (T, 3) [m]."""
-        return [steps_of(float(np.linalg.norm(targets[end] - targets[start])), self.step) for start, end in self.pairs]
+        return [
+            count_steps(float(np.linalg.norm(targets[end] - targets[start])), self.step) for start, end in self.pairs
+        ]
 
 
 NO_MOVES = Moves()
 
 
 @dataclass(frozen=True)
-class Lines:
+class MoveSamples:
     """The S samples of M lines, one line after the other, each with its start and its end."""
 
     first: NDArray[np.intp]  # (M + 1,) where each line's samples begin, and last S
@@ -52,7 +54,7 @@ class Lines:
 
 
 @dataclass(frozen=True)
-class Timing:
+class MoveTiming:
     """F moments of M timed lines, one line after the other: their samples, and as many between as make 32 parts."""
 
     first: NDArray[np.intp]  # (M + 1,) where each line's moments begin, and last F
@@ -67,19 +69,19 @@ class Timing:
         return (1.0 - share) * values[:, self.sample] + share * values[:, after]
 
 
-def steps_of(length: float, step: float) -> int:
+def count_steps(length: float, step: float) -> int:
     """Into how many equal steps a line is cut [m]: a hair above a whole number is that number."""
     return max(1, math.ceil(length / step - 1e-9))
 
 
-def lines_of(moves: Moves, targets: Array) -> Lines:
+def sample_moves(moves: Moves, targets: Array) -> MoveSamples:
     """Where the tip should be; targets: (T, 3) [m]."""
     steps = moves.steps(targets)
     share: list[Array] = [np.arange(n + 1) / n for n in steps]
     ends = [(targets[start], targets[end]) for start, end in moves.pairs]
     points = [(1.0 - along)[:, None] * a + along[:, None] * b for (a, b), along in zip(ends, share, strict=True)]
     counts = np.array([n + 1 for n in steps])
-    return Lines(
+    return MoveSamples(
         first=np.concatenate([[0], np.cumsum(counts)]),
         move=np.repeat(np.arange(len(steps)), counts),
         share=np.concatenate(share),
@@ -87,8 +89,8 @@ def lines_of(moves: Moves, targets: Array) -> Lines:
     )
 
 
-def timing_of(moves: Moves, lines: Lines) -> Timing:
-    """When the tip is where, if each line is run from rest to rest by the fifth-order profile of `moments`."""
+def time_samples(moves: Moves, lines: MoveSamples) -> MoveTiming:
+    """When the tip is where, if each line is run from rest to rest by the fifth-order profile of `quintic_rates`."""
     sample: list[NDArray[np.intp]] = []
     beyond: list[Array] = []
     shares: list[Array] = []
@@ -100,9 +102,9 @@ def timing_of(moves: Moves, lines: Lines) -> Timing:
         sample.append(first + number // parts)
         beyond.append(number % parts / parts)
     counts = [len(share) for share in shares]
-    rate, change = moments(np.concatenate(shares))
+    rate, change = quintic_rates(np.concatenate(shares))
     time = np.repeat(np.array(moves.times), counts)
-    return Timing(
+    return MoveTiming(
         first=np.concatenate([[0], np.cumsum(counts)]),
         sample=np.concatenate(sample),
         beyond=np.concatenate(beyond),
@@ -111,7 +113,7 @@ def timing_of(moves: Moves, lines: Lines) -> Timing:
     )
 
 
-def moments(share: Array) -> tuple[Array, Array]:
+def quintic_rates(share: Array) -> tuple[Array, Array]:
     """ds/dt and d²s/dt² where s = 10 t³ - 15 t⁴ + 6 t⁵ comes to these shares, of a move of one second.
 
     Of all ways from rest to rest it is the one of the least mean square jerk; s grows with t, so t is found by halving.
@@ -151,12 +153,12 @@ def check_moves(pairs: Sequence[tuple[int, int]], targets: Sequence[tuple[float,
         length = math.dist(targets[start - 1], targets[end - 1])
         if length == 0.0:
             raise ValueError(f"move {number} = [{start}, {end}]: both are one point, which no line joins")
-        if steps_of(length, step) > MOST_STEPS:
+        if count_steps(length, step) > MOST_STEPS:
             raise ValueError(
                 f"move {number} = [{start}, {end}] is {length:.4g} m long, more than {MOST_STEPS} steps of {step:g} m; "
                 f"give move_step: {_rounded_up(length / MOST_STEPS):g}"
             )
-        in_all += steps_of(length, step) + 1
+        in_all += count_steps(length, step) + 1
         if in_all > MOST_SAMPLES:
             raise ValueError(
                 f"moves have more than {MOST_SAMPLES} samples together; give fewer of them, or a move_step above "

@@ -63,7 +63,7 @@ class Box(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         x, y, z = self.size
         return Solid("box", self.center, rotation_from_rpy(*(self.rpy or (0.0, 0.0, self.yaw))), (x / 2, y / 2, z / 2))
 
-    def words(self) -> str:
+    def describe(self) -> str:
         """What it is, on one line."""
         x, y, z = self.size
         turned = f", turned by yaw {self.yaw:g} rad" if self.yaw else ""
@@ -84,7 +84,7 @@ class Sphere(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def solid(self) -> Solid:
         return Solid("sphere", self.center, np.eye(3), (self.radius, self.radius, self.radius))
 
-    def words(self) -> str:
+    def describe(self) -> str:
         """What it is, on one line."""
         return f"{_called(self.name)}sphere of radius {self.radius:g} m about {_point(self.center)}"
 
@@ -110,7 +110,7 @@ class Cylinder(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         axis = np.eye(3)["xyz".index(self.axis)] if isinstance(self.axis, str) else np.array(self.axis)
         return Solid("cylinder", self.center, rotation_to_axis(axis), (self.radius, self.radius, self.height / 2))
 
-    def words(self) -> str:
+    def describe(self) -> str:
         """What it is, on one line."""
         axis = self.axis if isinstance(self.axis, str) else _point(self.axis)
         return (
@@ -130,7 +130,7 @@ class Ground(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def solid(self) -> Solid:
         return Solid("ground", (0.0, 0.0, self.z), np.eye(3), (0.0, 0.0, 0.0))
 
-    def words(self) -> str:
+    def describe(self) -> str:
         """What it is, on one line."""
         return f"{_called(self.name)}ground, solid everywhere below z = {self.z:g} m"
 

@@ -115,7 +115,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return np.eye(3) if self.orientation is None else rotation_from_rpy(*self.orientation)
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """What it says beside its point, on one line."""
         parts = [] if self.axis is None else [f"axis {_vector(self.axis)}"]
         parts += [] if self.orientation is None else [f"orientation {_vector(self.orientation)} rad"]
@@ -125,12 +125,12 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return ", ".join(parts)
 
 
-def target_words(entries: Sequence[Point | Target]) -> list[str]:
+def describe_targets(entries: Sequence[Point | Target]) -> list[str]:
     """What targets say beside their points, a line for all that say the same, counted from 1."""
     numbers: dict[str, list[int]] = {}
     for number, entry in enumerate(entries, start=1):
         if isinstance(entry, Target):
-            numbers.setdefault(entry.words, []).append(number)
+            numbers.setdefault(entry.description, []).append(number)
     return [
         f"target{'s' if len(group) > 1 else ''} {', '.join(map(str, group))}: {words}"
         for words, group in numbers.items()
@@ -170,7 +170,7 @@ def read_target(value: Any, number: int) -> Target:
 
 
 @lru_cache
-def target_arrays(records: tuple[Target | None, ...], restarts: int) -> TargetArrays:
+def stack_targets(records: tuple[Target | None, ...], restarts: int) -> TargetArrays:
     """Stack targets into arrays; None stands for a point alone."""
     targets = [record or Target(position=(0.0, 0.0, 0.0)) for record in records]
     return TargetArrays(

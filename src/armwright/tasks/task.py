@@ -30,7 +30,7 @@ from armwright.tasks.targets import (
     TargetArrays,
     position_targets,
     read_target,
-    target_arrays,
+    stack_targets,
 )
 from armwright.tasks.workspace import MOST_POINTS, MOST_REGIONS, Region
 from armwright.yaml_documents import parse_document, read_document
@@ -48,7 +48,7 @@ _RANDOM = re.compile(r"random-(0|[1-9]\d{0,8})")
 class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Target points [m], and what belongs to them: the hypervolume's reference point, where they come from.
 
-    targets: points; where records are given that say more (`Target`), that is in `goals` and `entries`.
+    targets: points; where records are given that say more (`Target`), that is in `target_specs` and `target_arrays`.
     payload: what the tip carries at all targets, or at each [kg].
     payload_factors: the payload may also be so many times as heavy; the worst case counts, in each objective.
     target_noise: the targets may also be off by so much along x, y or z, all together; likewise [m].
@@ -98,7 +98,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         )
         points = [entry if record is None else record.position for entry, record in zip(entries, records, strict=True)]
         task = handler({**cast("dict[str, Any]", data), "targets": points})
-        kept = tuple(record if record is not None and record.words else None for record in records)
+        kept = tuple(record if record is not None and record.description else None for record in records)
         if any(kept):
             task._records = kept  # pyright: ignore[reportAttributeAccessIssue] - frozen are the fields alone
         return task
@@ -110,7 +110,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @field_serializer("targets")
     def _with_records(self, targets: tuple[Point, ...]) -> tuple[Point | Target, ...]:
-        return self.entries
+        return self.target_specs
 
     @field_validator("obstacles", mode="before")
     @classmethod
@@ -172,9 +172,9 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(f"payload = {self.payload} kg is outside 0 <= payload <= {LARGEST_PAYLOAD:g} kg")
         if self.moves == IN_ORDER and len(self.targets) < 2:
             raise ValueError(f"moves: {IN_ORDER} needs two targets or more")
-        check_moves([(start + 1, end + 1) for start, end in self.lines.pairs], self.targets, self.move_step)
+        check_moves([(start + 1, end + 1) for start, end in self.straight_moves.pairs], self.targets, self.move_step)
         if self.move_time is not None:
-            check_times(self.move_time, len(self.lines))
+            check_times(self.move_time, len(self.straight_moves))
         if sum(region.points for region in self.workspace) > MOST_POINTS:
             raise ValueError(f"workspace has more than {MOST_POINTS} points together")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
@@ -182,23 +182,23 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return self
 
     @property
-    def points(self) -> np.ndarray:
+    def target_positions(self) -> np.ndarray:
         """The targets as an array (T, 3) [m]."""
         return np.array(self.targets, dtype=np.float64)
 
     @property
-    def entries(self) -> tuple[Point | Target, ...]:
+    def target_specs(self) -> tuple[Point | Target, ...]:
         """The targets as a task file has them: a record where one says more than its point."""
         if not self._records:
             return self.targets
         return tuple(record or point for point, record in zip(self.targets, self._records, strict=True))
 
     @property
-    def goals(self) -> TargetArrays:
+    def target_arrays(self) -> TargetArrays:
         """How the targets are to be reached."""
         if not self._records:
             return position_targets(len(self.targets), self.restarts)
-        return target_arrays(self._records, self.restarts)
+        return stack_targets(self._records, self.restarts)
 
     @property
     def is_plain(self) -> bool:
@@ -210,11 +210,15 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """(T, 3) points [m] and (T,) payloads [kg]: as the task stands, then each by itself that it may come to."""
         noise = self.target_noise
         shifts = [sign * noise * axis for axis in np.eye(3) for sign in (-1.0, 1.0)] if noise > 0.0 else []
-        heavier = [(self.points, factor * self.payloads) for factor in self.payload_factors]
-        return [(self.points, self.payloads), *heavier, *((self.points + shift, self.payloads) for shift in shifts)]
+        heavier = [(self.target_positions, factor * self.payloads) for factor in self.payload_factors]
+        return [
+            (self.target_positions, self.payloads),
+            *heavier,
+            *((self.target_positions + shift, self.payloads) for shift in shifts),
+        ]
 
     @property
-    def case_words(self) -> str:
+    def cases_description(self) -> str:
         """What the task may come to beside what it says; empty for nothing."""
         factors = ", ".join(f"{factor:g}" for factor in self.payload_factors)
         found = [f"of payloads {factors} times as heavy"] if factors else []
@@ -228,7 +232,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return np.broadcast_to(np.array(self.payload, dtype=np.float64), (len(self.targets),)).copy()
 
     @property
-    def lines(self) -> Moves:
+    def straight_moves(self) -> Moves:
         """The straight moves, with targets counted from 0."""
         if self.moves == IN_ORDER:
             pairs = tuple((i, i + 1) for i in range(len(self.targets) - 1))

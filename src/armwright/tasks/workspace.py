@@ -40,13 +40,13 @@ class Region(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         x, y, z = zip(self.low, self.high, strict=True)
         return tuple(dict.fromkeys(product(x, y, z)))
 
-    def words(self) -> str:
+    def describe(self) -> str:
         """What it is, on one line."""
         low, high = (", ".join(f"{value:g}" for value in corner) for corner in (self.low, self.high))
         return f"box from ({low}) to ({high}), {self.points} points"
 
 
-def points_of(regions: tuple[Region, ...]) -> Array:
+def sample_regions(regions: tuple[Region, ...]) -> Array:
     """(W, 3) spread evenly over each region, by Halton's sequence from its second point on, always the same [m]."""
     parts = [np.zeros((0, 3))]
     for region in regions:

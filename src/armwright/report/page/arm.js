@@ -279,7 +279,7 @@ function drawTargets() {
 
 // Where the tool should point to: an arrow for its z, of a whole orientation its x and y, too.
 function drawGoal(target, t) {
-  const { rows, frames } = content.head.goals, size = ARROW * frame.radius;
+  const { rows, frames } = content.head.target_arrays, size = ARROW * frame.radius;
   if (!rows[t]) return;
   for (const k of rows[t] === 3 ? [0, 1, 2] : [2]) {
     const way = [0, 3, 6].map((r) => frames[t][r + k]), long = k === 2 ? size : 0.6 * size;

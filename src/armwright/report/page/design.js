@@ -28,7 +28,7 @@ export function openDesign(shownContent, fetched) {
 // A design at every target: error [m], angle [rad] (null where none is asked for), whether it is missed, joint values,
 // what holds each joint.
 export function postures(i) {
-  const arm = content.arm(i), { rows, frames, tolerance, angle_tolerance } = content.head.goals;
+  const arm = content.arm(i), { rows, frames, tolerance, angle_tolerance } = content.head.target_arrays;
   return content.targets.map((target, t) => {
     const q = content.q(i, t), posed = chain(arm, q), error = distance(posed.joints.at(-1), target);
     const angle = rows[t] ? angleOff(posed.tool, frames[t], rows[t] === 3) : null;
@@ -88,8 +88,8 @@ export function drawDesign() {
   }
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
-  const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.words).join("; ")}.` : "";
-  const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.words).join("; ")}.` : "";
+  const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.description).join("; ")}.` : "";
+  const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.description).join("; ")}.` : "";
   const lines = head.moves.length ? ` Straight moves between targets: ${head.moves.map(([a, b]) => `${a + 1} to ${b + 1}`).join(", ")}.` : "";
   const cases = head.cases ? ` Objectives are the worst of the task as it stands, ${head.cases}; all else is of the task as it stands.` : "";
   $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${solids}${lines}${boxes}`;
@@ -179,7 +179,7 @@ async function download(format) {
 
 function asCsv(i) {
   const arm = content.arm(i), joints = [...arm.axis.keys()].map((j) => j + 1);
-  const { oriented } = content.head.goals;
+  const { oriented } = content.head.target_arrays;
   const head = ["target", "x", "y", "z", "position_error", ...(oriented ? ["angle_error"] : []), "torque_norm",
     ...joints.map((j) => `q_${j}`), ...joints.map((j) => `torque_${j}`)];
   const rows = postures(i).map((one, t) => [t + 1, ...one.target, one.error, ...(oriented ? [one.angle ?? ""] : []), length(one.torques), ...one.q, ...one.torques]);

@@ -51,7 +51,7 @@ function numbersOf(i) {
   return found;
 }
 
-// The knee of these designs of a front first, then what lies nearest to its corner (pareto.py, knee_number).
+// The knee of these designs of a front first, then what lies nearest to its corner (pareto.py, knee_index).
 export function ranked(shownContent, numbers) {
   const { reference_point: reference } = shownContent.head;
   const values = new Map(numbers.map((i) => [i, Array.from(shownContent.values(i))]));
