@@ -12,7 +12,8 @@ import pytest
 import yaml
 from rich.console import Console
 
-from armwright.cli.console import show_result, watching
+from armwright.cli.progress import study_progress
+from armwright.cli.show_results import show_result
 from armwright.llm import client as chat
 from armwright.problem.problem import Problem
 from armwright.study.study import optimize
@@ -76,11 +77,11 @@ def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer
         show_result(console, optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_total=6), [])
         return console.file.getvalue()  # type: ignore[attr-defined]
 
-    table = shown("rules").split("Who found what")[1].splitlines()[1:5]
+    table = shown("rules").split("Attribution")[1].splitlines()[1:5]
     assert table[0].split("  ")[0] == "source"
     assert [row.split()[:2] for row in table[1:]] == [["random", "4"], ["rules", "1"], ["bbo", "5"]]
     assert max(map(len, table)) < 60
-    assert "Who found what" not in shown("none")
+    assert "Attribution" not in shown("none")
 
 
 @pytest.mark.slow
@@ -381,7 +382,7 @@ def test_a_wish_to_end_that_python_drops_is_heeded(name: str) -> None:
 @pytest.mark.parametrize("width", [60, 120])
 def test_progress_in_a_terminal(width: int) -> None:
     console = Console(file=io.StringIO(), force_terminal=True, width=width, markup=False, highlight=False)
-    with watching(console) as watch:
+    with study_progress(console) as watch:
         optimize(Problem(load_task("target-1")), proposer="rules", n_init=3, n_step=5, n_total=7, watch=watch)
     shown = console.file.getvalue()  # type: ignore[attr-defined]
     assert "iteration 7/7" in shown

@@ -228,7 +228,7 @@ def test_a_recorded_experiment_is_played_again_without_a_model(in_folder: Path, 
     file = file_of(in_folder, **settings)
     first = run_here(file, "--out", "first")
     assert first.exit_code == 0, first.output
-    assert "2 of them ask test-model for some 4 proposals in all" in first.output
+    assert "2 of them ask test-model for about 4 proposals in total" in first.output
     assert "[scripted]" in (in_folder / "first" / "table.md").read_text()
     chat_server.requests.clear()
     again = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")

@@ -407,7 +407,7 @@ def test_the_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     assert "  6 targets [m]: (0.6, -1, 0.4) (0.6, 0, 0.4)" in done.stdout
     assert "  origin_z: [0.3, 0.3]     # the cart's platform\n" in done.stdout
     assert "  - the wall stands 0.6 m in front of the cart\n" in done.stdout
-    assert "test-model: 1 call, 100 tokens in, 20 out, cost not known" in done.stdout
+    assert "test-model: 1 call, 100 tokens in, 20 out, cost unknown" in done.stdout
     assert "wrote wall.yaml and wall-space.yaml: a draft. Check the numbers" in done.stdout
     assert lines[-1] == "  armwright optimize wall.yaml --space wall-space.yaml"
     assert files(in_folder) == {"wall.yaml", "wall-space.yaml", DRAFTS}  # nothing was run

@@ -334,14 +334,14 @@ def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
     told = CliRunner().invoke(app, words)
     assert told.exit_code == 0, told.output
     shown = CliRunner().invoke(app, ["tasks", "line.yaml"])
-    assert "straight moves between targets: 1 to 2, 2 to 3; a step of 20 mm" in shown.output
+    assert "straight moves between targets: 1 to 2, 2 to 3; in steps of 20 mm" in shown.output
     (in_folder / "line.yaml").write_text(f"{text} [position_error, path_error]\nmove_step: 0.01\n")
     again = CliRunner().invoke(app, words)
     assert isinstance(again.exception, RunConflictError)
     assert "move_step: 0.02 there, 0.01 asked" in str(again.exception)
     (in_folder / "line.yaml").write_text(f"{text} [position_error, torque]\n")
     told = CliRunner().invoke(app, [*words, "--no-figures", "--out", "other"])
-    assert "the task's moves count in none of the objectives" in told.output
+    assert "no objective uses the task's moves" in told.output
 
 
 def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:

@@ -1,0 +1,29 @@
+"""Notes on what a task holds and what its objectives leave out."""
+
+from armwright.problem.objectives import OF_CLEARANCE, OF_MOVES, UNCOVERED_FRACTION
+from armwright.problem.problem import Problem
+from armwright.tasks.task import Task
+
+
+def unused_parts(problem: Problem) -> list[str]:
+    """Return a note for each part of the task that neither an objective nor a constraint uses."""
+    task = problem.task
+    parts = (
+        ("obstacles", task.obstacles, OF_CLEARANCE),
+        ("moves", task.straight_moves, OF_MOVES),
+        ("workspace", task.workspace, (UNCOVERED_FRACTION,)),
+    )
+    return [
+        f"no objective uses the task's {part}; objectives for it: {', '.join(quantity.name for quantity in quantities)}"
+        for part, given, quantities in parts
+        if given and not problem.uses(*quantities)
+    ]
+
+
+def payload_note(task: Task) -> str:
+    """Return the payload at the tip [kg], or an empty string without one."""
+    payloads = task.payloads
+    if not payloads.any():
+        return ""
+    low, high = payloads.min(), payloads.max()
+    return f"payload {low:g} kg" if low == high else f"payloads {low:g} to {high:g} kg"

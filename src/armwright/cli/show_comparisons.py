@@ -1,0 +1,136 @@
+"""Print experiments, comparisons of methods, and existing arms beside designs."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from armwright.cli.notes import payload_note
+from armwright.cli.streams import format_point
+from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
+from armwright.experiments.plan import Cell, Skipped
+from armwright.experiments.runner import Outcome
+from armwright.extras import install_command, missing_packages
+from armwright.problem.objectives import (
+    TORQUE_SCALE,
+)
+from armwright.study.cluster import Workers
+
+
+def show_plan(
+    console: Console, due: Sequence[Cell], finished: int, skipped: Sequence[Skipped], workers: Workers | None
+) -> None:
+    """Print what an experiment is about to run."""
+    where = "one after another" if workers is None else f"on {workers.description}"
+    parts = [f"{len(due)} to run {where}" if due else "nothing to run", f"{finished} finished before"]
+    console.print(f"{len(due) + finished + len(skipped)} cells: {', '.join(parts)}, {len(skipped)} skipped")
+    if len(due) > 1 and missing_packages("distributed"):
+        console.print(f"several at a time: {install_command('distributed')}")
+    for note in notes_on_cells(skipped, ()):
+        console.print(note)
+    with_model = [cell for cell in due if cell.plan.asks_a_model and cell.replay is None]
+    if with_model:
+        proposals = sum(-(-cell.n_total // cell.plan.n_step) for cell in with_model)
+        models = ", ".join(sorted({str(cell.plan.model) for cell in with_model}))
+        console.print(f"{len(with_model)} of them ask {models} for about {proposals:,} proposals in total")
+
+
+def notes_on_cells(skipped: Sequence[Skipped], failed: Sequence[Outcome]) -> list[str]:
+    """Return a line for each method and reason of skipped cells, and one for each failure."""
+    reasons = Counter((one.cell.plan.label, one.reason) for one in skipped)
+    notes = [
+        f"skipped: {label}, {count} {'cell' if count == 1 else 'cells'}: {reason}"
+        for (label, reason), count in reasons.items()
+    ]
+    return notes + [f"FAILED: {outcome.cell.words}: {outcome.fault}" for outcome in failed]
+
+
+def show_outcome(console: Console, outcome: Outcome, number: int, of: int) -> None:
+    """Print the outcome of a cell."""
+    if outcome.fault:
+        console.print(f"[{number}/{of}] FAILED: {outcome.cell.words}: {outcome.fault}")
+    else:
+        assert outcome.hypervolume is not None
+        console.print(
+            f"[{number}/{of}] {outcome.cell.words}: hypervolume {outcome.hypervolume:.3f}, {outcome.seconds:.1f} s"
+        )
+    console.file.flush()
+
+
+def show_comparison(console: Console, tables: Sequence[Path], figures: Sequence[Path]) -> None:
+    """Print the Markdown table and the paths of all tables and figures."""
+    console.print()
+    console.print(tables[0].read_text(encoding="utf-8"))
+    show_files(console, tables, figures)
+
+
+def show_files(console: Console, tables: Sequence[Path], figures: Sequence[Path]) -> None:
+    """Print the paths of tables and figures."""
+    console.print(f"tables: {tables[0].parent}/ ({', '.join(path.name for path in tables)})")
+    if figures:
+        console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+
+
+def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]) -> None:
+    """Print existing arms beside designs, with the base of each arm."""
+    objectives, space = comparison.problem.objectives, comparison.problem.space
+    others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
+    title = "; ".join(filter(None, (f"Arms on {comparison.problem.task.name}", payload_note(comparison.problem.task))))
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("\narm", no_wrap=True)
+    measured = [_ARM_COLUMNS[objective.name] for objective in MEASURES]
+    for name in ("\njoints", "reach\nm", "mass\nkg", *measured, *(f"{o.name}\n{o.unit}" for o in others)):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for arm in (*comparison.arms, *comparison.designs):
+        values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
+        numbers = [*arm.measures.values(), *(values[objective.name] for objective in others)]
+        cells = ["-" if value is None else _format_measure(value) for value in numbers]
+        table.add_row(arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *cells)
+    console.print(table)
+    console.print(
+        f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|, by each arm's own masses; torque "
+        "util. = the largest share of a joint's effort limit"
+    )
+    if comparison.designs and space.is_toy:
+        console.print(f"the designs have toy masses ({space.mass_note}); torques compare only with real ones (`mass:`)")
+    if comparison.positions:
+        within = " x ".join(f"[{low:g}, {high:g}]" for low, high in (space.origin_x, space.origin_y, space.origin_z))
+        console.print(
+            f"bases: {comparison.positions:,} positions tried for each arm in {within} m, by position error, then "
+            "torque; --base x,y,z fixes it"
+        )
+    names = ", ".join(objective.name for objective in objectives)
+    for arm in comparison.arms:
+        note = ""
+        if arm.violated:
+            note = f"; violates {', '.join(arm.violated)}"
+        elif comparison.run is not None:
+            note = f"; {_describe_dominance(arm, comparison.front)} ({names})"
+        console.print(f"{arm.name}: base at {format_point([round(value, 4) for value in arm.base])} m{note}")
+        for line in arm.notes:
+            console.print(f"  {line}")
+    if drawn:
+        console.print(f"redrawn: {', '.join(map(str, drawn))}")
+
+
+_ARM_COLUMNS = {
+    "position_error": "error\nm",
+    "torque": "\ntorque",
+    "worst_error": "worst\nm",
+    "unreached_targets": "targets\nunreached",
+    "peak_torque": "peak\nN m",
+    "torque_utilisation": "torque\nutil.",
+}
+
+
+def _format_measure(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1e4 else f"{value:.3g}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"
+
+
+def _describe_dominance(arm: ComparedArm, front: int) -> str:
+    if arm.dominates is None:
+        return "not comparable with the front"
+    return f"dominates {arm.dominates} of the {front} designs of the front, dominated by {arm.dominated_by}"

@@ -1,0 +1,115 @@
+"""Print tasks, actuators and drafts."""
+
+import shlex
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from armwright.cli.streams import format_point, plain_table
+from armwright.experiments.baselines import Baseline, baselines, baselines_of
+from armwright.llm.draft import Draft
+from armwright.robot.actuators import ActuatorRecord
+from armwright.tasks.targets import describe_targets
+from armwright.tasks.task import Task as DesignTask
+
+
+def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
+    """Print a table with a line per task."""
+    methods = list(dict.fromkeys(baseline.method for baseline in baselines()))
+    numbers = ("targets", *methods)
+    table = plain_table("task", *numbers, "", right=numbers)
+    table.columns[0].no_wrap = True
+    for task in tasks:
+        shares = {baseline.method: f"{100 * baseline.share:.0f} %" for baseline in baselines_of(task.name)}
+        shown = (shares.get(method, "") for method in methods)
+        table.add_row(task.name, str(len(task.targets)), *shown, Text(task.description))
+    console.print(table)
+    console.print(
+        f"\n{' and '.join(methods)}: share of the best known hypervolume after 200 counted trials (mean of "
+        f"{baselines()[0].runs} runs).\narmwright tasks NAME describes one task; random-N is one of a seeded family."
+    )
+
+
+def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
+    """Print the catalogue; values that a data sheet lacks are empty."""
+    heads = ("V", "g", "stall N m", "rated N m", "peak N m", "rad/s", "USD")
+    table = plain_table("actuator", "maker", *heads, "source", right=heads)
+    table.columns[0].no_wrap = table.columns[1].no_wrap = True
+    table.columns[-1].overflow = "fold"
+    for record in records:
+        numbers = (record.voltage, 1e3 * record.mass, record.stall_torque, record.rated_torque, record.peak_torque)
+        shown = ("" if n is None else f"{n:.4g}" for n in (*numbers, record.speed, record.price))
+        table.add_row(record.name, Text(record.maker), *shown, Text(record.source))
+    console.print(table)
+
+
+def show_task(console: Console, task: DesignTask, best_known: float | None, stored: Sequence[Baseline]) -> None:
+    """Print a task.
+
+    Args:
+        console: The console.
+        task: The task.
+        best_known: Its best known hypervolume, if any.
+        stored: Its baselines.
+    """
+    reference = task.reference_point
+    described = "chosen from the first random trials" if reference is None else format_point(reference)
+    console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
+    console.print(f"  {len(task.targets)} targets [m]: " + " ".join(format_point(target) for target in task.targets))
+    for line in describe_targets(task.target_specs):
+        console.print(Text(f"  {line}"))
+    if task.restarts:
+        console.print(f"  {task.restarts + 1} initial postures of the inverse kinematics per target")
+    if task.objectives is not None:
+        console.print(f"  objectives: {', '.join(task.objectives)}")
+    if task.constraints:
+        console.print(f"  constraints: {', '.join(task.constraints)}")
+    if task.payloads.any():
+        console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
+    if task.cases_description:
+        console.print(f"  evaluated by the worst case of these, {task.cases_description}")
+    for obstacle in task.obstacles:
+        console.print(f"  obstacle: {obstacle.describe()}")
+    if task.straight_moves:
+        listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.straight_moves.pairs)
+        timed = ""
+        if task.move_time is not None:
+            timed = f"; durations {', '.join(f'{time:g}' for time in np.atleast_1d(task.move_time))} s"
+        console.print(f"  straight moves between targets: {listed}; in steps of {1e3 * task.move_step:g} mm{timed}")
+    for region in task.workspace:
+        console.print(f"  workspace: {region.describe()}")
+    console.print(f"  reference point: {described}")
+    console.print(f"  provenance: {task.provenance}")
+    if best_known is not None:
+        console.print(f"  best known hypervolume: {best_known:.2f}")
+    for baseline in stored:
+        console.print(
+            f"  {baseline.method}, {baseline.runs} runs of 200 counted trials: E_hv {baseline.e_hv:.2f} (σ_hv "
+            f"{baseline.sigma_hv:.2f}), final {baseline.final:.2f}, {baseline.share:.1%} of the best known"
+        )
+
+
+def show_draft(console: Console, draft: Draft) -> None:
+    """Print a drafted task and space, the assumptions and the next commands."""
+    show_task(console, draft.task, None, ())
+    if draft.space is None:
+        console.print("design space: the default; no space file is needed")
+    else:
+        console.print("design space, other values are the defaults:")
+        console.print(textwrap.indent(draft.space_body, "  "), end="")
+    console.print(
+        "assumed:" if draft.assumed else f"{draft.by} lists no assumptions; check the files all the more carefully"
+    )
+    for line in draft.assumed:
+        console.print(f"  - {line}")
+    account = draft.account
+    cost = "cost unknown" if account.cost_usd is None else f"{account.cost_usd:.4f} USD"
+    console.print(
+        f"{draft.by}: {account.calls} {'call' if account.calls == 1 else 'calls'}, {account.input_tokens:,} tokens in, "
+        f"{account.output_tokens:,} out, {cost}, {account.seconds:.1f} s"
+    )
+    console.print(f"wrote {' and '.join(map(str, draft.files))}: a draft. Check and edit the numbers, then run:")
+    console.print(f"  armwright tasks {shlex.quote(str(draft.files[0]))}\n  {draft.command}")

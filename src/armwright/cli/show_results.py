@@ -1,0 +1,259 @@
+"""Print the results of runs: fronts, attribution, costs and where the files lie."""
+
+import math
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from armwright.cli.notes import payload_note, unused_parts
+from armwright.cli.streams import format_point, plain_table
+from armwright.problem.objectives import (
+    POSITION_ERROR,
+    TORQUE,
+    TORQUE_SCALE,
+)
+from armwright.runs.history import FrontMember, History
+from armwright.runs.results import REPORT, unmet
+from armwright.study.front_run import FrontRun
+from armwright.study.refine_run import Polished
+from armwright.study.study import Run
+
+SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
+MAX_ROWS = 16  # of the front; front.csv has all
+MAX_OBJECTIVES_BESIDE_GEOMETRY = 3  # more of them leave no room for base and links
+
+
+def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
+    """Print the front, the hypervolume and the costs of a run."""
+    history = run.history
+    summary = run.summary
+    show_front(console, history, summary)
+    if summary["proposer"] is not None:
+        console.print(_attribution_table(summary["credit"]))
+    volume = summary["hypervolume"]
+    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    infeasible = f", {(~history.feasible).sum()} infeasible" if history.problem.constraints else ""
+    sources = ", ".join(f"{count} {source}" for source, count in summary["by_source"].items())
+    console.print(
+        f"hypervolume {volume['final']:.3f} (mean over iterations {volume['mean']:.3f}; reference point {reference})"
+    )
+    _show_empty_front(console, history, volume["final"], "more trials")
+    _show_best_known(console, summary["best_known"])
+    more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
+    console.print(f"{summary['n_trials']} trials{more}{infeasible}: {sources}; {_seconds(summary['seconds'])}")
+    if summary["duplicates"]:
+        console.print(
+            f"{summary['duplicates']} trials repeated the design of an earlier one and were not evaluated again"
+        )
+    _show_proposer(console, summary["proposer"])
+    scaled = TORQUE in history.problem.objectives
+    problem = history.problem
+    notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if scaled else []
+    notes += [problem.space.mass_note, payload_note(problem.task), *unused_parts(problem)]
+    console.print("; ".join(filter(None, notes)))
+    _show_files(console, run.folder, figures)
+
+
+def show_front(console: Console, history: History, summary: dict[str, Any]) -> None:
+    """Print the front as a table and how much of it is robust; nothing if the front is empty."""
+    if not history.front:
+        return
+    verified = summary["verification"]
+    console.print(_front_table(history, None if verified is None else set(verified["solid_numbers"])))
+    if verified is not None:
+        console.print(
+            f"verified in float64 and with the base or a link 1 mm off: {verified['solid']} robust, "
+            f"{verified['fragile']} sensitive ({verified['solid_from_any_start']} also robust from other initial "
+            f"postures); hypervolume of the robust designs {verified['hypervolume_of_solid']:.3f}, of all in their "
+            f"worst case {verified['hypervolume_as_built']:.3f}"
+        )
+
+
+def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> None:
+    """Print the result of a front search."""
+    summary = run.summary
+    show_front(console, run.history, summary)
+    volume, search = summary["hypervolume"], summary["search"]
+    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    console.print(f"hypervolume {volume['final']:.3f} (reference point {reference}), {len(run.history)} designs")
+    _show_empty_front(console, run.history, volume["final"], "a larger --budget")
+    _show_best_known(console, summary["best_known"])
+    reason = {"budget": "budget spent", "stall": "hypervolume stalled"}[search["ended_by"]]
+    infeasible = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
+    console.print(f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}")
+    console.print(run.history.problem.space.mass_note)
+    _show_files(console, run.folder, figures)
+
+
+def show_polish(console: Console, polished: Polished) -> None:
+    """Print what refinement added to a run."""
+    show_front(console, polished.history, polished.summary)
+    final = polished.summary["hypervolume"]["final"]
+    before = polished.before.hypervolume
+    console.print(
+        f"refined {polished.tried} designs in {polished.evaluations:,} evaluations: added {polished.added} improved "
+        f"designs; hypervolume {before[-1]:.3f} -> {final:.3f}"
+    )
+    _show_best_known(console, polished.summary["best_known"])
+
+
+def _show_empty_front(console: Console, history: History, hypervolume: float, more: str) -> None:
+    if len(history) and not history.feasible.any():
+        console.print(f"{unmet(history)[0].upper()}{unmet(history)[1:]}. Use {more} or looser constraints.")
+    elif hypervolume == 0.0:
+        console.print(
+            f"All designs lie beyond the reference point, so none counts. Use {more} or another reference point."
+        )
+
+
+def _show_best_known(console: Console, gap: dict[str, Any] | None) -> None:
+    if gap is None:
+        return
+    console.print(f"{gap['share']:.1%} of the best known hypervolume ({gap['hypervolume']:.3f})")
+    if gap["beyond"]:
+        console.print(
+            f"NEW: {gap['beyond']} designs dominate or extend the best known front; they add "
+            f"{gap['gain']:.4%} to its hypervolume"
+        )
+
+
+def _show_files(console: Console, folder: Path | None, figures: Sequence[Path]) -> None:
+    if folder is None:
+        return
+    console.print(f"results: {folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
+    if figures:
+        console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+        console.print(f"page: {folder / REPORT}")
+
+
+def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
+    """Print a table with a line per run."""
+    if not listed:
+        console.print("no runs found")
+        return
+    numbers = ("seed", "trials", "hypervolume", "share")
+    table = plain_table("run", "task", "method", *numbers, "state", right=numbers)
+    for run in listed:
+        volume, share = run["hypervolume"], run["share_of_best_known"]
+        table.add_row(
+            *(Text(str(run[name])) for name in ("folder", "task", "method", "seed", "trials")),
+            "" if volume is None else f"{volume:.3f}",
+            "" if share is None else f"{share:.1%}",
+            Text(str(run["state"])),
+        )
+    console.print(table)
+
+
+def show_picked(console: Console, run: Path, history: History, picked: Sequence[FrontMember], most: int) -> None:
+    """Print the chosen designs and the command that exports the first."""
+    console.print(f"{len(picked)} of the front's {len(history.front)} designs meet the conditions")
+    for member in picked[:most]:
+        values = ", ".join(
+            f"{o.label.lower()} {value:.4g} {o.unit}"
+            for o, value in zip(history.problem.objectives, member.values, strict=True)
+        )
+        links = ", ".join(f"{length:.3f}" for length in member.design.links)
+        console.print(Text(f"#{member.number}", style="bold") + Text(f" ({member.source}): {values}"))
+        motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
+        base = format_point(member.design.origin)
+        console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}")
+    first = picked[0].number
+    console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
+
+
+def _format_base(member: FrontMember) -> str:
+    return " ".join(f"{value:5.2f}" for value in member.design.origin)
+
+
+def _format_links(member: FrontMember) -> str:
+    return " ".join(f"{value:.2f}" for value in member.design.links)
+
+
+def _front_table(history: History, robust: set[int] | None) -> Table:
+    title = f"Pareto front of {history.problem.task.name}"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    verdict = () if robust is None else ("verdict",)
+    objectives = [SHORT_NAMES.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
+    geometry = ("base [m]", "links [m]") if len(objectives) <= MAX_OBJECTIVES_BESIDE_GEOMETRY else ()
+    for name in ("#", "source", *verdict, *objectives, "joints", *geometry):
+        justify = "right" if name in ("#", *objectives) else "left"
+        table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
+    reference = history.reference_point or (math.inf,) * len(objectives)
+    inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
+    shown: list[int] = np.unique(np.linspace(0, len(inside) - 1, MAX_ROWS).round().astype(int)).tolist()
+    for member in (inside[i] for i in shown):
+        table.add_row(
+            str(member.number),
+            member.source,
+            *(() if robust is None else ("robust" if member.number in robust else "sensitive",)),
+            *map(_format_value, member.values),
+            member.design.joints,
+            *((_format_base(member), _format_links(member)) if geometry else ()),
+        )
+    left_out = len(history.front) - len(shown)
+    if left_out:
+        beyond = len(history.front) - len(inside)
+        table.caption = f"and {left_out} more" + (f", {beyond} of them beyond the reference point" if beyond else "")
+        table.caption_justify = "left"
+    return table
+
+
+def _attribution_table(credit: dict[str, dict[str, Any]]) -> Table:
+    """Return a table of trials and gained hypervolume by source; useful only with a proposer."""
+    table = Table(title="Attribution", title_justify="left", box=None, pad_edge=False)
+    table.add_column("source")
+    for name in ("trials", "on the front", "hypervolume gained"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for source, share in credit.items():
+        gained = f"{share['hypervolume_gained']:.3f}"
+        table.add_row(source, str(share["trials"]), str(share["front"]), gained)
+    return table
+
+
+def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
+    if proposer is None:
+        return
+    if proposer["model"] is not None:
+        cost = "cost unknown" if proposer["cost_usd"] is None else f"{proposer['cost_usd']:.4f} USD"
+        by = "" if proposer["origin"] == "model" else f" (origin: {proposer['origin']})"
+        tokens = f"{proposer['input_tokens']:,} tokens in, {proposer['output_tokens']:,} out"
+        console.print(
+            f"{proposer['model']}{by}: {proposer['calls']} calls, {tokens}, {cost}, {proposer['call_seconds']:.1f} s"
+        )
+    failures = proposer["failures"]
+    if failures:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in failures.items())
+        console.print(f"{sum(failures.values())} proposals failed and became black-box trials ({kinds})")
+    if proposer["flagged"]:
+        console.print(
+            f"FLAGGED: {proposer['fallback_share']:.0%} of the proposals failed; this run does not represent its "
+            "proposer and is left out of its row in tables"
+        )
+    if proposer.get("differing_prompts"):
+        console.print(
+            f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones; "
+            "--replay-strict makes that an error"
+        )
+    overlap = proposer["overlap"]
+    if overlap is not None:
+        age = overlap["feedback_age"]
+        feedback = "" if age is None else f"; feedback {age['mean']:.1f} trials old on average, {age['max']} at most"
+        console.print(
+            f"overlap: {overlap['ratio']:.1%} of the trials were proposals (planned: "
+            f"{overlap['ratio_planned']:.1%}){feedback}"
+        )
+
+
+def _seconds(seconds: dict[str, float]) -> str:
+    parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
+    return f"{seconds['total']:.1f} s ({parts})"
+
+
+def _format_value(value: float) -> str:
+    return f"{value:.3f}" if value >= 0.0095 or value == 0.0 else f"{value:.1e}"
