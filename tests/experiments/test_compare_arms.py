@@ -1,4 +1,4 @@
-"""Buy or build: arms that exist on a task, beside the designs of a run."""
+"""Existing arms on a task, compared with the designs of a run."""
 
 import json
 import subprocess
@@ -50,7 +50,7 @@ UR5, PANDA = robot("ur5_robot"), robot("panda")
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("buying") / "run"
+    folder = tmp_path_factory.mktemp("arms") / "run"
     aw.optimize(aw.Problem(TASK, SPACE), proposer="none", n_init=10, n_total=30, out=folder)
     return folder
 
@@ -72,8 +72,8 @@ def tab(browser: Browser) -> Iterator[Tab]:
     opened.close()
 
 
-def test_a_design_that_is_bought_has_the_values_of_one_that_is_built(run: Path, history: History) -> None:
-    """The front's URDFs as arms for sale, where their designs stand."""
+def test_exported_design_compared_as_existing_arm_keeps_its_values(run: Path, history: History) -> None:
+    """Compare the front's URDFs at the bases of their designs."""
     members = history.front[:4]
     files = [run / "designs" / f"{member.number:04d}" / "arm.urdf" for member in members]
     comparison = compare_arms(TASK, files, run, base=(0.0, 0.0, 0.0))
@@ -87,8 +87,8 @@ def test_a_design_that_is_bought_has_the_values_of_one_that_is_built(run: Path, 
     assert comparison.positions == 0
 
 
-def test_numbers_are_those_of_the_arm_where_it_stands(compared: ArmComparison) -> None:
-    """By the formulas of the objectives, from postures, masses of the URDF and the task's payloads."""
+def test_measures_match_formulas_at_the_found_base(compared: ArmComparison) -> None:
+    """Recompute the objectives from postures, the masses of the URDF and the payloads of the task."""
     for arm, placed in zip(compared.arms, compared.placed, strict=True):
         evaluation = compared.problem.physics_of_arms(stack_arms([placed]))
         torque, error = evaluation.joint_torques[0], evaluation.position_error[0]
@@ -108,19 +108,19 @@ def test_numbers_are_those_of_the_arm_where_it_stands(compared: ArmComparison) -
     assert [arm.joints for arm in compared.arms] == [6, 7]
 
 
-def test_the_base_is_searched_within_the_spaces_ranges(compared: ArmComparison) -> None:
-    """No place of a thousand others that misses as little needs clearly less torque; the same seed, the same place."""
+def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compared: ArmComparison) -> None:
+    """No other of 1000 positions that reaches all targets needs clearly less torque; equal seeds give equal bases."""
     rng = np.random.default_rng(5)
     for arm, file in zip(compared.arms, (UR5, PANDA), strict=True):
         x, y, z = arm.base
         assert -0.5 <= x <= 0.5
         assert -1.0 <= y <= 1.0
         assert z == 0.0
-        bought = read_urdf(file).arm
+        arm_at_origin = read_urdf(file).arm
         first = compared.placed[list(compared.arms).index(arm)].base
-        assert np.subtract(first, arm.base) == pytest.approx(bought.base)
+        assert np.subtract(first, arm.base) == pytest.approx(arm_at_origin.base)
         others = rng.uniform((-0.5, -1.0, 0.0), (0.5, 1.0, 0.0), (1000, 3))
-        moved = [replace(bought, base=tuple(np.add(bought.base, place).tolist())) for place in others]
+        moved = [replace(arm_at_origin, base=tuple(np.add(arm_at_origin.base, place).tolist())) for place in others]
         evaluation = compared.problem.physics_of_arms(stack_arms(moved))
         missed = np.maximum(evaluation.position_error - 1e-3, 0.0).sum(axis=1)
         torque = 40 * np.linalg.norm(evaluation.joint_torques, axis=2).sum(axis=1)
@@ -130,7 +130,7 @@ def test_the_base_is_searched_within_the_spaces_ranges(compared: ArmComparison) 
     assert compare_arms(TASK, [PANDA], space=SPACE, seed=1).arms[0].base != compared.arms[1].base
 
 
-def test_standing_beside_the_front(history: History) -> None:
+def test_dominance_counts_match_pairwise_comparison(history: History) -> None:
     values = np.array([member.values for member in history.front])
     for point in [
         *values,
@@ -145,7 +145,7 @@ def test_standing_beside_the_front(history: History) -> None:
     assert dominance_counts((1.0, None), (), history) is None
 
 
-def test_the_run_keeps_the_arms_for_its_figures_and_its_page(run: Path, compared: ArmComparison, tab: Tab) -> None:
+def test_run_folder_keeps_existing_arms_for_figures_and_page(run: Path, compared: ArmComparison, tab: Tab) -> None:
     comparison = compare_arms(TASK, [UR5, PANDA], run)
     kept = read_existing_arms(run, 2)
     assert kept == comparison.arms == compared.arms
@@ -172,7 +172,7 @@ def test_the_run_keeps_the_arms_for_its_figures_and_its_page(run: Path, compared
         assert f"dominates {designs} of the front, dominated by {arm.dominated_by}" in note
 
 
-def test_a_name_that_is_no_text_of_a_page(run: Path, tmp_path: Path, tab: Tab) -> None:
+def test_arm_name_with_markup_is_escaped_on_the_page(run: Path, tmp_path: Path, tab: Tab) -> None:
     hostile = tmp_path / "<img src=x onerror='window.hacked = 1'>.urdf"
     hostile.write_text(UR5.read_text())
     compare_arms(TASK, [hostile], run, base=(0.0, 0.0, 0.0))
@@ -182,7 +182,7 @@ def test_a_name_that_is_no_text_of_a_page(run: Path, tmp_path: Path, tab: Tab) -
     (run / EXISTING_ARMS).unlink()
 
 
-def test_without_arms_nothing_is_drawn(run: Path, history: History) -> None:
+def test_front_figure_without_existing_arms_and_with_a_damaged_file(run: Path, history: History) -> None:
     (run / EXISTING_ARMS).unlink(missing_ok=True)
     assert read_existing_arms(run, 2) == ()
     (run / EXISTING_ARMS).write_text('[{"name": "x"}]')
@@ -194,7 +194,7 @@ def test_without_arms_nothing_is_drawn(run: Path, history: History) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_not_known_of_an_arm_is_not_compared(tmp_path: Path) -> None:
+def test_unknown_price_and_effort_are_not_compared(tmp_path: Path) -> None:
     space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
     problem = aw.Problem(
         TASK, space, objectives=named_objectives(["position_error", "mass", "price", "torque_utilisation"])
@@ -207,13 +207,13 @@ def test_what_is_not_known_of_an_arm_is_not_compared(tmp_path: Path) -> None:
     assert ur5.values[3] == ur5.measures["torque_utilisation"] != None  # noqa: E711
     assert (without.values[3], without.measures["torque_utilisation"]) == (None, None)
     assert (ur5.dominates, ur5.dominated_by) == (None, None)
-    assert any("its price is not known" in note for note in ur5.notes)
+    assert any("price unknown" in note for note in ur5.notes)
     assert any("not every joint states an effort" in note for note in without.notes)
     assert write_figures(tmp_path / "run")
 
 
-def test_constraints_hold_for_arms_too(tmp_path: Path) -> None:
-    """What an arm breaks is said with its number, and it then stands nowhere; clearance of a URDF is not known."""
+def test_violated_constraints_exclude_an_arm_from_the_front(tmp_path: Path) -> None:
+    """A violated constraint is listed with its value; the clearance of a URDF is unknown."""
     task = TASK.model_copy(update={"constraints": ("mass <= 19", "self_clearance >= 0.01")})
     aw.optimize(aw.Problem(task, SPACE), proposer="none", n_init=10, n_total=10, out=tmp_path / "run")
     ur5, panda = compare_arms(task, [UR5, PANDA], tmp_path / "run", base=(0.0, 0.0, 0.0)).arms
@@ -221,11 +221,11 @@ def test_constraints_hold_for_arms_too(tmp_path: Path) -> None:
     assert (ur5.dominates, ur5.dominated_by) == (None, None)
     assert panda.violated == ()
     assert panda.dominates is not None
-    assert "whether it keeps self_clearance >= 0.01 is not known" in panda.notes
+    assert "unknown whether it meets self_clearance >= 0.01" in panda.notes
 
 
-def test_slides_are_geared_as_those_of_designs(tmp_path: Path) -> None:
-    """Their force stays; the torque is that of an actuator with the space's travel."""
+def test_slides_of_existing_arms_use_the_travel_of_the_space(tmp_path: Path) -> None:
+    """The force is unchanged; the torque follows from the travel of the space."""
     tiago = read_urdf(robot("tiago_no_hand"))
     (plain,) = compare_arms(TASK, [tiago], base=(0.0, 0.0, 0.0), space=SPACE.model_copy(update={"travel": 1.0})).placed
     (geared,) = compare_arms(TASK, [tiago], base=(0.0, 0.0, 0.0), space=SPACE).placed
@@ -235,16 +235,16 @@ def test_slides_are_geared_as_those_of_designs(tmp_path: Path) -> None:
         assert other.travel == (SPACE.travel if other.kind == "prismatic" else 1.0)
 
 
-def test_mistakes(run: Path, tmp_path: Path) -> None:
-    with pytest.raises(SettingsError, match="no arm was named"):
+def test_invalid_arguments_are_refused(run: Path, tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="expected at least one arm"):
         compare_arms(TASK, [])
     with pytest.raises(TaskError, match="is a run of the task feeder, with other targets or payloads"):
         compare_arms("target-1", [UR5], run)
     with pytest.raises(TaskError, match="other targets or payloads"):
         compare_arms(TASK.model_copy(update={"payload": 1.0}), [UR5], run)
-    with pytest.raises(SettingsError, match="the run has its own"):
+    with pytest.raises(SettingsError, match="the run has its own space"):
         compare_arms(TASK, [UR5], run, space=SPACE)
-    with pytest.raises(SettingsError, match="three finite numbers"):
+    with pytest.raises(SettingsError, match="expected three finite numbers"):
         compare_arms(TASK, [UR5], base=(0.0, float("nan"), 0.0))
     with pytest.raises(ArmError, match="there is no file"):
         compare_arms(TASK, ["none.urdf"])
@@ -255,8 +255,8 @@ def test_mistakes(run: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_arms_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """robot_descriptions itself, with a repository that lies there already, as after the first time."""
+def test_arm_is_found_by_name_in_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Use robot_descriptions with a repository that is already cached."""
     place = tmp_path / "cache" / "example-robot-data-here" / "example-robot-data"
     urdf = place / "robots" / "ur_description" / "urdf" / "x.urdf"
     monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path / "cache"))
@@ -277,8 +277,8 @@ def test_arms_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_names_that_cannot_be_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A network that is not there, and a package that is not there."""
+def test_arm_names_without_network_or_package_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Report a missing network and a missing package."""
     monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))
     for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "all_proxy"):
         monkeypatch.setenv(name, "http://127.0.0.1:9")
@@ -290,7 +290,7 @@ def test_names_that_cannot_be_fetched(tmp_path: Path, monkeypatch: pytest.Monkey
         find_urdf("panda")
 
 
-def test_the_command(run: Path, in_folder: Path) -> None:
+def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder: Path) -> None:
     Path("task.yaml").write_text(json.dumps(TASK.model_dump(mode="json", exclude_none=True)))
     done = armwright("compare-arms", "task.yaml", UR5, PANDA, "--run", run, "--no-figures")
     assert done.returncode == 0, done.stderr
@@ -314,7 +314,7 @@ def test_the_command(run: Path, in_folder: Path) -> None:
         assert words in line
 
 
-def test_a_compared_arm_of_no_run(compared: ArmComparison) -> None:
+def test_comparison_without_a_run_has_no_designs(compared: ArmComparison) -> None:
     comparison = compare_arms(TASK, [UR5], space=SPACE, base=(0.0, 0.0, 0.0))
     (arm,) = comparison.arms
     assert isinstance(arm, ComparedArm)

@@ -577,7 +577,7 @@ def compare_arms_(
 ) -> None:
     """Buy or build: evaluate arms that exist on TASK, beside the designs of a run."""
     from armwright.cli import console as view
-    from armwright.experiments.compare_arms import as_records, compare_arms
+    from armwright.experiments.compare_arms import compare_arms, comparison_record
     from armwright.spaces.design_space import load_space
 
     compared = compare_arms(
@@ -597,7 +597,7 @@ def compare_arms_(
 
         drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
     if json_:
-        _print_json(as_records(compared))
+        _print_json(comparison_record(compared))
     else:
         view.show_arms(view.stdout_console(), compared, drawn)
 
