@@ -44,7 +44,7 @@ class Held(Proposer):
         """Lets an answer go, and waits until the study has it."""
         self._gates[number].set()
         for thread in threading.enumerate():
-            if thread.name == f"armwright-question-{number}" and thread is not threading.current_thread():
+            if thread.name == f"armwright-request-{number}" and thread is not threading.current_thread():
                 thread.join()
 
     def propose(self, history: History, seed: int, number: int) -> list[Proposal]:
@@ -116,7 +116,7 @@ def test_the_black_box_waits_when_it_is_a_block_ahead() -> None:
     seen: list[tuple[int, int]] = []
 
     def watch(progress: Progress) -> None:
-        seen.append((progress.number, progress.under_way))
+        seen.append((progress.number, progress.n_in_flight))
         if progress.doing == "finished" and progress.number == 7:
             threading.Timer(0.05, proposer.release, (4,)).start()  # nothing can be drawn until then
 
@@ -289,7 +289,7 @@ def test_an_interrupt_ends_the_questions_under_way(chat_server: ChatServer) -> N
     with pytest.raises(KeyboardInterrupt):
         search(LlmProposer("test-model", chat_server.url), in_flight=3, watch=interrupt)
     for thread in threading.enumerate():
-        if thread.name.startswith("armwright-question"):
+        if thread.name.startswith("armwright-request"):
             thread.join(30)
             assert not thread.is_alive()
     assert not released.is_set()

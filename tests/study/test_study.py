@@ -309,7 +309,7 @@ def test_another_factory_is_another_run(tmp_path: Path) -> None:
 
 
 def test_a_sampler_or_proposer_of_the_wrong_kind_is_refused() -> None:
-    with pytest.raises(SettingsError, match="or a factory seed -> sampler, got RandomSampler"):
+    with pytest.raises(SettingsError, match=r"or a factory seed -> sampler, got .*RandomSampler"):
         optimize(PROBLEM, proposer="none", sampler=RandomSampler())  # type: ignore[arg-type]
     with pytest.raises(SettingsError, match=r"Listed is a class; give an instance of it: Listed\(\)"):
         optimize(PROBLEM, proposer=Listed)  # type: ignore[arg-type]

@@ -123,8 +123,8 @@ def _live(console: Console) -> Generator[Callable[[StudyProgress], None]]:
                 console.print(note)
             activities = {"proposing": f"asking {progress.source} …", "paused": "paused"}
             activity = activities.get(progress.doing, progress.source)
-            if progress.under_way:
-                activity += f"  {progress.under_way} asked"
+            if progress.n_in_flight:
+                activity += f"  {progress.n_in_flight} asked"
             bar.update(
                 line,
                 total=progress.n_total,

@@ -15,7 +15,9 @@ from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
-from armwright.study.schedule import Asker, Schedule, asking_turns
+from armwright.study.overlapping_schedule import request_schedule
+from armwright.study.proposal_requests import ProposalRequests
+from armwright.study.schedule import Blocks
 from armwright.study.study import optimize
 from armwright.tasks.task import Task
 
@@ -38,7 +40,9 @@ def preview(problem: Problem, asking: Asking, *, n_init: int = 10, seed: int = 0
     """The first prompt of a new run."""
     history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
     proposer = PromptedProposer(ReplayBackend((), Path()), asking, "llm")
-    return _preview(proposer, problem, n_init, proposer.prompt_for(history, Asker(proposer, seed).seed(n_init)))
+    return _preview(
+        proposer, problem, n_init, proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init))
+    )
 
 
 def preview_after(
@@ -68,18 +72,18 @@ def preview_after(
         ReplayBackend((), run), asking, settings["name"] if "prompt" in settings else "llm", prompt=prompt
     )
     proposer.look(run)
-    asker = Asker(proposer, config.seed)
+    requests = ProposalRequests(proposer, config.seed)
     if number is not None:
         then = _then(run, config, history, proposer.asked(), number)
-        text = proposer.prompt_for(then, asker.seed(number), proposer.past_hints(number))
+        text = proposer.prompt_for(then, requests.seed(number), proposer.past_hints(number))
         return _preview(proposer, history.problem, number, text)
-    turns = asking_turns(asker, _schedule(config), lambda: history, config.study.in_flight)
-    number, finished = turns.upcoming(len(history))
+    schedule = request_schedule(requests, Blocks.of(config.study), lambda: history, config.study.in_flight)
+    number, finished = schedule.upcoming(len(history))
     # What is to be otherwise than in the run is to be seen, even where the run's own answer waits for its second call.
     if wishes:
-        text = proposer.prompt_for(history, asker.seed(number), proposer.next_hints(number))
+        text = proposer.prompt_for(history, requests.seed(number), proposer.next_hints(number))
     else:
-        text = proposer.question(history, asker.seed(number), number).prompt
+        text = proposer.question(history, requests.seed(number), number).prompt
     note = _note(finished - len(history), len(proposer.unused(history)))
     return replace(_preview(proposer, history.problem, number, text), note=note)
 
@@ -90,15 +94,15 @@ def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: st
 
 def _then(run: Path, config: RunConfig, history: History, asked: Mapping[int, int], number: int) -> History:
     """What was known when a past proposal was asked for."""
-    schedule = _schedule(config)
+    blocks = Blocks.of(config.study)
     if asked:
         if number in asked:
             return history.before(asked[number])
         numbers = ", ".join(map(str, sorted(asked)))
     else:  # a run without a model: as a model would have been asked
-        if schedule.begins_block(number) and number <= len(history):
+        if blocks.is_first_trial(number) and number <= len(history):
             return history.before(number)
-        there = [n for n in range(len(history) + 1) if schedule.begins_block(n)]
+        there = [n for n in range(len(history) + 1) if blocks.is_first_trial(n)]
         numbers = ", ".join(map(str, there[:6])) + (f", … {there[-1]}" if len(there) > 6 else "")
     raise SettingsError(f"--number {number}: the proposals of {run} were asked for trials {numbers}")
 
@@ -110,7 +114,3 @@ def _note(before: int, unused: int) -> str:
     trials = "1 trial comes" if before == 1 else f"{before} trials come"
     designs = f", {unused} of them of the calls so far" if unused else ""
     return f"{trials} before it{designs}, and will be in it"
-
-
-def _schedule(config: RunConfig) -> Schedule:
-    return Schedule(config.study.n_init, config.study.n_step, config.study.n_total)

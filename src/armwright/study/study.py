@@ -32,7 +32,9 @@ from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
 from armwright.study.dask_backend import DaskBackend
 from armwright.study.evaluation_backend import Evaluated, EvaluationBackend, InProcessBackend
-from armwright.study.schedule import Asker, Nobody, Recorded, Schedule, Turn, Turns, asking_turns, past_turns
+from armwright.study.overlapping_schedule import request_schedule
+from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
+from armwright.study.schedule import Blocks, NoProposer, ReplaySchedule, Schedule
 
 LARGEST = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
@@ -44,7 +46,7 @@ class Progress:
     """What a study does now: it begins, asks its proposer, is paused by its watcher, or has finished a trial.
 
     iteration: counted trials finished (0 while the random ones run).
-    under_way: questions that wait for their answers while trials go on.
+    n_in_flight: questions that wait for their answers while trials go on.
     fault, faults: of this trial; and of all trials so far, by kind.
     note: what the user should be told, once.
     """
@@ -56,7 +58,7 @@ class Progress:
     hypervolume: float | None
     front_size: int
     source: str
-    under_way: int = 0
+    n_in_flight: int = 0
     fault: str | None = None
     faults: Mapping[str, int] = field(default_factory=dict[str, int])
     note: str = ""
@@ -69,14 +71,14 @@ class _Pending:
     Attributes:
         optuna_trial: Optuna's object.
         trial: the trial as far as it is known; it has values once it is evaluated.
-        turn: the proposer's turn, if it was one.
+        slot: the proposer's slot, if it was one.
         proposing: seconds spent on the proposal.
         sampling: seconds spent in the sampler.
     """
 
     optuna_trial: Any
     trial: FinishedTrial
-    turn: Turn | None
+    slot: ProposalSlot | None
     proposing: float
     sampling: float
 
@@ -199,7 +201,9 @@ class Study:
         self.watch = watch
         self._channel = Channel(None if folder is None else folder.path)
         overlap = self.method.in_flight is not None
-        self._asker = None if proposer is None else Asker(proposer, config.seed, None if overlap else self._asking)
+        self._requests = (
+            None if proposer is None else ProposalRequests(proposer, config.seed, None if overlap else self._asking)
+        )
         n_objectives, names = len(problem.objectives), [constraint.words for constraint in problem.constraints]
         self.black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
         self.trials = folder.open_trials(problem.space, n_objectives, len(names)) if folder is not None else []
@@ -249,18 +253,18 @@ class Study:
         self._begin()
         if self.workers is not None:
             self._backend = DaskBackend(self.problem, self.workers, self._notify)
-        with closing(self._turns()) as turns:
+        with closing(self._new_schedule()) as schedule:
             for number in range(first, self.n_trials):
-                self._wait_for_room(number, turns)
-                self._begin_trial(number, turns)
+                self._wait_for_room(number, schedule)
+                self._begin_trial(number, schedule)
             while self._pending:
-                self._take_results(turns, LOOK_SECONDS)
+                self._take_results(schedule, LOOK_SECONDS)
 
-    def _wait_for_room(self, number: int, turns: Turns) -> None:
+    def _wait_for_room(self, number: int, schedule: Schedule) -> None:
         """Take results until trial `number` may begin; StoppedError if the watcher ended the session."""
-        self._take_results(turns, 0.0)
+        self._take_results(schedule, 0.0)
         while not self._may_begin(number):
-            self._take_results(turns, LOOK_SECONDS)
+            self._take_results(schedule, LOOK_SECONDS)
         self._channel.say("evaluating", number)
 
     def _may_begin(self, number: int) -> bool:
@@ -282,11 +286,11 @@ class Study:
             return False
         return sum(not pending.is_evaluated for pending in self._pending.values()) < self._backend.capacity
 
-    def _take_results(self, turns: Turns, timeout: float) -> None:
+    def _take_results(self, schedule: Schedule, timeout: float) -> None:
         """Tell the sampler all results that there are, and record what can be.
 
         Args:
-            turns: asked how many questions are under way.
+            schedule: asked how many questions are under way.
             timeout: how long to wait for the first result [s].
         """
         while (result := self._backend.next_result(timeout)) is not None:
@@ -295,15 +299,15 @@ class Study:
             for pending in self._pending.values():
                 if pending.trial.duplicate_of == number and not pending.is_evaluated:
                     self._tell(pending, Evaluated(evaluated.outcome, 0.0))
-            self._record_ready(turns)
+            self._record_ready(schedule)
             timeout = 0.0
-        self._record_ready(turns)  # duplicates have no result of their own
+        self._record_ready(schedule)  # duplicates have no result of their own
 
-    def _record_ready(self, turns: Turns) -> None:
+    def _record_ready(self, schedule: Schedule) -> None:
         """Record the trials before which none is missing."""
         while (pending := self._pending.get(len(self.trials))) is not None and pending.is_evaluated:
             del self._pending[len(self.trials)]
-            self._record(pending, turns)
+            self._record(pending, schedule)
 
     def _notify(self, note: str) -> None:
         """Pass on news from the workers."""
@@ -312,8 +316,8 @@ class Study:
     def _check(self, on_model_failure: str) -> None:
         """Says what the proposals will take, and makes sure that they are to be had."""
         assert self.proposer is not None
-        assert self._asker is not None
-        due = self._schedule.n_proposals - len(past_turns(self._history()))
+        assert self._requests is not None
+        due = Blocks.of(self.method).n_proposals - len(past_slots(self._history()))
         if due <= 0:
             return
         forecast = self.proposer.forecast(self.problem, due)
@@ -327,7 +331,7 @@ class Study:
                 raise
             words = "the run goes on"
             if fault.final is not None:
-                self._asker.give_up(fault.final)
+                self._requests.stop(fault.final)
                 words = "no questions are asked in this session"
             self._report("beginning", len(self.trials), self.proposer.name, note=f"{fault}; {words}")
             self._channel.say("evaluating", len(self.trials), str(fault))
@@ -337,17 +341,13 @@ class Study:
         self._channel.say("asking", number)
         self._report("proposing", number, self.proposer.name, note=self.proposer.announce(number))
 
-    @property
-    def _schedule(self) -> Schedule:
-        return Schedule(self.method.n_init, self.method.n_step, self.method.n_total)
-
-    def _turns(self) -> Turns:
-        if self._asker is None or self.proposer is None:
-            return Nobody()
-        record = self.proposer.record()
+    def _new_schedule(self) -> Schedule:
+        if self._requests is None or self.proposer is None:
+            return NoProposer()
+        blocks, record = Blocks.of(self.method), self.proposer.record()
         if record is not None:
-            return Recorded(self._asker, record, self._schedule, self._history)
-        return asking_turns(self._asker, self._schedule, self._history, self.method.in_flight)
+            return ReplaySchedule(self._requests, record, blocks, self._history)
+        return request_schedule(self._requests, blocks, self._history, self.method.in_flight)
 
     def _begin(self) -> None:
         """Before the first new trial: results of fewer trials are taken away, other versions are noted."""
@@ -356,22 +356,22 @@ class Study:
         discard_results(self.folder.path)
         self.config = self.folder.note_versions(self.config, self.problem.evaluator)
 
-    def _begin_trial(self, number: int, turns: Turns) -> None:
+    def _begin_trial(self, number: int, schedule: Schedule) -> None:
         """Choose the design of a trial and start its evaluation; a duplicate takes the values of the first."""
         started = time.perf_counter()
-        turn = turns.next(number)
-        self._channel.say("evaluating", number, _fault_words(turn))
+        slot = schedule.next(number)
+        self._channel.say("evaluating", number, _fault_words(slot))
         proposed = time.perf_counter()
-        refinement = self._refinement(number) if turn is None else None
-        optuna_trial, design, source = self._ask(number, turn, refinement)
+        refinement = self._refinement(number) if slot is None else None
+        optuna_trial, design, source = self._ask(number, slot, refinement)
         sampled = time.perf_counter()
         first = self._first_of.setdefault(design, number)
-        trial = _begun(number, source, design, turn)
+        trial = _begun(number, source, design, slot)
         if first != number:
             trial = replace(trial, duplicate_of=first, evaluations=0)
         if refinement is not None:
             trial = replace(trial, refines=refinement.refines, evaluations=trial.evaluations + refinement.evaluations)
-        pending = _Pending(optuna_trial, trial, turn, proposed - started, sampled - proposed)
+        pending = _Pending(optuna_trial, trial, slot, proposed - started, sampled - proposed)
         self._pending[number] = pending
         if first == number:
             self._backend.submit(number, design)
@@ -400,17 +400,17 @@ class Study:
             },
         )
 
-    def _record(self, pending: _Pending, turns: Turns) -> None:
+    def _record(self, pending: _Pending, schedule: Schedule) -> None:
         """Write a trial whose values are known: from now on it is part of the run."""
-        finished, turn = pending.trial, pending.turn
+        finished, slot = pending.trial, pending.slot
         if self.folder is not None:
             self.folder.append(finished)
         self._count(finished)
         self._freeze_reference_point()
-        note = "" if turn is None else turn.note
+        note = "" if slot is None else slot.note
         if finished.failure:
             note = f"trial {finished.number}: {finished.failure}"
-        self._report("finished", finished.number, finished.source, turns, finished.fault, note)
+        self._report("finished", finished.number, finished.source, schedule, finished.fault, note)
 
     def _count(self, trial: FinishedTrial) -> None:
         """Takes a new trial into all that is kept of them, so that the next one costs no more after many."""
@@ -434,14 +434,14 @@ class Study:
         self._refined += 1
         return refine_one(history, self.config.seed)
 
-    def _ask(self, number: int, turn: Turn | None, refinement: Refinement | None) -> tuple[Any, Design, str]:
+    def _ask(self, number: int, slot: ProposalSlot | None, refinement: Refinement | None) -> tuple[Any, Design, str]:
         """Optuna's trial with the design to evaluate, and where it comes from."""
         if refinement is not None and refinement.design is not None:
             return *self.black_box.inject(refinement.design, number, POLISH, None), POLISH
-        if turn is not None and turn.proposal is not None:
+        if slot is not None and slot.proposal is not None:
             assert self.proposer is not None
             source = self.proposer.name
-            return *self.black_box.inject(turn.proposal.design, number, source, turn.proposal.id), source
+            return *self.black_box.inject(slot.proposal.design, number, source, slot.proposal.id), source
         if number < len(self.method.initial_designs):
             given = Design(self.method.initial_designs[number])
             return *self.black_box.inject(given, number, INITIAL_DESIGN, None), INITIAL_DESIGN
@@ -467,7 +467,7 @@ class Study:
         doing: Literal["beginning", "proposing", "paused", "finished"],
         number: int,
         source: str,
-        turns: Turns | None = None,
+        schedule: Schedule | None = None,
         fault: str | None = None,
         note: str = "",
     ) -> None:
@@ -482,7 +482,7 @@ class Study:
                 hypervolume=self._tracker.hypervolume,
                 front_size=self._tracker.size,
                 source=source,
-                under_way=0 if turns is None else turns.under_way,
+                n_in_flight=0 if schedule is None else schedule.n_in_flight,
                 fault=fault,
                 faults=self._faults.copy(),
                 note=note,
@@ -548,27 +548,27 @@ def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
     )
 
 
-def _fault_words(turn: Turn | None) -> str | None:
-    """Why a turn came to nothing; empty where it has a design, None where there is nothing new to say."""
-    if turn is None:
+def _fault_words(slot: ProposalSlot | None) -> str | None:
+    """Why a slot came to nothing; empty where it has a design, None where there is nothing new to say."""
+    if slot is None:
         return None
-    return "" if turn.proposal is not None else turn.note or None
+    return "" if slot.proposal is not None else slot.note or None
 
 
-def _begun(number: int, source: str, design: Design, turn: Turn | None) -> FinishedTrial:
+def _begun(number: int, source: str, design: Design, slot: ProposalSlot | None) -> FinishedTrial:
     """A trial that has no values yet."""
     trial = FinishedTrial(number, source, design, values=())
-    if turn is None:
+    if slot is None:
         return trial
-    proposal = turn.proposal
+    proposal = slot.proposal
     return replace(
         trial,
         proposal=None if proposal is None else proposal.id,
         reason="" if proposal is None else proposal.reason,
         expected=None if proposal is None else proposal.expected,
-        fault=turn.fault,
-        asked=None if turn.asked == number else turn.asked,
-        feedback=None if turn.feedback == number else turn.feedback,
+        fault=slot.fault,
+        asked=None if slot.asked == number else slot.asked,
+        feedback=None if slot.feedback == number else slot.feedback,
     )
 
 

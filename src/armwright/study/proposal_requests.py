@@ -1,0 +1,110 @@
+"""Requests to a proposer, and the trials that its designs, or its faults, take."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from armwright.exceptions import DesignError, ProposalError
+from armwright.proposers.proposer import Proposal, Proposer
+from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
+from armwright.seeding import PROPOSING, derived_seed
+
+
+@dataclass(frozen=True)
+class ProposalSlot:
+    """A trial reserved for the proposer: its proposal, or the kind of fault that left the trial without one.
+
+    Attributes:
+        asked: number of the trial that the proposal was requested for.
+        feedback: number of finished trials that the proposer knew.
+        proposal: the design, if there is one.
+        fault: kind of the fault, if there is none.
+        note: message for the user.
+    """
+
+    asked: int
+    feedback: int
+    proposal: Proposal | None = None
+    fault: str | None = None
+    note: str = ""
+
+
+class ProposalRequests:
+    """Requests proposals, until a fault that another request cannot mend.
+
+    Args:
+        proposer: whom to ask.
+        seed: of the run.
+        notify: called with the number of the trial before each request.
+    """
+
+    def __init__(self, proposer: Proposer, seed: int, notify: Callable[[int], None] | None = None) -> None:
+        self.per_call = proposer.per_call
+        self._proposer = proposer
+        self._seed = seed
+        self._notify = notify
+        self._final_fault: str | None = None  # the kind of the fault that ended the requests
+        self._lock = threading.Lock()
+
+    def unused(self, history: History) -> list[ProposalSlot]:
+        """Return the proposals of earlier sessions that no trial has used yet."""
+        return [ProposalSlot(p.asked, p.known or 0, p, note=p.note) for p in self._proposer.unused(history)]
+
+    def request(self, history: History, number: int) -> list[ProposalSlot]:
+        """Request proposals for trial `number` after `history`: one slot per design, or one with a fault."""
+        known = len(history)
+        if self._final_fault is not None:
+            return [ProposalSlot(number, known, fault=self._final_fault)]
+        if self._notify is not None:
+            self._notify(number)
+        try:
+            answer = self._proposer.propose(history, self.seed(number), number)
+        except ProposalError as fault:
+            known = known if fault.known is None else fault.known
+            return [ProposalSlot(number, known, fault=fault.kind, note=self._note(fault))]
+        proposals = [answer] if isinstance(answer, Proposal) else list(answer)
+        if not proposals:
+            return [ProposalSlot(number, known, fault="answer", note="the proposer gave no design")]
+        return [_check_design(history, number, proposal) for proposal in proposals]
+
+    def seed(self, number: int) -> int:
+        """Return the seed of the request for trial `number`."""
+        return derived_seed(self._seed, PROPOSING, number)
+
+    def stop(self, kind: str) -> bool:
+        """Make no more requests in this session, and return True if none had stopped them before."""
+        with self._lock:
+            is_first, self._final_fault = self._final_fault is None, self._final_fault or kind
+        return is_first
+
+    def cancel(self) -> None:
+        """Cancel the requests in flight."""
+        self._proposer.cancel()
+
+    def _note(self, fault: ProposalError) -> str:
+        """Return the message for the user; only the first request that meets a final fault reports it."""
+        if not fault.final:
+            return str(fault)
+        return f"{fault}; no more questions are asked in this session" if self.stop(fault.kind) else ""
+
+
+def _check_design(history: History, number: int, proposal: Proposal) -> ProposalSlot:
+    known = len(history) if proposal.known is None else proposal.known
+    try:
+        history.problem.space.design(proposal.design.params)
+    except DesignError as fault:
+        return ProposalSlot(number, known, fault="answer", note=str(fault))
+    return ProposalSlot(number, known, proposal, note=proposal.note)
+
+
+def past_slots(history: History) -> list[ProposalSlot]:
+    """Return the slots that the finished trials were."""
+    return [slot for slot in map(_past_slot, history) if slot is not None]
+
+
+def _past_slot(trial: FinishedTrial) -> ProposalSlot | None:
+    if trial.proposal is None and trial.fault is None:
+        return None
+    asked = trial.number if trial.asked is None else trial.asked
+    return ProposalSlot(asked, trial.number if trial.feedback is None else trial.feedback, fault=trial.fault)
