@@ -593,9 +593,9 @@ class _Server:
     app: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        from armwright.report.live_server import Pages, live_app
+        from armwright.report.live_app import OpenPages, live_app
 
-        self.app = live_app(self.folder, self.token, lambda host: host == "127.0.0.1:9", Pages())
+        self.app = live_app(self.folder, self.token, lambda host: host == "127.0.0.1:9", OpenPages())
 
     async def _ask(self, method: str, path: bytes, headers: list[tuple[bytes, bytes]], body: bytes) -> tuple[int, Any]:
         address, _, query = path.partition(b"?")

@@ -20,8 +20,8 @@ DEFAULTS = {
     "answer": "two-step", "proposals": 1, "output": "auto",
 }  # fmt: skip
 TASK_FIELDS = (  # fields that distinguish one task from another
-    "entries", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step", "move_time",
-    "workspace", "constraints", "objectives", "reference_point",
+    "target_specs", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step",
+    "move_time", "workspace", "constraints", "objectives", "reference_point",
 )  # fmt: skip
 
 
