@@ -128,7 +128,7 @@ def run(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        (("verification",), 3), (("verification", "solid_numbers"), None), (("verification", "solid_numbers"), {}),
+        (("verification",), 3), (("verification", "robust_numbers"), None), (("verification", "robust_numbers"), {}),
         (("hypervolume",), {}), (("hypervolume", "history"), [[1], 2]), (("hypervolume", "final"), "x"),
         (("credit",), []), (("credit", "bbo"), None), (("proposer", "failures"), 1), (("diagnostics",), "x"),
         (("seconds",), {}), (("best_known",), {"share": 1}), (("front_size",), 10**400), (("n_trials",), -1),

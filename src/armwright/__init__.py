@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from armwright.spaces.parameters import Design
     from armwright.study.cluster import Workers
     from armwright.study.front_run import FrontRun, find_front
-    from armwright.study.refine_run import polish_run
+    from armwright.study.refine_run import refine_run
     from armwright.study.study import Run, optimize
     from armwright.tasks.task import Task, builtin_tasks, load_task, random_task
 
@@ -101,7 +101,7 @@ _PLACES = {
     "load_task": "tasks.task",
     "optimize": "study.study",
     "paper_space": "spaces.design_space",
-    "polish_run": "study.refine_run",
+    "refine_run": "study.refine_run",
     "random_task": "tasks.task",
     "read_run": "runs.folder",
     "read_urdf": "robot.urdf_reader",
@@ -166,10 +166,10 @@ __all__ = [
     "load_task",
     "optimize",
     "paper_space",
-    "polish_run",
     "random_task",
     "read_run",
     "read_urdf",
+    "refine_run",
     "to_mjcf",
     "to_ros2_control",
     "to_sdf",

@@ -25,10 +25,10 @@ def test_front_polish_and_verify(in_folder: Path) -> None:
     polished = armwright("polish", "mine", "--evaluations", "120")
     assert polished.returncode == 0, polished.stderr
     assert "improved designs" in polished.stdout
-    assert " polish " in polished.stdout
+    assert " refine " in polished.stdout
     verified = armwright("verify", "mine", "--json")
     record = json.loads(verified.stdout)["verification"]
-    assert record["solid"] + record["fragile"] == json.loads(verified.stdout)["front_size"]
+    assert record["robust"] + record["sensitive"] == json.loads(verified.stdout)["front_size"]
     assert "from other initial postures" in armwright("verify", "mine").stdout
     again = armwright("optimize", "target-1", *SHORT, "--out", "mine")
     assert "is finished; nothing was computed again" in again.stdout
@@ -47,9 +47,9 @@ def test_front_and_polish_draw_their_figures(in_folder: Path) -> None:
         assert {"hypervolume.png", "front.png", "arms.pdf"} <= drawn
 
 
-def test_robust_and_polish_every(in_folder: Path) -> None:
+def test_robust_and_refine_every(in_folder: Path) -> None:
     done = armwright(
-        "optimize", "target-1", *SHORT, "--robust", "--polish-every", "3", "--proposer", "none", "--out", "r", "--json"
+        "optimize", "target-1", *SHORT, "--robust", "--refine-every", "3", "--proposer", "none", "--out", "r", "--json"
     )
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
@@ -57,8 +57,8 @@ def test_robust_and_polish_every(in_folder: Path) -> None:
     assert summary["best_known"] is None
     config = (in_folder / "r" / "config.yaml").read_text()
     assert "tolerance: 0.001" in config
-    assert "polish_every: 3" in config
-    line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--polish-every", "3", "--out", "r")
+    assert "refine_every: 3" in config
+    line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--refine-every", "3", "--out", "r")
     assert "tolerance: 0.001 there, 0.0 asked" in line
 
 
@@ -74,7 +74,7 @@ def test_robust_and_polish_every(in_folder: Path) -> None:
         (2, ("front", "target-1", "--proposer", "none"), "gives no designs"),
         (2, ("front", "target-1", "--proposer", "rules", "--from", "x"), "choose one"),
         (1, ("front", "target-1", "--from", "nothing"), "not a run folder"),
-        (2, ("optimize", "target-1", "--polish-every", "0"), "polish_every = 0"),
+        (2, ("optimize", "target-1", "--refine-every", "0"), "refine_every = 0"),
         (1, ("polish", "nothing"), "not a run folder"),
         (1, ("verify", "nothing"), "not a run folder"),
     ],

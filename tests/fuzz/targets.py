@@ -441,7 +441,7 @@ def looked_at(there: Path) -> None:
     any_of(
         (
             lambda: json.dumps(list_runs([there])),
-            lambda: pick_from(there, solid=True),
+            lambda: pick_from(there, robust=True),
             lambda: export_design(there, None, "urdf"),
             lambda: RunContent(there).packed(),
             lambda: markdown(compare_runs(there), "runs", notes=()),
@@ -684,7 +684,7 @@ def argument_seeds() -> list[bytes]:
     lines = (
         ["tasks", "target-1"], ["tasks", "--json"], ["optimize", "target-1", "--n-total", "2", "--n-init", "1"],
         ["optimize", "target-1", "--sampler", "random", "--objectives", "torque,mass", "--robust", "--seed", "3"],
-        ["optimize", "target-1", "--proposer", "rules", "--n-step", "2", "--polish-every", "2", "--json"],
+        ["optimize", "target-1", "--proposer", "rules", "--n-step", "2", "--refine-every", "2", "--json"],
         ["optimize", "target-1", "--proposer", f"replay:{run}", "--replay-strict", "--memory", "own"],
         ["optimize", "target-1", "--proposer", "manual:desk", "--once", "--proposals", "2", "--prompt", "minus"],
         ["optimize", "target-1", "--model", "openai-chat:x", "--base-url", "http://127.0.0.1:9/v1", "--max-calls", "3",

@@ -44,7 +44,7 @@ from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.spaces.tolerance import perturbed
 from armwright.study.front_run import find_front
-from armwright.study.refine_run import polish_run
+from armwright.study.refine_run import refine_run
 from armwright.study.study import optimize
 from armwright.tasks.task import Task, load_task
 from armwright.tasks.task_template import task_template
@@ -273,17 +273,17 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     assert numbers["worst_error"] == pytest.approx(there.evaluation([there.front[0].number]).position_error.max())
     # what is verified keeps its bounds, but for a little, when it is built a little off
     history, summary = verify_run(tmp_path / "run")
-    solid = summary["verification"]["solid_numbers"]
-    designs = [history.trials[number].design for number in solid]
+    robust = summary["verification"]["robust_numbers"]
+    designs = [history.trials[number].design for number in robust]
     rows = SPACE.matrix(designs)
     off = np.max([problem.evaluate_matrix(copies).violations for copies in perturbed(SPACE, rows)], axis=0)
     assert np.all(off <= 0.06)  # 5 % in float64
-    # what is polished stays feasible
-    polished = polish_run(tmp_path / "run", 240)
-    assert polished.added
-    assert all(trial.is_feasible for trial in polished.history.trials[len(run.trials) :])
-    refined = [trial.design for trial in polished.history]
-    assert np.array_equal(polished.history.violations, problem.evaluate(refined).violations)
+    # refined designs stay feasible
+    refined = refine_run(tmp_path / "run", 240)
+    assert refined.added
+    assert all(trial.is_feasible for trial in refined.history.trials[len(run.trials) :])
+    designs = [trial.design for trial in refined.history]
+    assert np.array_equal(refined.history.violations, problem.evaluate(designs).violations)
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
@@ -348,7 +348,7 @@ def test_a_replay_has_the_same_constraints_to_the_bit(chat_server: ChatServer, t
 
 def test_where_nothing_is_feasible_yet_the_nearest_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     problem = Problem(task(*IMPOSSIBLE))
-    run = optimize(problem, proposer="rules", n_total=12, polish_every=4, seed=1, out=tmp_path / "run")
+    run = optimize(problem, proposer="rules", n_total=12, refine_every=4, seed=1, out=tmp_path / "run")
     assert run.front == []
     assert run.hypervolume.tolist() == [0.0] * 12
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
@@ -360,7 +360,7 @@ def test_where_nothing_is_feasible_yet_the_nearest_is_told(tmp_path: Path, capsy
     with pytest.raises(FailureError, match=words):
         pick(run.history)
     with pytest.raises(RunFolderError, match=words):
-        polish_run(tmp_path / "run")
+        refine_run(tmp_path / "run")
     assert {file.name for file in write_figures(tmp_path / "run")} >= {"front.png", f"arm-{nearest:04d}.png"}
 
 

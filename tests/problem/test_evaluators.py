@@ -123,8 +123,8 @@ def test_a_function_that_fails_counts_the_worst_where_that_is_stated() -> None:
         (lambda: aw.evaluator("torque")(len), "one of armwright's own"),
         (lambda: aw.Problem(TASK, SPACE, tolerance=0.001, evaluator=measured), "a tolerance does not go with"),
         (
-            lambda: aw.optimize(aw.Problem(WHOLE, SPACE, evaluator=measured), polish_every=5),
-            "--polish-every does not go with an evaluator",
+            lambda: aw.optimize(aw.Problem(WHOLE, SPACE, evaluator=measured), refine_every=5),
+            "--refine-every does not go with an evaluator",
         ),
     ],
 )

@@ -58,8 +58,8 @@ def three(task: Task) -> Problem:
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})
 
 
-def test_polish_within_a_study_of_one_objective() -> None:
-    run = optimize(one(OPEN), proposer="none", n_init=3, n_total=8, polish_every=3)
+def test_refinement_within_a_study_of_one_objective() -> None:
+    run = optimize(one(OPEN), proposer="none", n_init=3, n_total=8, refine_every=3)
     assert any(trial.refines is not None for trial in run.trials)
 
 
@@ -239,7 +239,7 @@ def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: t
     point = front.summary["hypervolume"]["reference_point"]
     assert front.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(values, ref=point), rel=0.02)
     assert front.summary["best_known"] is None
-    assert verify_run(tmp_path / "run")[1]["verification"]["solid"] >= 0
+    assert verify_run(tmp_path / "run")[1]["verification"]["robust"] >= 0
     page = RunContent(tmp_path / "run")
     assert page.packed()
 

@@ -168,7 +168,7 @@ def test_the_page_shows_the_end_and_outlives_the_study(tmp_path: Path, tab: Tab,
     tab.open(study.address)
     expect(tab.page.locator("#doing")).to_have_text("finished: 40 designs")
     assert study.end() == 0
-    expect(tab.page.locator("#facts")).to_contain_text("solid")
+    expect(tab.page.locator("#facts")).to_contain_text("robust")
     expect(tab.page.locator("#hint")).to_be_hidden()  # nobody would read it
     history = read_run(study.folder)[1]
     assert tab.ask("armwright.content.n") == 40

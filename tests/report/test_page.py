@@ -255,20 +255,20 @@ def test_the_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: H
     tab.page.keyboard.press("ArrowDown")
     assert tab.ask("armwright.state.design") == int(second.get_attribute("data-design"))
     assert second.get_attribute("aria-current") == "true"
-    solid = set(json.loads((run / "summary.json").read_text())["verification"]["solid_numbers"])
+    robust = set(json.loads((run / "summary.json").read_text())["verification"]["robust_numbers"])
     for row in tab.page.locator("#table tbody tr").all():
-        verdict = "solid" if int(row.get_attribute("data-design")) in solid else "fragile"
+        verdict = "robust" if int(row.get_attribute("data-design")) in robust else "sensitive"
         assert verdict in row.inner_text()
 
 
-def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", solid: bool = False) -> list[int]:
+def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", robust: bool = False) -> list[int]:
     """The designs of the table, in its order, after a wish was typed in."""
     page = tab.page
     page.locator("#pick-where").fill(where)
     page.locator("#pick-by").select_option(label=by)
     if by == "weights":
         page.locator("#pick-weights").fill(weights)
-    page.locator("#pick-solid").set_checked(solid)
+    page.locator("#pick-robust").set_checked(robust)
     page.get_by_role("button", name="Pick", exact=True).click()
     return [int(text) for text in page.locator("#table tbody tr td:first-child").all_inner_texts()]
 
@@ -286,7 +286,7 @@ def test_picking_in_the_page_is_picking_in_a_terminal(run: Path, tab: Tab) -> No
     assert asked(tab, by="least torque") == picked(run, by="torque")
     where = ("position_error<=2", " length < .6")
     assert asked(tab, ",".join(where), by="least mass") == picked(run, *where, by="mass")
-    assert asked(tab, solid=True) == picked(run, solid=True)
+    assert asked(tab, robust=True) == picked(run, robust=True)
     assert asked(tab, "origin_z >= 1e-2") == picked(run, "origin_z>=0.01")
     last = asked(tab, "torque < 4.5", by="weights", weights="position_error=2, torque=1")
     assert last == picked(run, "torque<4.5", weights={"position_error": 2.0, "torque": 1.0})

@@ -133,8 +133,8 @@ def test_exported_trials_equal_those_of_the_run(which: str, request: pytest.Fixt
 def verdicts_of(folder: Path, history: History) -> dict[int, str]:
     summary = read_summary(folder)
     assert summary is not None
-    solid = summary["verification"]["solid_numbers"]
-    return {member.number: "solid" if member.number in solid else "fragile" for member in history.front}
+    robust = summary["verification"]["robust_numbers"]
+    return {member.number: "robust" if member.number in robust else "sensitive" for member in history.front}
 
 
 def test_the_runs_show_what_can_differ_between_trials(run: Path) -> None:

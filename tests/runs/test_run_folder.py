@@ -61,7 +61,7 @@ def test_config_repeats_the_run(run: Run) -> None:
         "n_step": 4,
         "n_total": 8,
         "in_flight": None,
-        "polish_every": None,
+        "refine_every": None,
         "initial_designs": [],
     }
     assert config["seed"] == 0
@@ -85,7 +85,7 @@ def test_summary(run: Run) -> None:
         "verification",
         "evaluations",
         "duplicates",
-        "polish",
+        "refine",
         "credit",
         "proposer",
         "diagnostics",

@@ -58,10 +58,10 @@ def test_weights_are_shares_of_the_reference_point(history: History) -> None:
         assert pick(history, weights=named)[0].number == best.number
 
 
-def test_only_solid_ones(run: Path) -> None:
-    solid = json.loads((run / "summary.json").read_text())["verification"]["solid_numbers"]
-    _, picked = pick_from(run, solid=True)
-    assert sorted(member.number for member in picked) == sorted(solid)
+def test_pick_can_be_restricted_to_robust_designs(run: Path) -> None:
+    robust = json.loads((run / "summary.json").read_text())["verification"]["robust_numbers"]
+    _, picked = pick_from(run, robust=True)
+    assert sorted(member.number for member in picked) == sorted(robust)
 
 
 def test_why_nothing_is_left(history: History) -> None:

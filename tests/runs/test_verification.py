@@ -1,4 +1,4 @@
-"""Solid and fragile: against the plain float64 reference, and by designs that are one or the other on purpose."""
+"""Robust and sensitive: against the plain float64 reference, and by designs that are one or the other on purpose."""
 
 from pathlib import Path
 
@@ -71,18 +71,18 @@ def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
     agree(found.started, worst)
 
 
-def test_what_is_solid_follows_from_the_worst_cases(designs: list[Design]) -> None:
+def test_what_is_robust_follows_from_the_worst_cases(designs: list[Design]) -> None:
     values = PROBLEM.evaluate(designs).values
     found = verify(PROBLEM, designs, values, BOX)
     allowed = values + np.maximum(0.05 * values, 0.005 * np.array(BOX))
     for i in range(len(designs)):
-        solid = np.all(found.exact[i] <= allowed[i]) and np.all(found.moved[i] <= allowed[i])
-        assert found.solid[i] == solid
-        assert found.from_any_start[i] == (solid and np.all(found.started[i] <= allowed[i]))
-    assert 0 < found.solid.sum() < len(designs)
+        robust = np.all(found.exact[i] <= allowed[i]) and np.all(found.moved[i] <= allowed[i])
+        assert found.robust[i] == robust
+        assert found.from_any_start[i] == (robust and np.all(found.started[i] <= allowed[i]))
+    assert 0 < found.robust.sum() < len(designs)
 
 
-def test_an_arm_that_needs_luck_is_fragile() -> None:
+def test_design_near_a_flip_of_the_solver_is_sensitive() -> None:
     """A target at the arm's full reach: with any shorter link it is a millimetre away; half a millimetre is allowed."""
     at_reach = Task(name="reach", targets=((0.0, 0.0, 0.4),), reference_point=(0.1, 20.0))
     lucky = Problem(at_reach).space.clipped((0.0, 0.0, 0.0), "RPRP", (0.1, 0.1, 0.1, 0.1))
@@ -90,7 +90,7 @@ def test_an_arm_that_needs_luck_is_fragile() -> None:
     problem = Problem(at_reach)
     found = verify(problem, [lucky, easy], problem.evaluate([lucky, easy]).values, (0.1, 20.0))
     assert found.moved[0, 0] == pytest.approx(1e-3, abs=1e-6)
-    assert found.solid.tolist() == [False, True]
+    assert found.robust.tolist() == [False, True]
 
 
 def test_robust_values_are_the_worst_case(designs: list[Design]) -> None:
@@ -109,11 +109,11 @@ def test_verify_run_marks_the_front(tmp_path: Path) -> None:
     history, summary = verify_run(tmp_path / "run")
     assert summary == read_summary(tmp_path / "run")
     record = summary["verification"]
-    assert record["solid"] + record["fragile"] == len(history.front)
+    assert record["robust"] + record["sensitive"] == len(history.front)
     assert {**summary, "verification": None} == run.summary
     table = (tmp_path / "run" / "front.csv").read_text()
-    assert table.count(",solid,") == record["solid"]
-    assert table.count(",fragile,") == record["fragile"]
+    assert table.count(",robust,") == record["robust"]
+    assert table.count(",sensitive,") == record["sensitive"]
     other = optimize(PROBLEM, **{**settings, "out": tmp_path / "other"})
     assert other.summary["verification"] == record
 

@@ -1,4 +1,4 @@
-"""Refinement and polish: better in every objective, within the space, counted, and the same each time."""
+"""Refinement: better in every objective, within the space, counted, and the same each time."""
 
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,11 @@ from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
-from armwright.runs.history import POLISH
+from armwright.runs.history import REFINE
 from armwright.runs.results import read_summary
 from armwright.search.cma_es import POPULATION, Refined, refine
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
-from armwright.study.refine_run import polish_run
+from armwright.study.refine_run import refine_run
 from armwright.study.study import Run, optimize
 from armwright.tasks.task import load_task
 
@@ -84,43 +84,45 @@ def run(tmp_path: Path) -> Run:
     return optimize(PROBLEM, proposer="rules", n_init=5, n_step=5, n_total=30, seed=0, out=tmp_path / "run")
 
 
-def test_polish_adds_what_became_better(run: Run) -> None:
+def test_refine_run_adds_improved_designs(run: Run) -> None:
     assert run.folder is not None
-    polished = polish_run(run.folder, 240)
-    new = polished.history.trials[len(run.trials) :]
-    assert 0 < polished.added == len(new) <= polished.tried
+    refined = refine_run(run.folder, 240)
+    new = refined.history.trials[len(run.trials) :]
+    assert 0 < refined.added == len(new) <= refined.tried
     for trial in new:
-        assert trial.source == POLISH
+        assert trial.source == REFINE
         assert trial.refines is not None
         parent = run.trials[trial.refines]
         assert np.all(np.array(trial.values) < parent.values)
         assert trial.design.joints == parent.design.joints
-    assert sum(trial.evaluations for trial in new) == polished.evaluations
-    assert polished.evaluations <= 240 * polished.tried
+    assert sum(trial.evaluations for trial in new) == refined.evaluations
+    assert refined.evaluations <= 240 * refined.tried
     summary = read_summary(run.folder)
-    assert summary == polished.summary
+    assert summary == refined.summary
     assert summary is not None
     assert summary["proposer"] == run.summary["proposer"]
     assert summary["hypervolume"]["final"] > run.summary["hypervolume"]["final"]
     assert summary["hypervolume"]["mean"] == pytest.approx(run.summary["hypervolume"]["mean"])  # of the counted trials
-    assert summary["evaluations"] == len(run.trials) + polished.evaluations
+    assert summary["evaluations"] == len(run.trials) + refined.evaluations
     _, read = read_run(run.folder)
-    assert read.trials == list(polished.history.trials)
+    assert read.trials == list(refined.history.trials)
 
 
-def test_a_polished_run_is_finished_and_cannot_be_extended(run: Run) -> None:
+def test_refined_run_is_finished_and_cannot_be_extended(run: Run) -> None:
     assert run.folder is not None
-    polish_run(run.folder, 120)
+    refine_run(run.folder, 120)
     _, before = read_run(run.folder)
     settings = {"proposer": "rules", "n_init": 5, "n_step": 5, "seed": 0, "out": run.folder}
     again = optimize(PROBLEM, n_total=30, **settings)
     assert list(again.trials) == before.trials
-    with pytest.raises(RunConflictError, match="was polished"):
+    with pytest.raises(RunConflictError, match="was refined"):
         optimize(PROBLEM, n_total=100, **settings)
     assert read_run(run.folder)[1].trials == before.trials
 
 
-def test_polish_counts_evaluations_in_vain_and_tries_anew(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refine_run_counts_evaluations_in_vain_and_draws_another_seed(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert run.folder is not None
     seeds: list[int] = []
 
@@ -131,41 +133,41 @@ def test_polish_counts_evaluations_in_vain_and_tries_anew(run: Run, monkeypatch:
         return Refined(rows, values, np.zeros(len(rows), dtype=bool), evaluations * len(rows))
 
     monkeypatch.setattr("armwright.study.refine_run.refine_members", nothing_better)
-    first = polish_run(run.folder, 120)
+    first = refine_run(run.folder, 120)
     assert first.added == 0
     assert first.summary["evaluations"] == 35 + first.evaluations
-    second = polish_run(run.folder, 120)
+    second = refine_run(run.folder, 120)
     assert second.summary["evaluations"] == 35 + 2 * first.evaluations
-    assert second.summary["polish"] == {"rounds": 2, "in_vain": 2 * first.evaluations}
+    assert second.summary["refine"] == {"rounds": 2, "in_vain": 2 * first.evaluations}
     assert len(set(seeds)) == 2
 
 
-def test_polish_refuses_what_it_cannot_do(run: Run, tmp_path: Path) -> None:
+def test_refine_run_refuses_bad_input(run: Run, tmp_path: Path) -> None:
     assert run.folder is not None
     with pytest.raises(SettingsError, match="evaluations = 3"):
-        polish_run(run.folder, 3)
+        refine_run(run.folder, 3)
     with pytest.raises(RunFolderError, match="not a run folder"):
-        polish_run(tmp_path / "nothing")
+        refine_run(tmp_path / "nothing")
     assert not (tmp_path / "nothing").exists()
     (run.folder / "summary.json").unlink()
     with pytest.raises(RunFolderError, match="not finished"):
-        polish_run(run.folder)
+        refine_run(run.folder)
 
 
 @pytest.mark.slow
-def test_polish_within_a_study(tmp_path: Path) -> None:
-    settings = {"proposer": "rules", "n_init": 5, "n_step": 10, "seed": 1, "polish_every": 5}
+def test_refinement_within_a_study(tmp_path: Path) -> None:
+    settings = {"proposer": "rules", "n_init": 5, "n_step": 10, "seed": 1, "refine_every": 5}
     run = optimize(PROBLEM, n_total=30, **settings)
-    polished = [trial for trial in run.trials if trial.refines is not None]
-    assert len(polished) == 5  # after 5, 10, …, 25 counted trials; at 10 and 20 the proposer's turn comes first
+    refined = [trial for trial in run.trials if trial.refines is not None]
+    assert len(refined) == 5  # after 5, 10, …, 25 counted trials; at 10 and 20 the proposer's turn comes first
     assert [trial.number for trial in run.trials if trial.source == "rules"] == [5, 15, 25]
-    for trial in polished:
+    for trial in refined:
         assert trial.refines is not None
         assert trial.evaluations == 1 + 1000 // POPULATION * POPULATION
         assert trial.refines < trial.number
-        if trial.source == POLISH:
+        if trial.source == REFINE:
             assert np.all(np.array(trial.values) < run.trials[trial.refines].values)
-    without = optimize(PROBLEM, n_total=30, **{**settings, "polish_every": None})
+    without = optimize(PROBLEM, n_total=30, **{**settings, "refine_every": None})
     assert hypervolume(run.history.values, (5, 5)) > hypervolume(without.history.values, (5, 5))
     # Stopped and resumed, it is the same run.
     for n_total in (11, 30):

@@ -83,7 +83,7 @@ def numbers(run: Path) -> list[int]:
 @pytest.mark.parametrize(
     "settings",
     [
-        {"problem": PAPER, "sampler": "tpe", "polish_every": 5},
+        {"problem": PAPER, "sampler": "tpe", "refine_every": 5},
         {"problem": PAPER, "sampler": "nsga2"},
         {"problem": MANY, "sampler": "random"},
     ],

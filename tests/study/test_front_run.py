@@ -94,7 +94,7 @@ def test_its_summary_and_files(done: FrontRun) -> None:
     assert summary["best_known"]["share"] == pytest.approx(final / summary["best_known"]["hypervolume"])
     _, verified = verify_run(done.folder)
     assert verified == summary
-    assert summary["verification"]["solid"] + summary["verification"]["fragile"] == len(done.history)
+    assert summary["verification"]["robust"] + summary["verification"]["sensitive"] == len(done.history)
     for member in done.front[:: len(done.front) // 5]:
         mujoco.MjModel.from_xml_path(str(done.folder / f"designs/{member.number:04d}/arm.urdf"))
 
@@ -207,7 +207,7 @@ def test_a_front_wholly_outside_the_box_is_kept_drawn_and_gone_on_with(tmp_path:
         assert front_mask(run.history.values).all()
         assert 0 < len(run.history) <= 300
         assert write_figures(tmp_path / "run")
-    assert verify_run(tmp_path / "run")[1]["verification"]["solid"] >= 0
+    assert verify_run(tmp_path / "run")[1]["verification"]["robust"] >= 0
 
 
 def test_a_proposer_is_not_asked_for_a_folder_of_another_run(tmp_path: Path) -> None:
@@ -244,7 +244,7 @@ def test_a_run_of_a_gpu_is_read_and_verified_without_one(tmp_path: Path) -> None
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text().replace("device: cpu", "device: cuda"))
     assert "device: cuda" in config.read_text()
-    assert verify_run(tmp_path / "run")[1]["verification"]["solid"] > 0
+    assert verify_run(tmp_path / "run")[1]["verification"]["robust"] > 0
     assert write_figures(tmp_path / "run")
 
 

@@ -133,7 +133,7 @@ def test_objectives_of_clearance() -> None:
     for quantity in CLEARANCES:
         least = getattr(evaluation, quantity.name).min(axis=1)
         assert np.array_equal(quantity(evaluation), np.minimum(least, FAR))
-    assert np.any(verify(problem, designs, values, (1.0, 1.0)).solid)
+    assert np.any(verify(problem, designs, values, (1.0, 1.0)).robust)
     alone = Problem(
         Task(name="alone", targets=task.targets), objectives=named_objectives(["collision", "clearance_shortfall"])
     )

@@ -83,7 +83,7 @@ def test_a_study_with_its_figures(torture: Callable[[str, Scenario], Counter[str
 
 
 def test_a_study_whose_sampler_keeps_notes(torture: Callable[[str, Scenario], Counter[str]]) -> None:
-    settings = ("--proposer", "none", "--sampler", "nsga2", "--polish-every", "20", "--no-figures")
+    settings = ("--proposer", "none", "--sampler", "nsga2", "--refine-every", "20", "--no-figures")
     torture("optimize, NSGA-II", study(60, *settings))
 
 

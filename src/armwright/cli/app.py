@@ -215,12 +215,12 @@ def optimize(
         list[Path] | None,
         typer.Option(help="A design to begin with, such as designs/0042/design.json of a run; several may be given."),
     ] = None,
-    polish_every: Annotated[
+    refine_every: Annotated[
         int | None,
         typer.Option(help="After so many counted trials, one refines a design of the front by 1000 evaluations."),
     ] = None,
     verify: Annotated[
-        bool, typer.Option("--verify/--no-verify", help="Mark each design of the front solid or fragile.")
+        bool, typer.Option("--verify/--no-verify", help="Mark each design of the front robust or sensitive.")
     ] = True,
     device: DeviceName = "auto",
     figures: Figures = True,
@@ -266,7 +266,7 @@ def optimize(
                 n_step=n_step,
                 n_total=n_total,
                 in_flight=(1 if in_flight is None else in_flight) if overlap else None,
-                polish_every=polish_every,
+                refine_every=refine_every,
                 initial_designs=initial_designs,
                 on_model_failure=on_model_failure,
                 verify=verify,
@@ -638,7 +638,7 @@ def pick_(
         str | None,
         typer.Option(help="Of the objectives, each as a share of its reference point: position_error=2,torque=1."),
     ] = None,
-    solid: Annotated[bool, typer.Option("--solid", help="Only designs that hold when built 1 mm off.")] = False,
+    robust: Annotated[bool, typer.Option("--robust", help="Only designs that hold when built 1 mm off.")] = False,
     most: Annotated[int, typer.Option("-n", help="So many designs, the best first.")] = 1,
     json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
@@ -650,7 +650,7 @@ def pick_(
         raise SettingsError(f"-n {most}: a whole number from 1 is needed")
     conditions = [read_condition(words) for words in where or ()]
     weighed = None if weights is None else read_weights(weights)
-    history, picked = pick_from(run, conditions, by, weighed, solid)
+    history, picked = pick_from(run, conditions, by, weighed, robust)
     if json_:
         _print_json(
             [
@@ -737,9 +737,9 @@ def polish(
 ) -> None:
     """Tune the lengths and the base of RUN's Pareto designs, and add what became better to the run."""
     from armwright.cli import console as view
-    from armwright.study.refine_run import polish_run
+    from armwright.study.refine_run import refine_run
 
-    polished = polish_run(run, evaluations)
+    polished = refine_run(run, evaluations)
     _figures(run)
     if json_:
         _print_json({"folder": str(run), **polished.summary})
@@ -752,7 +752,7 @@ def verify(
     run: Annotated[Path, typer.Argument(help="A finished run folder.")],
     json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
 ) -> None:
-    """Compute RUN's Pareto designs again, exactly and a little off, and mark each solid or fragile."""
+    """Compute RUN's Pareto designs again, exactly and a little off, and mark each robust or sensitive."""
     from armwright.cli import console as view
     from armwright.report.page import write_report
     from armwright.runs.results import REPORT, verify_run

@@ -21,7 +21,7 @@ from armwright.problem.objectives import (
 from armwright.runs.history import FrontMember, History
 from armwright.runs.results import REPORT, unmet
 from armwright.study.front_run import FrontRun
-from armwright.study.refine_run import Polished
+from armwright.study.refine_run import RefinedRun
 from armwright.study.study import Run
 
 SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
@@ -65,13 +65,13 @@ def show_front(console: Console, history: History, summary: dict[str, Any]) -> N
     if not history.front:
         return
     verified = summary["verification"]
-    console.print(_front_table(history, None if verified is None else set(verified["solid_numbers"])))
+    console.print(_front_table(history, None if verified is None else set(verified["robust_numbers"])))
     if verified is not None:
         console.print(
-            f"verified in float64 and with the base or a link 1 mm off: {verified['solid']} robust, "
-            f"{verified['fragile']} sensitive ({verified['solid_from_any_start']} also robust from other initial "
-            f"postures); hypervolume of the robust designs {verified['hypervolume_of_solid']:.3f}, of all in their "
-            f"worst case {verified['hypervolume_as_built']:.3f}"
+            f"verified in float64 and with the base or a link 1 mm off: {verified['robust']} robust, "
+            f"{verified['sensitive']} sensitive ({verified['robust_from_any_start']} also robust from other initial "
+            f"postures); hypervolume of the robust designs {verified['hypervolume_of_robust']:.3f}, of all in their "
+            f"worst case {verified['hypervolume_worst_case']:.3f}"
         )
 
 
@@ -91,7 +91,7 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     _show_files(console, run.folder, figures)
 
 
-def show_polish(console: Console, polished: Polished) -> None:
+def show_polish(console: Console, polished: RefinedRun) -> None:
     """Print what refinement added to a run."""
     show_front(console, polished.history, polished.summary)
     final = polished.summary["hypervolume"]["final"]

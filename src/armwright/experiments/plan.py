@@ -45,7 +45,7 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     sampler: str = "tpe"
     n_step: Count = 10
     in_flight: Count | None = None
-    polish_every: Count | None = None
+    refine_every: Count | None = None
     model: str | None = None
     base_url: str | None = None
     prompt: str | None = None
@@ -194,7 +194,7 @@ class Cell:
             "n-step": plan.n_step,
             "n-total": self.n_total,
             "in-flight": plan.in_flight,
-            "polish-every": plan.polish_every,
+            "refine-every": plan.refine_every,
         }
         flags = ["--no-figures"] + ["--overlap"] * (plan.in_flight is not None)
         return ["optimize", self.task, *self._options(said), *flags]

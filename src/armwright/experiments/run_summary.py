@@ -126,8 +126,8 @@ def describe_method(config: RunConfig) -> str:
             text += f" {model}"
         if method.n_step != 10:
             text += f" (N_step {method.n_step})"
-    if method.polish_every:
-        text += f" (polish {method.polish_every})"
+    if method.refine_every:
+        text += f" (refine {method.refine_every})"
     if method.n_total != 200:
         text += f" ({method.n_total} trials)"
     return text

@@ -68,7 +68,7 @@ def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
         n_step=plan.n_step,
         n_total=cell.n_total,
         in_flight=plan.in_flight,
-        polish_every=plan.polish_every,
+        refine_every=plan.refine_every,
         seed=cell.seed,
         out=cell.folder,
     )
@@ -93,7 +93,7 @@ def finished_before(cell: Cell) -> Outcome | None:
     try:
         proposer = choose_proposer(plan.wishes(cell.replay)).proposer
         method = study_method(
-            proposer, plan.sampler, cell.n_init, plan.n_step, cell.n_total, plan.in_flight, plan.polish_every
+            proposer, plan.sampler, cell.n_init, plan.n_step, cell.n_total, plan.in_flight, plan.refine_every
         )
         check_same_run(cell.folder, read_config(cell.folder), study_config(_problem(cell), method, cell.seed))
     except ArmwrightError:

@@ -26,7 +26,7 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.best_known import known_front
 from armwright.runs.config import FrontMethod, Method, RunConfig
 from armwright.runs.folder import read_config
-from armwright.runs.history import POLISH, History
+from armwright.runs.history import REFINE, History
 from armwright.runs.results import read_summary
 from armwright.runs.selection import bounded_numbers, numbers_of
 from armwright.runs.trials_file import TrialsReader
@@ -252,7 +252,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "study": None if study is None else study.model_dump(mode="json"),
         "n_init": method.n_init,
         "planned": None if study is None else study.n_trials,
-        "command": repeat_command(config, any(trial.source == POLISH for trial in history), spent),
+        "command": repeat_command(config, any(trial.source == REFINE for trial in history), spent),
         "config": config.model_dump(mode="json"),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
         "colours": {
@@ -300,7 +300,7 @@ def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | No
         "seconds": sum(trial.seconds.get("total", 0.0) for trial in history),
         "evaluations": sum(trial.evaluations for trial in history),
         "infeasible": int((~history.feasible).sum()),
-        "solid": None,
+        "robust": None,
         "cost_usd": None,
         "search": None,
     }
@@ -309,7 +309,7 @@ def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | No
     verification = cast("Mapping[str, Any] | None", summary["verification"])
     proposer = cast("Mapping[str, Any]", summary.get("proposer") or {})
     found["hypervolume"] = summary["hypervolume"]["final"]
-    found["solid"] = None if verification is None else verification["solid_numbers"]
+    found["robust"] = None if verification is None else verification["robust_numbers"]
     found["cost_usd"] = proposer.get("cost_usd")
     if isinstance(config.method, FrontMethod):
         search = summary["search"]

@@ -25,7 +25,7 @@ TASK_FIELDS = (  # fields that distinguish one task from another
 )  # fmt: skip
 
 
-def repeat_command(config: RunConfig, polished: bool = False, spent: int | None = None) -> str:
+def repeat_command(config: RunConfig, refined: bool = False, spent: int | None = None) -> str:
     """Return the shell command that repeats a run, without options at their defaults.
 
     The user's own task, space and initial designs appear as TASK.yaml, SPACE.yaml and DESIGN-1.json; their content is
@@ -33,7 +33,7 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
 
     Args:
         config: The settings of the run.
-        polished: Whether the run was refined afterwards.
+        refined: Whether the run was refined afterwards.
         spent: Evaluations of a direct search.
 
     Returns:
@@ -67,7 +67,7 @@ def repeat_command(config: RunConfig, polished: bool = False, spent: int | None 
     options += ["--robust"] * (config.tolerance > 0.0)
     options += ["--overlap"] * ("in_flight" in given)
     line = shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])
-    return f"{line} && armwright polish RUN" if polished else line
+    return f"{line} && armwright refine RUN" if refined else line
 
 
 def _study_options(method: Method) -> dict[str, Any]:
@@ -80,7 +80,7 @@ def _study_options(method: Method) -> dict[str, Any]:
         "n_step": method.n_step,
         "n_total": method.n_total,
         "in_flight": method.in_flight,
-        "polish_every": method.polish_every,
+        "refine_every": method.refine_every,
     }
 
 

@@ -32,7 +32,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
 
     proposer: its name and settings; None for black-box trials only.
     in_flight: how many questions go on while black-box trials run; None: the study waits for each.
-    polish_every: after so many counted trials the next free one refines a design of the front; None: never.
+    refine_every: after so many counted trials the next free one refines a design of the front; None: never.
     initial_designs: that the first of the n_init trials are, in place of random ones.
     """
 
@@ -42,7 +42,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     n_step: int = Field(ge=1)
     n_total: int = Field(ge=1)
     in_flight: int | None = Field(default=None, ge=1)
-    polish_every: int | None = Field(default=None, ge=1)
+    refine_every: int | None = Field(default=None, ge=1)
     initial_designs: tuple[dict[str, float | str], ...] = ()
 
     @field_validator("proposer")
@@ -129,7 +129,7 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
         """How its study searches; RunFolderError where it is a search for the whole front."""
         if isinstance(self.method, FrontMethod):
             raise RunFolderError(
-                "this run is a search for the whole front, not a study: its front needs no polish, and "
+                "this run is a search for the whole front, not a study: its front needs no refinement, and "
                 "`armwright front` with a larger --budget goes on with it"
             )
         return self.method

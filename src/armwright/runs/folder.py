@@ -88,7 +88,7 @@ class RunFolder:
         if config.method != there.method:  # a larger n_total
             if self._n_trials() > there.study.n_trials:
                 raise RunConflictError(
-                    f"{self.path} was polished, so its study cannot go on; give another --out DIR, or polish it again"
+                    f"{self.path} was refined, so its study cannot go on; give another --out DIR, or refine it again"
                 )
             there = there.model_copy(update={"method": config.method})
             self.write_config(there)

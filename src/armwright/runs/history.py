@@ -28,9 +28,9 @@ from armwright.spaces.parameters import Design
 RANDOM = "random"
 BBO = "bbo"
 INITIAL_DESIGN = "initial_design"  # given by the user, such as an existing arm
-POLISH = "polish"  # a design of the front, refined
+REFINE = "refine"  # a refined design of the front
 FRONT = "front"  # of a search for the whole front
-NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, POLISH, FRONT)
+NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, REFINE, FRONT)
 GROWING = (
     "values",
     "violations",

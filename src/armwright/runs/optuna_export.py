@@ -139,12 +139,12 @@ class _Export:
         return {key: value for key, value in attributes.items() if value is not None}
 
     def _verdicts(self) -> dict[int, str]:
-        """Return "solid" or "fragile" by trial number, for a front that was verified."""
+        """Return "robust" or "sensitive" by trial number, for a front that was verified."""
         summary = read_summary(self.run)
         if summary is None or summary["n_trials"] != len(self.history) or summary["verification"] is None:
             return {}
-        solid = set(summary["verification"]["solid_numbers"])
-        return {member.number: "solid" if member.number in solid else "fragile" for member in self.history.front}
+        robust = set(summary["verification"]["robust_numbers"])
+        return {member.number: "robust" if member.number in robust else "sensitive" for member in self.history.front}
 
     def _trials(self, verdicts: Mapping[int, str]) -> Iterator[FrozenTrial]:
         """Yield the trials of the study.

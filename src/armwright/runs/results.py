@@ -126,7 +126,7 @@ def summarize(
         "verification": _verification_record(history, verification),
         "evaluations": sum(trial.evaluations for trial in history),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
-        "polish": None,
+        "refine": None,
         "credit": {source: asdict(credit) for source, credit in credit_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
         "diagnostics": None if proposer is None else asdict(diagnose(history, proposer.name)),
@@ -165,10 +165,10 @@ def resummarize(
     """The summary of a finished run after trials were added or designs verified; what only its sessions knew stays."""
     if isinstance(config.method, FrontMethod):
         return {**summary, "verification": _verification_record(history, verification)}
-    known = {key: summary[key] for key in ("proposer", "diagnostics", "polish") if key in summary}
+    known = {key: summary[key] for key in ("proposer", "diagnostics", "refine") if key in summary}
     new = summarize(history, config, None, verification) | known
-    if new["polish"] is not None:
-        new["evaluations"] += new["polish"]["in_vain"]
+    if new["refine"] is not None:
+        new["evaluations"] += new["refine"]["in_vain"]
     return new
 
 
@@ -224,28 +224,28 @@ def _standing_record(history: History, found: Array) -> dict[str, Any] | None:
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
-    """How many designs of the front are solid, the hypervolume of these, and that of what a workshop makes of all."""
+    """How many designs of the front are robust, the hypervolume of these, and that of what a workshop makes of all."""
     if verification is None:
         return None
-    solid = [member.number for member, holds in zip(history.front, verification.solid, strict=True) if holds]
+    robust = [member.number for member, holds in zip(history.front, verification.robust, strict=True) if holds]
     reference = history.reference_point or ()
     return {
-        "solid": len(solid),
-        "fragile": len(history.front) - len(solid),
-        "solid_numbers": solid,
-        "hypervolume_of_solid": hypervolume(history.values[solid], reference),
-        "solid_from_any_start": int(verification.from_any_start.sum()),
-        "hypervolume_as_built": hypervolume(verification.as_built, reference),
+        "robust": len(robust),
+        "sensitive": len(history.front) - len(robust),
+        "robust_numbers": robust,
+        "hypervolume_of_robust": hypervolume(history.values[robust], reference),
+        "robust_from_any_start": int(verification.from_any_start.sum()),
+        "hypervolume_worst_case": hypervolume(verification.worst_case, reference),
     }
 
 
 def _verdicts(history: History, verification: Verification | None) -> dict[int, dict[str, Any]]:
-    """For each design of the front: whether it is solid, and its objectives under each disturbance."""
+    """For each design of the front: whether it is robust, and its objectives under each disturbance."""
     if verification is None:
         return {}
     return {
         member.number: {
-            "solid": bool(verification.solid[i]),
+            "robust": bool(verification.robust[i]),
             "from_any_start": bool(verification.from_any_start[i]),
             "exact": _objectives(history, verification.exact[i].tolist()),
             "moved": _objectives(history, verification.moved[i].tolist()),
@@ -261,7 +261,7 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
         return {}
     kinds = ("exact", "moved", "started")
     columns = {f"{name}_{kind}": value for kind in kinds for name, value in verdict[kind].items()}
-    verdict_ = "solid" if verdict["solid"] else "fragile"
+    verdict_ = "robust" if verdict["robust"] else "sensitive"
     return {"verdict": verdict_, "from_any_start": "yes" if verdict["from_any_start"] else "no", **columns}
 
 

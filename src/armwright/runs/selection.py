@@ -87,7 +87,7 @@ def pick(
 
     by: the number that should be small. weights: of the objectives, each divided by its reference point, whose sum
     should be small. Without either, the knee of the front comes first, then what lies nearest to its corner.
-    numbers: only these trials, such as the solid ones.
+    numbers: only these trials, such as the robust ones.
     FailureError where none meets the conditions; SettingsError for a name that does not exist.
 
     Examples:
@@ -133,16 +133,16 @@ def pick_from(
     where: Sequence[Condition] = (),
     by: str | None = None,
     weights: Mapping[str, float] | None = None,
-    solid: bool = False,
+    robust: bool = False,
 ) -> tuple[History, list[FrontMember]]:
-    """The same of a run folder; solid: only designs that hold when they are built a little off."""
+    """The same of a run folder; robust: only designs that hold when they are built a little off."""
     _, history = read_run(run)
     numbers = None
-    if solid and history.front:
+    if robust and history.front:
         verification = (read_summary(run) or {}).get("verification")
         if verification is None:
             raise FailureError(f"{run} is not verified; armwright verify {run} does it")
-        numbers = verification["solid_numbers"]
+        numbers = verification["robust_numbers"]
     return history, pick(history, where, by, weights, numbers)
 
 

@@ -31,12 +31,12 @@ class _Standing(_Record):
 
 
 class _Verification(_Record):
-    solid: Count
-    fragile: Count
-    solid_numbers: list[int]
-    hypervolume_of_solid: float
-    solid_from_any_start: Count
-    hypervolume_as_built: float
+    robust: Count
+    sensitive: Count
+    robust_numbers: list[int]
+    hypervolume_of_robust: float
+    robust_from_any_start: Count
+    hypervolume_worst_case: float
 
 
 class _Credit(_Record):
@@ -84,7 +84,7 @@ class _Diagnostics(_Record):
     black_box: _Habits | None
 
 
-class _Polish(_Record):
+class _Refinement(_Record):
     rounds: Count
     in_vain: Count
 
@@ -121,7 +121,7 @@ class StudySummary(_Summary):
     hypervolume: _Curve
     evaluations: Count
     duplicates: Count
-    polish: _Polish | None
+    refine: _Refinement | None
     credit: dict[str, _Credit]
     proposer: _Proposer | None
     diagnostics: _Diagnostics | None

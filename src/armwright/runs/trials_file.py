@@ -54,7 +54,7 @@ class TrialsReader:
         self._file = 0  # which file it was
 
     def read_on(self) -> bool:
-        """Reads what has come; whether it is another file than before (the run was polished), read from its start."""
+        """Reads what has come; whether it is another file than before (the run was refined), read from its start."""
         try:
             with self._path.open("rb") as file:
                 there = os.fstat(file.fileno())

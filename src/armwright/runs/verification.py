@@ -1,9 +1,9 @@
-"""Which designs of a front are solid: the solver is chaotic in places, so a search collects flukes.
+"""Which designs of a front are robust: the solver is chaotic in places, so a search collects flukes.
 
 Each design is computed again in float64: as it is, with its base or one link off by 1 mm, and from 20 other start
 postures. docs/method.md §10.
 
-Other starts do not make a design fragile: the posture that was found exists, and a controller that knows it can take
+Other starts do not make a design sensitive: the posture that was found exists, and a controller that knows it can take
 it. They say whether the inverse kinematics would find one as good by itself.
 """
 
@@ -36,18 +36,18 @@ class Verification:
     exact: (N, M) in float64.
     moved: (N, M) the worst in float64 with the base or one link off by 1 mm.
     started: (N, M) the worst in float64 from other start postures.
-    solid: (N,) whether neither `exact` nor `moved` is worse than is allowed, or breaks a constraint by more than that.
+    robust: (N,) whether neither `exact` nor `moved` is worse than is allowed, or breaks a constraint by more than that.
     from_any_start: (N,) whether `started` is not, either.
-    as_built: (N, M) the worst of what a workshop makes of them; infinite where that breaks a constraint.
+    worst_case: (N, M) the worst of what a workshop makes of them; infinite where that breaks a constraint.
     """
 
     values: Array
     exact: Array
     moved: Array
     started: Array
-    solid: NDArray[np.bool_]
+    robust: NDArray[np.bool_]
     from_any_start: NDArray[np.bool_]
-    as_built: Array
+    worst_case: Array
 
 
 def verify_front(history: History) -> Verification | None:
@@ -62,7 +62,7 @@ def verify_front(history: History) -> Verification | None:
 def verify(
     problem: Problem, designs: Sequence[Design], values: Array, reference_point: Sequence[float]
 ) -> Verification:
-    """Computes designs again, and says which are solid.
+    """Computes designs again, and says which are robust.
 
     values: (N, M) what the search found.  reference_point: (M,) sets the scale of what is allowed.
     """
@@ -74,10 +74,10 @@ def verify(
     started = worst_case([_outcomes(problem, rows, start) for start in starts])
     worst = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
     built = worst_case([exact, off])
-    solid = np.all(built.values <= worst, axis=1) & np.all(built.violations <= ALLOWED_SHARE, axis=1)
+    robust = np.all(built.values <= worst, axis=1) & np.all(built.violations <= ALLOWED_SHARE, axis=1)
     holds = np.all(started.values <= worst, axis=1) & np.all(started.violations <= ALLOWED_SHARE, axis=1)
     as_built = masked_objectives(np.maximum(values, built.values), built.violations)
-    return Verification(values, exact.values, off.values, started.values, solid, solid & holds, as_built)
+    return Verification(values, exact.values, off.values, started.values, robust, robust & holds, as_built)
 
 
 def _outcomes(problem: Problem, rows: Array, start: Array | None = None) -> Outcomes:

@@ -11,7 +11,7 @@ import moocore
 import numpy as np
 
 from armwright.pareto import hypervolume
-from armwright.runs.history import POLISH, FrontMember, History
+from armwright.runs.history import REFINE, FrontMember, History
 from armwright.search.cma_es import Refined, refine
 from armwright.seeding import REFINING, derived_seed
 from armwright.spaces.parameters import Design
@@ -46,7 +46,7 @@ def next_to_refine(history: History) -> FrontMember:
     """The design that adds most hypervolume, of those that were neither refined yet nor are refined ones."""
     members = worth_refining(history)
     tried = {trial.refines for trial in history}
-    fresh = [m for m in members if m.source != POLISH and m.number not in tried] or members
+    fresh = [m for m in members if m.source != REFINE and m.number not in tried] or members
     values = np.array([member.values for member in members])
     reference = history.reference_point
     assert reference is not None  # what is refined comes after the first random trials

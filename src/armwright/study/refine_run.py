@@ -1,4 +1,4 @@
-"""Polish: the designs of a finished run's front, refined, and added to the run."""
+"""Refine the front of a finished run, and add improved designs to it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.runs.folder import RunFolder, read_run
-from armwright.runs.history import POLISH, FrontMember, History
+from armwright.runs.history import REFINE, FrontMember, History
 from armwright.runs.results import discard_results, read_summary, resummarize, unmet, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
@@ -21,8 +21,8 @@ MOST_EVALUATIONS = 10**9
 
 
 @dataclass(frozen=True)
-class Polished:
-    """What polishing a run came to.
+class RefinedRun:
+    """A refined run.
 
     before, history: without and with the new trials.  tried: how many designs were refined.
     evaluations: spent in all.
@@ -40,8 +40,8 @@ class Polished:
         return len(self.history) - len(self.before)
 
 
-def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
-    """Refines each design of a finished run's front; what became better is added as trials of source `polish`.
+def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
+    """Refines each design of a finished run's front; what became better is added as trials of source `refine`.
 
     evaluations: for each design.  The same call again goes on from the front as it is then.
     """
@@ -58,18 +58,18 @@ def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
         if len(trials) < method.n_trials or summary is None:
             raise RunFolderError(
                 f"{path} is not finished ({len(trials)} of {method.n_trials} trials are there): give the command that "
-                "began it once more, then polish it"
+                "began it once more, then refine it"
             )
         before = History(config.problem, tuple(trials), method.n_init, config.reference_point)
         members = worth_refining(before)
         if not members:
-            raise RunFolderError(f"{path} has no front to polish: {unmet(before)}")
-        earlier = summary.get("polish") or {"rounds": 0, "in_vain": 0}
+            raise RunFolderError(f"{path} has no front to refine: {unmet(before)}")
+        earlier = summary.get("refine") or {"rounds": 0, "in_vain": 0}
         seed = derived_seed(config.seed, REFINING, len(before), earlier["rounds"])
         refined = refine_members(before, members, seed, evaluations)
         found = _trials(before, members, refined)
         in_vain = earlier["in_vain"] + (0 if found else refined.evaluations)
-        summary = {**summary, "polish": {"rounds": earlier["rounds"] + 1, "in_vain": in_vain}}
+        summary = {**summary, "refine": {"rounds": earlier["rounds"] + 1, "in_vain": in_vain}}
         discard_results(path)
         for trial in found:
             folder.append(trial)
@@ -77,13 +77,13 @@ def polish_run(path: str | Path, evaluations: int = EVALUATIONS) -> Polished:
         verification = verify_front(after)
         summary = resummarize(summary, after, config, verification)
         write_results(folder, after, summary, verification)
-    return Polished(before, after, summary, len(members), refined.evaluations)
+    return RefinedRun(before, after, summary, len(members), refined.evaluations)
 
 
 def _trials(history: History, members: Sequence[FrontMember], refined: Refined) -> list[FinishedTrial]:
     """A trial for each design that became better; all evaluations are shared out among these.
 
-    Where none did, the summary tells of the evaluations: under `polish`, and in its sum.
+    Where none did, the summary tells of the evaluations: under `refine`, and in its sum.
     """
     better = np.flatnonzero(refined.improved).tolist()
     designs = history.problem.space.designs(refined.matrix[better])
@@ -91,7 +91,7 @@ def _trials(history: History, members: Sequence[FrontMember], refined: Refined) 
     return [
         FinishedTrial(
             len(history) + k,
-            POLISH,
+            REFINE,
             design,
             tuple(refined.values[i].tolist()),
             violations=tuple(violations[k].tolist()),

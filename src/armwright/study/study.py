@@ -22,7 +22,7 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import Method, RunConfig, record_objectives, versions
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
-from armwright.runs.history import BBO, INITIAL_DESIGN, POLISH, RANDOM, FrontMember, History
+from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, REFINE, FrontMember, History
 from armwright.runs.results import discard_results, read_summary, results_are_there, summarize, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
@@ -122,7 +122,7 @@ def optimize(
     n_step: int = 10,
     n_total: int = 200,
     in_flight: int | None = None,
-    polish_every: int | None = None,
+    refine_every: int | None = None,
     initial_designs: Sequence[Design] = (),
     on_model_failure: str = "stop",
     verify: bool = True,
@@ -137,7 +137,7 @@ def optimize(
     sampler: "tpe", "tpe-multivariate", "nsga2", "gp", "random", or a factory seed -> Optuna sampler.
     n_init random trials come first, then n_total counted ones in blocks of n_step.
     in_flight: how many questions to the proposer go on while black-box trials run; None: the study waits for each.
-    polish_every: after so many counted trials, the next that is free refines a design of the front (`polish.py`).
+    refine_every: after so many counted trials, the next free one refines a design of the front (`search/refine.py`).
     initial_designs: the designs of the first of the n_init trials, such as an existing arm.
     verify: whether the front is verified where results are written (`verification.py`); not with an evaluator.
     workers: processes that evaluate designs in place of this one.
@@ -162,11 +162,11 @@ def optimize(
         proposer = choose_proposer(proposer).proposer
     elif isinstance(proposer, type):
         raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
-    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, polish_every, initial_designs)
+    method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     for design in method.initial_designs:
         problem.space.design(design)  # says what is wrong before anything is begun
-    if problem.evaluator is not None and method.polish_every is not None:
-        raise SettingsError("--polish-every does not go with an evaluator: a refinement takes a thousand evaluations")
+    if problem.evaluator is not None and method.refine_every is not None:
+        raise SettingsError("--refine-every does not go with an evaluator: a refinement takes a thousand evaluations")
     if workers is not None and in_flight is not None:
         raise SettingsError("--overlap does not go with --workers: these go on while a question is asked")
     config = study_config(problem, method, seed)
@@ -422,7 +422,7 @@ class Study:
 
     def _refinement(self, number: int) -> Refinement | None:
         """A design of the front refined, where one is due."""
-        every = self.method.polish_every
+        every = self.method.refine_every
         if every is None:
             return None
         due = (number - self.method.n_init) // every
@@ -437,7 +437,7 @@ class Study:
     def _ask(self, number: int, slot: ProposalSlot | None, refinement: Refinement | None) -> tuple[Any, Design, str]:
         """Optuna's trial with the design to evaluate, and where it comes from."""
         if refinement is not None and refinement.design is not None:
-            return *self.black_box.inject(refinement.design, number, POLISH, None), POLISH
+            return *self.black_box.inject(refinement.design, number, REFINE, None), REFINE
         if slot is not None and slot.proposal is not None:
             assert self.proposer is not None
             source = self.proposer.name
@@ -510,7 +510,7 @@ def study_method(
     n_step: int,
     n_total: int,
     in_flight: int | None,
-    polish_every: int | None,
+    refine_every: int | None,
     initial_designs: Sequence[Design] = (),
 ) -> Method:
     """How `optimize` searches with these arguments; SettingsError where they do not go together."""
@@ -527,7 +527,7 @@ def study_method(
         n_step=whole("n_step", n_step, 1),
         n_total=whole("n_total", n_total, 1),
         in_flight=None if in_flight is None else whole("in_flight", in_flight, 1),
-        polish_every=None if polish_every is None else whole("polish_every", polish_every, 1),
+        refine_every=None if refine_every is None else whole("refine_every", refine_every, 1),
         initial_designs=tuple(dict(design.params) for design in initial_designs),
     )
 

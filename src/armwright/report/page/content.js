@@ -118,7 +118,7 @@ export class Content {
     return all.subarray(target * size, target * size + this._part("joints", i)[0]);
   }
 
-  isSolid(i) { return this.head.result.solid === null ? null : this.head.result.solid.includes(i); }
+  isRobust(i) { return this.head.result.robust === null ? null : this.head.result.robust.includes(i); }
   callsOf(i) {
     const id = this.proposals[i]?.id;
     if (!id) return [];

@@ -65,8 +65,8 @@ export function drawDesign() {
   $("design-box").hidden = i === null;
   if (i === null) return;
   const { head } = content, arm = content.arm(i), posed = postures(i), values = content.values(i);
-  const solid = content.isSolid(i), n = content.targets.length;
-  const verdict = solid === null || !head.front.includes(i) ? "" : solid ? ", solid" : ", fragile";
+  const robust = content.isRobust(i), n = content.targets.length;
+  const verdict = robust === null || !head.front.includes(i) ? "" : robust ? ", robust" : ", sensitive";
   $("design-title").textContent = `#${i} ${content.joints(i)}, ${content.look(i).label}${verdict}`;
   const iteration = head.study && i >= head.n_init ? ` Iteration ${i - head.n_init + 1}.` : "";
   const objectives = head.objectives.map((o, k) => {

@@ -33,8 +33,8 @@ export function drawHeader() {
     facts.push(fact("hypervolume", `${number(result.hypervolume)}${share}`));
     facts.push(fact("reference point", `(${head.reference_point.map((v) => number(v)).join(", ")})`));
   }
-  const solid = result.solid === null ? "" : `, ${result.solid.length} solid`;
-  facts.push(fact("front", `${plural(head.front.length, "design")}${solid}`));
+  const robust = result.robust === null ? "" : `, ${result.robust.length} robust`;
+  facts.push(fact("front", `${plural(head.front.length, "design")}${robust}`));
   if (head.result.infeasible) facts.push(fact("infeasible", `${head.result.infeasible}`));
   for (const [source, n] of Object.entries(result.by_source)) {
     facts.push(fact(head.looks[source].label, `${n}`, head.looks[source].colour));

@@ -59,7 +59,7 @@ function take(buffer) {
     open();
     return;
   }
-  const isAnother = content.n < known || content.head.designs_from === 0; // the run began anew, or was polished
+  const isAnother = content.n < known || content.head.designs_from === 0; // the run began anew, or was refined
   if (isAnother) {
     forget();
     set({ design: Math.min(state.design ?? 0, content.n - 1), compared: null });

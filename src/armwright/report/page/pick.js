@@ -32,7 +32,7 @@ export function openPick(shownContent) {
 }
 
 export function drawPick() {
-  $("pick-solid").parentElement.hidden = content.head.result.solid === null;
+  $("pick-robust").parentElement.hidden = content.head.result.robust === null;
 }
 
 // Shows all of the front again; what was asked for stays in the form.
@@ -119,9 +119,9 @@ function choose() {
   const told = new Map(content.head.front.map((i) => [i, numbersOf(i)]));
   const words = $("pick-words");
   try {
-    const asked = conditions(), solid = $("pick-solid").checked;
+    const asked = conditions(), robust = $("pick-robust").checked;
     const left = content.head.front.filter((i) => (
-      (!solid || content.isSolid(i)) && asked.every(({ name, relation, bound }) => HOLDS[relation](told.get(i).get(name), bound))
+      (!robust || content.isRobust(i)) && asked.every(({ name, relation, bound }) => HOLDS[relation](told.get(i).get(name), bound))
     ));
     const order = ordered(left, told);
     words.classList.toggle("missed", !order.length);
@@ -131,7 +131,7 @@ function choose() {
     }
     show(order);
     $("pick-all").hidden = false;
-    words.textContent = `Design ${order[0]}, of ${plural(order.length, "design")} that ${order.length === 1 ? "meets" : "meet"} it. ${command(asked, solid)}`;
+    words.textContent = `Design ${order[0]}, of ${plural(order.length, "design")} that ${order.length === 1 ? "meets" : "meet"} it. ${command(asked, robust)}`;
     set({ design: order[0] });
   } catch (fault) {
     words.classList.add("missed");
@@ -140,11 +140,11 @@ function choose() {
 }
 
 // The same in a terminal.
-function command(asked, solid) {
+function command(asked, robust) {
   const by = $("pick-by").value;
   const parts = asked.map(({ name, relation, bound }) => `--where "${name}${relation}${bound}"`);
   if (by === WEIGHTS) parts.push(`--weights ${[...weights()].map(([name, weight]) => `${name}=${weight}`).join(",")}`);
   else if (by !== KNEE) parts.push(`--by ${by}`);
-  if (solid) parts.push("--solid");
+  if (robust) parts.push("--robust");
   return `In a terminal: armwright pick RUN ${parts.join(" ")}`.trim();
 }

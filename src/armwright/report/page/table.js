@@ -24,8 +24,8 @@ function columns() {
       key: String(k), name: `${o.label} [${o.unit.replace(" x ", " × ")}]`, value: (i) => content.values(i)[k],
     })),
   ];
-  if (head.result.solid !== null) {
-    made.push({ key: "solid", name: "verdict", text: true, value: (i) => (content.isSolid(i) ? "solid" : "fragile") });
+  if (head.result.robust !== null) {
+    made.push({ key: "robust", name: "verdict", text: true, value: (i) => (content.isRobust(i) ? "robust" : "sensitive") });
   }
   made.push({ key: "joints", name: "joints", text: true, value: (i) => content.joints(i) });
   if (head.parameters.some((p) => p.name === "mount")) {
