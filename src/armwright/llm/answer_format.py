@@ -4,7 +4,7 @@ A line is read only where every word of it is understood; where numbers are mixe
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
@@ -37,6 +37,15 @@ _NAME = re.compile(
     rf"|(?<=[\s;,])[*_`]{{0,3}}(?P<later>{_WORDS}))[ \t*_`]*[:=]",
     re.MULTILINE,
 )
+
+
+def module_lists(names: Collection[str]) -> dict[str, str]:
+    """Return the lists of a space besides joints and links, each with the prefix of its parameters.
+
+    Args:
+        names: of the space's parameters.
+    """
+    return {group: kind for group, kind in LISTS.items() if group not in ("joints", "links") and f"{kind}_1" in names}
 
 
 def designs_in_lines(text: str) -> tuple[int, list[dict[str, Any]]]:

@@ -1,4 +1,4 @@
-"""Past designs as a prompt shows them: docs/method.md §6."""
+"""Past designs as prompts show them (docs/method.md §6)."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.llm.answer import LONGEST_REASON
-from armwright.llm.answer_format import LISTS, NOTHING
+from armwright.llm.answer_format import NOTHING, module_lists
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.miss_reasons import AT_LIMIT, why_missed
 from armwright.robot.arm import GRAVITY
@@ -18,9 +18,9 @@ from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 from armwright.text import one_line
 
-N_PARETO = 5  # members of the front shown
+N_PARETO = 5  # front members shown
 N_RANDOM = 5  # other finished designs shown
-LARGE = 1e6  # from which on numbers are written with an exponent
+LARGE = 1e6  # from which numbers are written with an exponent
 NOISE = 1e-9  # below it a number counts as 0
 
 Record = Mapping[str, Any]
@@ -29,16 +29,23 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Digits:
-    """Decimals that numbers are shown with: three, or more where a problem's own scale is small."""
+    """Numbers of decimals in a prompt: three, or more if the problem's scale is small.
+
+    Attributes:
+        length: of lengths and positions [m].
+        torque: of torques [N m].
+        objectives: of each objective.
+        shares: of each objective that has a value per target.
+    """
 
     length: int
     torque: int
     objectives: tuple[int, ...]
-    shares: tuple[int, ...]  # of those objectives of which each target has a share
+    shares: tuple[int, ...]
 
     @classmethod
     def of(cls, history: History) -> "Digits":
-        """By the space's longest arm, and by the largest objectives so far."""
+        """Derive the decimals from the space's longest arm and the largest objectives so far."""
         space = history.problem.space
         reach = space.max_reach
         weight = space.max_joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
@@ -46,20 +53,22 @@ class Digits:
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres
         objectives = tuple(max(3, _decimals(v)) for v in rough)
-        with_shares = [objective.is_of_targets for objective in history.problem.objectives]
         return cls(
             max(3, _decimals(space.link[1])),
             max(2, _decimals(heaviest / 2)),
             objectives,
-            tuple(decimals for decimals, shared in zip(objectives, with_shares, strict=True) if shared),
+            tuple(n for n, o in zip(objectives, history.problem.objectives, strict=True) if o.is_of_targets),
         )
 
 
 class Feedback:
-    """Members of the front and other finished designs, drawn by `seed`, as text.
+    """A random sample of the front and of the other finished designs, as text.
 
-    front, others: numbers of the trials; of the front by its first objective, else in the order of the run. As long as
-        no design is feasible, what comes nearest to it stands in for the front.
+    Attributes:
+        front: trial numbers of front members, sorted by the first objective; if no design is feasible, those of the
+            designs with the smallest violations.
+        others: trial numbers of other designs, in the order of the run.
+        digits: decimals of all numbers.
     """
 
     def __init__(self, history: History, seed: int) -> None:
@@ -76,10 +85,10 @@ class Feedback:
             self._evaluation = history.evaluation(numbers)
             shares = [o.each(self._evaluation) for o in history.problem.objectives if o.is_of_targets]
             shape = (*self._evaluation.position_error.shape, 0)
-            self._each = np.stack(shares, axis=-1) if shares else np.empty(shape)  # (n, T, those that have shares)
+            self._each = np.stack(shares, axis=-1) if shares else np.empty(shape)  # (n, T, objectives with shares)
 
     def records(self, numbers: Sequence[int], targets: Sequence[int]) -> list[Record]:
-        """For each of these designs its parameters, and what came of it at `targets` (places in the task's list)."""
+        """Return the parameters and results of designs, by trial number, at the targets of these indices."""
         return [self._record(number, list(targets)) for number in numbers]
 
     def _record(self, number: int, shown: list[int]) -> Record:
@@ -96,11 +105,11 @@ class Feedback:
             "limits": _limits(evaluation, row, joints),
             "load": _load(evaluation.motor_torques[row], joints),
             "e_all": vector(self._history.trials[number].values, at.objectives),
-            "broken": _broken(self._history, number),
+            "broken": _violated(self._history, number),
         }
 
     def _missed(self, number: int, row: int, shown: list[int]) -> str:
-        """Why targets are missed, counted as shown; empty for points alone, whose reasons stand in the other lists."""
+        """Explain unreached targets by the numbers shown; empty for positions, which the other lists explain."""
         if not self._evaluation.target_arrays.oriented:
             return ""
         arm = self._history.problem.arm(self._history.trials[number].design)
@@ -109,7 +118,7 @@ class Feedback:
 
 
 def proposal_records(history: History, name: str) -> list[Record]:
-    """The earlier designs of the proposer `name`: what it expected, what came out, and its reason."""
+    """Return the earlier designs of the proposer `name`, with expectations, results and reasons."""
     front = {member.number for member in history.front}
     at = Digits.of(history)
     return [
@@ -117,7 +126,7 @@ def proposal_records(history: History, name: str) -> list[Record]:
             **_parameters(history, trial.number, at.length),
             "expected": "not said" if trial.expected is None else vector(trial.expected, at.objectives),
             "e_all": vector(trial.values, at.objectives),
-            "broken": _broken(history, trial.number),
+            "broken": _violated(history, trial.number),
             "on_front": trial.number in front,
             "reason": one_line(trial.reason, LONGEST_REASON) or "not said",
         }
@@ -127,12 +136,12 @@ def proposal_records(history: History, name: str) -> list[Record]:
 
 
 def points(rows: NDArray[np.float64], decimals: int | Sequence[int] = 3) -> str:
-    """Rows of numbers as text."""
+    """Format an array (N, M) as a list of vectors."""
     return "[" + ", ".join(vector(row, decimals) for row in rows) + "]"
 
 
 def vector(values: Sequence[float] | NDArray[np.float64], decimals: int | Sequence[int] = 3) -> str:
-    """Numbers as text, with so many decimals (each)."""
+    """Format numbers with the given decimals, one number for all or one for each."""
     each = [decimals] * len(values) if isinstance(decimals, int) else decimals
     return "(" + ", ".join(_number(float(value), n) for value, n in zip(values, each, strict=True)) + ")"
 
@@ -144,7 +153,7 @@ def _number(value: float, decimals: int) -> str:
 
 
 def _decimals(scale: float) -> int:
-    """That show three digits of a number of this size."""
+    """Return the decimals that show three digits of a number of this size."""
     return 2 - math.floor(math.log10(scale)) if scale > NOISE else 3
 
 
@@ -159,53 +168,51 @@ def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
     }
 
 
-def _broken(history: History, number: int) -> str:
-    """The constraints that a design does not keep, with what it has instead; empty where the task has none."""
+def _violated(history: History, number: int) -> str:
+    """Describe the violated constraints of a design; empty if the task has no constraints."""
     constraints = history.problem.constraints
-    words = [
+    violated = [
         f"{c.quantity.symbol} = {c.measured(value):.4g}, not {c.relation} {c.bound:.12g}"
         for c, value in zip(constraints, history.trials[number].violations, strict=True)
         if value > 0.0
     ]
-    return ("; ".join(words) or "none") if constraints else ""
+    return ("; ".join(violated) or "none") if constraints else ""
 
 
 def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str, str]]:
-    """What a design has beside base, joints and links, as the lines of an answer: name and value."""
+    """Return a design's mount and lists besides joints and links, as name and value of an answer's lines."""
     names = {parameter.name for parameter in space.parameters}
-    found = [("MOUNT", design.mount)] if design.mount is not None else []
-    for group, kind in LISTS.items():
-        if group in ("joints", "links") or f"{kind}_1" not in names:
-            continue
+    extras = [("MOUNT", design.mount)] if design.mount is not None else []
+    for group, kind in module_lists(names).items():
         values = [design.params.get(f"{kind}_{j}", NOTHING) for j in range(1, len(design.joints) + 1)]
         shown = [value if isinstance(value, str) else f"{value:.{decimals}f}" for value in values]
-        found.append((group.upper(), f"({', '.join(shown)})"))
-    return found
+        extras.append((group.upper(), f"({', '.join(shown)})"))
+    return extras
 
 
 def _joint_labels(history: History, number: int) -> list[str]:
-    """What each joint of a design's arm is called: as its module, of several there each with a letter."""
-    places = history.trials[number].design.module_of_joint
+    """Name each joint after its module, with a letter if the module has several joints."""
+    modules = history.trials[number].design.module_of_joint
     return [
-        f"joint_{place + 1}" + ("" if places.count(place) == 1 else "abc"[places[:j].count(place)])
-        for j, place in enumerate(places)
+        f"joint_{module + 1}" + ("" if modules.count(module) == 1 else "abc"[modules[:j].count(module)])
+        for j, module in enumerate(modules)
     ]
 
 
 def _limits(evaluation: Evaluation, row: int, joints: Sequence[str]) -> str:
-    """Which joints stand at which limit, and at how many of the targets."""
+    """List the joints at their limits, with the number of targets."""
     lower, upper = evaluation.arms.lower[row], evaluation.arms.upper[row]
     q = evaluation.q[row]  # (T, D) [rad] or [m]
-    found: list[str] = []
+    at_limit: list[str] = []
     for j, name in enumerate(joints):
-        for word, stands in (("upper", q[:, j] > upper[j] - AT_LIMIT), ("lower", q[:, j] < lower[j] + AT_LIMIT)):
-            if stands.any():
-                found.append(f"{name} {word} at {int(stands.sum())} of {len(q)}")
-    return ", ".join(found) or "none"
+        for side, reached in (("upper", q[:, j] > upper[j] - AT_LIMIT), ("lower", q[:, j] < lower[j] + AT_LIMIT)):
+            if reached.any():
+                at_limit.append(f"{name} {side} at {int(reached.sum())} of {len(q)}")
+    return ", ".join(at_limit) or "none"
 
 
 def _angles(evaluation: Evaluation, row: int, shown: list[int]) -> str:
-    """By how many degrees the tool is off at targets, "-" where any direction will do; empty where no target asks."""
+    """List the angle errors [deg], "-" for targets without orientation; empty if no target has one."""
     target_arrays = evaluation.target_arrays
     if not target_arrays.oriented:
         return ""
@@ -214,7 +221,7 @@ def _angles(evaluation: Evaluation, row: int, shown: list[int]) -> str:
 
 
 def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:
-    """Each joint's share of the torques' absolute sum over the targets; torques: (T, D) [N m]."""
+    """List each joint's share of the absolute torques (T, D) [N m], summed over the targets."""
     carried = np.abs(torques).sum(axis=0)
     if not carried.any():
         return "no torque at any joint"
@@ -223,8 +230,8 @@ def _load(torques: NDArray[np.float64], joints: Sequence[str]) -> str:
 
 
 def draw_in_order(items: Sequence[T], n: int, rng: np.random.Generator) -> list[T]:
-    """Draw `n` of the items without repetition, in their order; all of them if there are no more."""
+    """Draw `n` items without replacement, in their original order; all of them if there are fewer."""
     if len(items) <= n:
         return list(items)
-    places = rng.choice(len(items), size=n, replace=False)
-    return [items[place] for place in sorted(places.tolist())]
+    indices = rng.choice(len(items), size=n, replace=False)
+    return [items[i] for i in sorted(indices.tolist())]

@@ -1,4 +1,4 @@
-"""Prompts for a language model: their templates (in templates/, or a file), rendered for a search."""
+"""Prompts for a language model, rendered from templates in templates/ or from a file."""
 
 import os
 import re
@@ -23,40 +23,43 @@ from armwright.text import end_of, fence, one_line, without_thoughts
 PROMPTS = ("plus", "minus")
 Memory = Literal["none", "own"]
 MEMORIES: tuple[str, ...] = get_args(Memory)
-Form = Literal["text", "then-schema", "schema"]  # of the answer: free; free, and a second call extracts it; by schema
+Form = Literal["text", "then-schema", "schema"]  # answer: free text; free text and a second call; JSON only
 
-MOST_TOKENS = 12_000  # of a prompt; beyond it fewer targets, designs and earlier proposals are shown
+MOST_TOKENS = 12_000  # longer prompts show fewer targets, designs and earlier proposals
 FEWEST_TARGETS = 4  # shown
 MOST_PROPOSED, FEWEST_PROPOSED = 20, 4  # earlier proposals shown
-LONGEST_ANALYSIS = 40_000  # characters of a free answer that the second call reads; the end counts
+LONGEST_ANALYSIS = 40_000  # characters from the end of a free answer that the second call reads
 LARGEST_TEMPLATE = 256 * 1024  # [bytes]
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """A prompt's name and its Jinja template."""
+    """A prompt's name and its Jinja template.
+
+    Raises:
+        SettingsError: The template is invalid, or names unknown variables or templates.
+    """
 
     name: str
     template: str
 
     def __post_init__(self) -> None:
-        """SettingsError where the template cannot be read."""
         try:
             tree = _sandbox().parse(self.template)
             _sandbox().from_string(self.template)  # filters and tests, too
-        except TemplateSyntaxError as fault:
-            raise SettingsError(f"prompt {self.name}, line {fault.lineno}: {fault.message}") from fault
-        except (RecursionError, SyntaxError) as fault:  # the latter of the Python that jinja makes of it
-            raise SettingsError(f"prompt {self.name} is nested too deeply") from fault
-        except ValueError as fault:  # of Python, by a number of thousands of digits
-            raise SettingsError(f"prompt {self.name} cannot be read: {str(fault)[:80]}") from fault
+        except TemplateSyntaxError as error:
+            raise SettingsError(f"prompt {self.name}, line {error.lineno}: {error.message}") from error
+        except (RecursionError, SyntaxError) as error:  # SyntaxError: of the Python code that Jinja generates
+            raise SettingsError(f"prompt {self.name} is nested too deeply") from error
+        except ValueError as error:  # of Python, for a number of thousands of digits
+            raise SettingsError(f"prompt {self.name} cannot be read: {str(error)[:80]}") from error
         known = {*VARIABLES, *_sandbox().globals, *_exported(tree)}
         for other in set(meta.find_referenced_templates(tree)) - {None}:
-            there = _sandbox().list_templates()
-            if other not in there:
+            templates = _sandbox().list_templates()
+            if other not in templates:
                 raise SettingsError(
                     f'prompt {self.name} uses the template "{other}", which does not exist.'
-                    f"{did_you_mean(str(other), there)} Templates: {', '.join(there)}"
+                    f"{did_you_mean(str(other), templates)} Templates: {', '.join(templates)}"
                 )
             known |= _exported(_sandbox().parse(builtin_template(str(other))))
         for name in sorted(meta.find_undeclared_variables(tree) - known):
@@ -76,18 +79,29 @@ class Prompt:
         form: Form = "then-schema",
         hints: Sequence[str] = (),
     ) -> str:
-        """The prompt for the next design after `history`; which designs it shows is drawn from `seed`.
+        """Return the prompt for the next design.
 
-        memory: "own" shows the earlier proposals of the proposer `name`, too.
-        proposals: how many designs are asked for.
-        hints: what the template makes nothing of stands at the end.
+        Fewer targets, designs and proposals are shown until the prompt has at most about MOST_TOKENS, unless hints and
+        the template itself are longer.
 
-        At most about MOST_TOKENS long, unless hints and a template's own words are longer: of more targets, designs
-        and proposals fewer are shown.
+        Args:
+            history: the finished trials.
+            seed: of the draw of the designs that are shown.
+            memory: "own" also shows the earlier proposals of `name`.
+            name: name of the proposer.
+            proposals: number of designs asked for.
+            form: form of the answer.
+            hints: the user's notes; appended if the template ignores them.
+
+        Raises:
+            SettingsError: The template fails, or renders to nothing.
         """
         proposed = proposal_records(history, name) if memory == "own" else []
         feedback = Feedback(history, seed)
-        common = common_values(history, memory, proposals, form) | {"n_proposed": len(proposed), "hints": _lines(hints)}
+        common = common_values(history, memory, proposals, form) | {
+            "n_proposed": len(proposed),
+            "hints": _visible_hints(hints),
+        }
         most = MOST_TARGETS, max(len(feedback.front), len(feedback.others)), MOST_PROPOSED
         while True:
             text = self._with_hints({**common, **shown_values(history, feedback, proposed, *most)})
@@ -105,28 +119,25 @@ class Prompt:
     def _render(self, values: Mapping[str, Any]) -> str:
         try:
             text = _tidy(render(_sandbox().from_string(self.template), values))
-        except _FAULTS as fault:
-            line = next(
-                (f.lineno for f in reversed(traceback.extract_tb(fault.__traceback__)) if f.filename == "<template>"),
-                None,
-            )
-            where = "" if line is None else f", line {line}"
-            words = one_line(str(fault), 300) or type(fault).__name__
-            raise SettingsError(f"prompt {self.name}{where} cannot be rendered: {words}") from fault
+        except _TEMPLATE_ERRORS as error:
+            lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == "<template>"]
+            line = f", line {lines[-1]}" if lines else ""
+            message = one_line(str(error), 300) or type(error).__name__
+            raise SettingsError(f"prompt {self.name}{line} cannot be rendered: {message}") from error
         if not text.strip():
-            raise SettingsError(f"prompt {self.name} is empty: there would be nothing to answer")
+            raise SettingsError(f"prompt {self.name} is empty")
         return text
 
 
-# What a template can run into.
-_FAULTS = (
+# Errors that a template can cause.
+_TEMPLATE_ERRORS = (
     TemplateError, TypeError, ValueError, ArithmeticError, LookupError, AttributeError, NameError, RecursionError,
     MemoryError
 )  # fmt: skip
 
 
 def load_prompt(name: str | Path) -> Prompt:
-    """The prompt `plus` or `minus`, or the one of a template file."""
+    """Return the prompt `plus` or `minus`, or that of a template file."""
     if str(name) in PROMPTS:
         return _builtin_prompt(str(name))
     path = Path(name)
@@ -138,13 +149,13 @@ def load_prompt(name: str | Path) -> Prompt:
         )
     try:
         if path.stat().st_size > LARGEST_TEMPLATE:
-            raise SettingsError(f"{path} is larger than {LARGEST_TEMPLATE // 1024} KiB; that is no prompt")
+            raise SettingsError(f"{path} is larger than {LARGEST_TEMPLATE // 1024} KiB, the limit for a prompt")
         text = path.read_text(encoding="utf-8-sig")
-    except OSError as fault:
-        raise SettingsError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    except UnicodeDecodeError as fault:
-        raise SettingsError(f"{path} is not a text file in UTF-8") from fault
-    # A file that is called as a prompt of ours must not pass for it.
+    except OSError as error:
+        raise SettingsError(f"cannot read {path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{path} is not a text file in UTF-8") from error
+    # A file called "plus" must not pass for the built-in prompt.
     return Prompt(path.name if path.name not in PROMPTS else f"./{path.name}", text)
 
 
@@ -154,26 +165,26 @@ def _builtin_prompt(name: str) -> Prompt:
 
 
 def builtin_template(name: str) -> str:
-    """The text of a template that comes with armwright."""
+    """Return the text of a built-in template."""
     loader = _sandbox().loader
     assert loader is not None
     return loader.get_source(_sandbox(), name)[0]
 
 
 def whole_template(name: str) -> str:
-    """The template of a prompt as one text to make one's own from: that of `plus` and `minus` with what they extend."""
+    """Return the template of a prompt as one text, with the template that `plus` and `minus` extend."""
     template = load_prompt(name).template
     if name not in PROMPTS:
         return template
     whole = builtin_template("proposal.md.j2")
     for block, content in re.findall(r"{% block (\w+) %}\n(.*?){% endblock %}", template, re.DOTALL):
-        start = f"{{% block {block} %}}\n"
-        whole = whole.replace(start, start + content, 1)
+        opening = f"{{% block {block} %}}\n"
+        whole = whole.replace(opening, opening + content, 1)
     return whole
 
 
 def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expected: bool = False) -> str:
-    """The prompt of the second call: the free answer turned into parameters."""
+    """Return the prompt of the second call, which extracts the parameters from a free answer."""
     values = {
         "parameters": problem.space.parameters,
         "symbols": " and ".join(objective.symbol for objective in problem.objectives),
@@ -185,40 +196,40 @@ def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expe
 
 
 def fenced(answer: str) -> dict[str, str]:
-    """A free answer as material for a second call: without its thoughts, its end alone, and a fence that it lacks."""
+    """Return the end of a free answer, without its thoughts, and a fence that does not occur in it."""
     material = end_of(without_thoughts(answer).strip() or answer, LONGEST_ANALYSIS)
     return {"answer": material, "fence": fence(material)}
 
 
 def rendered(name: str, values: Mapping[str, Any]) -> str:
-    """A template that comes with armwright, with these values."""
+    """Render a built-in template."""
     return _tidy(render(_sandbox().get_template(name), values))
 
 
 def estimated_tokens(text: str) -> int:
-    """About how many tokens a model makes of a text: words in pieces of 5 letters, numbers in pieces of 3 digits."""
+    """Estimate the tokens of a text: one per 5 letters of a word, or 3 digits of a number."""
     return len(re.findall(r"[0-9]{1,3}|[A-Za-z]{1,5}|\S", text))
 
 
-def _lines(hints: Sequence[str]) -> list[str]:
-    """Each hint on one line; one in which nothing is to be seen is left out."""
+def _visible_hints(hints: Sequence[str]) -> list[str]:
+    """Return each hint on one line, without those that have no visible characters."""
     return [line for hint in hints if (line := one_line(hint, LONGEST_HINT))]
 
 
 def _fewer(targets: int, designs: int, proposed: int) -> tuple[int, int, int]:
-    """A step less of everything, targets first."""
+    """Return the next smaller numbers to show; targets are reduced first."""
     if targets > FEWEST_TARGETS:
         return max(FEWEST_TARGETS, 3 * targets // 4), designs, max(FEWEST_PROPOSED, 3 * proposed // 4)
     return targets, max(1, designs - 1), FEWEST_PROPOSED
 
 
 def _tidy(text: str) -> str:
-    """Without blanks at line ends, and without more than one empty line in a row."""
+    """Remove blanks at line ends and repeated empty lines."""
     return re.sub(r"\n{3,}", "\n\n", re.sub(r"[ \t]+\n", "\n", text)).strip() + "\n"
 
 
 def _exported(tree: nodes.Template) -> set[str]:
-    """What a template gives to its blocks, and to those of templates that extend it: macros, and names it sets."""
+    """Return the macros and variables that a template defines for its blocks and its extensions."""
     macros = {node.name for node in tree.find_all(nodes.Macro)}
     return macros | {
         node.target.name for node in tree.body if isinstance(node, nodes.Assign) and isinstance(node.target, nodes.Name)

@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.kinematics.ik import UPDATES
 from armwright.kinematics.paths import UPDATES_OF_STEP
-from armwright.llm.answer_format import LISTS
+from armwright.llm.answer_format import module_lists
 from armwright.llm.feedback import Feedback, Record, points, vector
 from armwright.problem.objectives import (
     OF_CLEARANCE,
@@ -21,8 +21,10 @@ from armwright.problem.objectives import (
     UNREACHED_TARGETS,
     Objective,
 )
+from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
+from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.spaces.tolerance import length_columns
 from armwright.tasks.targets import REACHED, describe_targets
@@ -32,7 +34,7 @@ from armwright.text import one_line
 MOST_TARGETS = 64  # shown
 LONGEST_DESCRIPTION = 2_000  # characters of a task's description
 
-# What a template may use; the answer to `armwright prompt --variables`.
+# Variables of a template, as `armwright prompt --variables` lists them.
 VARIABLES = {
     "space": "the design space: min_joints, max_joints, joint_types, joint_range, origin_x, origin_y, origin_z, "
     "link, mass_note, and all else that a space file can hold",
@@ -89,48 +91,13 @@ VARIABLES = {
 
 def common_values(history: History, memory: str, proposals: int, form: str) -> dict[str, Any]:
     """Return the values that do not depend on how much of a history is shown."""
-    problem, space = history.problem, history.problem.space
-    names = {parameter.name for parameter in space.parameters}
-    turning = [kind for kind in space.joint_types if MODULES[kind].is_revolute]
-    asked = [("MOUNT", "mount")] if "mount" in names else []
-    asked += [
-        (group.upper(), kind)
-        for group, kind in LISTS.items()
-        if group not in ("joints", "links") and f"{kind}_1" in names
-    ]
+    problem = history.problem
     return {
-        "space": space,
-        "n_joints": str(space.max_joints) if space.min_joints == space.max_joints else "D",
-        "turning": turning,
-        "sliding": [kind for kind in space.joint_types if MODULES[kind].is_prismatic],
-        "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
-        "asked": asked,
-        "n_copies": len(length_columns(space)) * 2,
-        "joint_descriptions": JOINT_DESCRIPTIONS,
-        "mount_descriptions": MOUNT_DESCRIPTIONS,
-        "gravity": GRAVITY,
-        "task": problem.task,
-        "description": one_line(problem.task.description, LONGEST_DESCRIPTION),
-        "restricted": [p for p in problem.space.parameters if p.name in dict(problem.space.restrict)],
-        "payload": _payload_words(problem.task),
-        "obstacles": [obstacle.describe() for obstacle in problem.task.obstacles],
-        "collisions": problem.uses(*OF_CLEARANCE),
-        "oriented": problem.task.target_arrays.oriented,
-        "restarts": problem.task.restarts,
-        "moves": _move_words(problem.task) if problem.uses(*OF_MOVES) else "",
-        "move_times": _time_words(problem.task) if problem.uses(*OF_TIME) else "",
-        "workspace": [region.describe() for region in problem.task.workspace]
-        if problem.uses(UNCOVERED_FRACTION)
-        else [],
-        "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.uses(quantity)],
-        "updates_of_step": UPDATES_OF_STEP,
-        "n_targets": len(problem.task.target_positions),
-        "updates": UPDATES,
-        "objectives": [_spoken(objective, problem.task) for objective in problem.objectives],
+        **_space_values(problem.space),
+        **_task_values(problem),
         "constraints": problem.constraints,
-        "n_feasible": int(history.feasible.sum()),
-        "cases": problem.task.cases_description,
         "tolerance": problem.tolerance,
+        "n_feasible": int(history.feasible.sum()),
         "reference_point": history.reference_point,
         "n_finished": len(history),
         "n_front": len(history.front),
@@ -140,8 +107,48 @@ def common_values(history: History, memory: str, proposals: int, form: str) -> d
     }
 
 
-def _spoken(objective: Objective, task: Task) -> Objective:
-    """An objective whose words say what this task's tolerances and weights make of it."""
+def _space_values(space: DesignSpace) -> dict[str, Any]:
+    names = {parameter.name for parameter in space.parameters}
+    lists = [(group.upper(), kind) for group, kind in module_lists(names).items()]
+    return {
+        "space": space,
+        "n_joints": str(space.max_joints) if space.min_joints == space.max_joints else "D",
+        "turning": [kind for kind in space.joint_types if MODULES[kind].is_revolute],
+        "sliding": [kind for kind in space.joint_types if MODULES[kind].is_prismatic],
+        "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
+        "asked": [("MOUNT", "mount"), *lists] if "mount" in names else lists,
+        "n_copies": len(length_columns(space)) * 2,
+        "joint_descriptions": JOINT_DESCRIPTIONS,
+        "mount_descriptions": MOUNT_DESCRIPTIONS,
+        "restricted": [p for p in space.parameters if p.name in dict(space.restrict)],
+    }
+
+
+def _task_values(problem: Problem) -> dict[str, Any]:
+    task = problem.task
+    return {
+        "gravity": GRAVITY,
+        "task": task,
+        "description": one_line(task.description, LONGEST_DESCRIPTION),
+        "payload": _describe_payload(task),
+        "obstacles": [obstacle.describe() for obstacle in task.obstacles],
+        "collisions": problem.uses(*OF_CLEARANCE),
+        "oriented": task.target_arrays.oriented,
+        "restarts": task.restarts,
+        "moves": _describe_moves(task) if problem.uses(*OF_MOVES) else "",
+        "move_times": _describe_times(task) if problem.uses(*OF_TIME) else "",
+        "workspace": [region.describe() for region in task.workspace] if problem.uses(UNCOVERED_FRACTION) else [],
+        "of_the_way": [quantity.symbol for quantity in OF_THE_WAY if problem.uses(quantity)],
+        "updates_of_step": UPDATES_OF_STEP,
+        "n_targets": len(task.target_positions),
+        "updates": UPDATES,
+        "objectives": [_task_specific(objective, task) for objective in problem.objectives],
+        "cases": task.cases_description,
+    }
+
+
+def _task_specific(objective: Objective, task: Task) -> Objective:
+    """Return the objective with a description that mentions the task's tolerances and weights."""
     target_arrays = task.target_arrays
     if objective == UNREACHED_TARGETS and (target_arrays.oriented or np.any(target_arrays.tolerance != REACHED)):
         angle = " or the tool's direction by its angle tolerance" if target_arrays.oriented else ""
@@ -153,8 +160,8 @@ def _spoken(objective: Objective, task: Task) -> Objective:
     return objective
 
 
-def _payload_words(task: Task) -> str:
-    """What the tip carries; empty where that is nothing."""
+def _describe_payload(task: Task) -> str:
+    """Describe the payloads; empty if there are none."""
     payloads = task.payloads
     if not payloads.any():
         return ""
@@ -166,8 +173,8 @@ def _payload_words(task: Task) -> str:
     return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
 
 
-def _move_words(task: Task) -> str:
-    """The straight moves, by numbers of targets; empty where there are none."""
+def _describe_moves(task: Task) -> str:
+    """Describe the straight moves by target numbers; empty if there are none."""
     pairs = task.straight_moves.pairs
     if task.moves == IN_ORDER:
         return "from each target to the next, in the order of the list"
@@ -177,8 +184,8 @@ def _move_words(task: Task) -> str:
     return f"between the targets of these numbers, counted from 1: {listed}{more}" if pairs else ""
 
 
-def _time_words(task: Task) -> str:
-    """How long the moves take; empty where that is not said."""
+def _describe_times(task: Task) -> str:
+    """Describe the durations of the moves; empty if the task states none."""
     times = task.straight_moves.times
     if not times:
         return ""
@@ -197,16 +204,25 @@ def shown_values(
     most_designs: int,
     most_proposed: int,
 ) -> dict[str, Any]:
-    """At most so many targets, designs of the front, other designs, and earlier proposals."""
-    points_, decimals = history.problem.task.target_positions, feedback.digits.length
-    shown = spread(len(points_), most_targets)
-    front = [feedback.front[place] for place in spread(len(feedback.front), most_designs)]
-    others = [feedback.others[place] for place in spread(len(feedback.others), most_designs)]
+    """Return the values that show past designs.
+
+    Args:
+        history: the finished trials.
+        feedback: the designs drawn from them.
+        proposed: records of the proposer's earlier designs.
+        most_targets: number of targets shown, at most.
+        most_designs: number of front members shown, and of other designs, at most.
+        most_proposed: number of earlier proposals shown, at most.
+    """
+    task, decimals = history.problem.task, feedback.digits.length
+    shown = spread(len(task.target_positions), most_targets)
+    front = [feedback.front[i] for i in spread(len(feedback.front), most_designs)]
+    others = [feedback.others[i] for i in spread(len(feedback.others), most_designs)]
     return {
-        "targets": points(points_[shown], decimals),
-        "asks": describe_targets([history.problem.task.target_specs[place] for place in shown]),
-        "target_low": vector(points_.min(axis=0), decimals),
-        "target_high": vector(points_.max(axis=0), decimals),
+        "targets": points(task.target_positions[shown], decimals),
+        "asks": describe_targets([task.target_specs[i] for i in shown]),
+        "target_low": vector(task.target_positions.min(axis=0), decimals),
+        "target_high": vector(task.target_positions.max(axis=0), decimals),
         "n_targets_shown": len(shown),
         "front": feedback.records(front, shown),
         "others": feedback.records(others, shown),
@@ -215,5 +231,5 @@ def shown_values(
 
 
 def spread(n: int, most: int) -> list[int]:
-    """At most `most` of the places 0 … n-1, evenly spread."""
-    return sorted({round(place) for place in np.linspace(0, n - 1, min(n, most))})
+    """Return at most `most` of the indices 0 … n-1, evenly spread."""
+    return sorted({round(i) for i in np.linspace(0, n - 1, min(n, most))})
