@@ -1,7 +1,7 @@
-"""A model's answer turned into designs: the schema it is asked for, and what is taken of what it gives.
+"""A model's answer: its JSON schema, and the designs read from it.
 
-Lenient in form (numbers as text, lower-case joint letters, code fences, thoughts before the answer), strict in
-substance: nothing is guessed, and the design space refuses in its own words.
+Reading is lenient about form (numbers as text, lower-case joint letters, code fences, thoughts before the answer) and
+strict about content: nothing is guessed, and errors are those of the design space.
 """
 
 import json
@@ -14,21 +14,20 @@ from itertools import islice
 from typing import Any, cast
 
 from armwright.exceptions import DesignError
-from armwright.llm.answer_format import designs_in_lines, plain_number, words_of_lists
+from armwright.llm.answer_format import JOINT_NAMES, designs_in_lines, expand_lists, plain_number
 from armwright.problem.problem import Problem
-from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
 from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, exact
 from armwright.text import one_line, without_thoughts
 
-LONGEST_ANSWER = 100_000  # characters; the end counts
-MOST_OBJECTS = 1000  # braces tried in a free answer, from its end
+LONGEST_ANSWER = 100_000  # characters that are read, from the end
+MOST_OBJECTS = 1000  # braces tried as JSON, from the end of a free answer
 LONGEST_REASON = 300  # characters
-LONGEST_VALUE = 60  # characters of a value or a name that a refusal repeats
+LONGEST_VALUE = 60  # characters of a value or a name in an error
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A design, why it was chosen, and the objectives that were expected of it (where that was asked)."""
+    """A design, the reason for it, and the expected objectives if they were asked for."""
 
     design: Design
     reason: str = ""
@@ -36,12 +35,15 @@ class Answer:
 
 
 def answer_schema(problem: Problem, *, reasoning: bool, expected: bool, proposals: int) -> dict[str, Any]:
-    """JSON schema of an answer: one property a parameter, and the reason; of several designs, a list of such.
+    """Return the JSON schema of an answer: one property per parameter and the reason, or a list of such designs.
 
-    reasoning: whether the thoughts come first, in the same answer.
-    expected: whether the objectives that the design is expected to have are asked for.
+    Ranges are described but not enforced: the design space can say what is wrong.
 
-    Ranges are told, not enforced here: the design space refuses in its own words.
+    Args:
+        problem: gives the parameters and the objectives.
+        reasoning: ask for the analysis first, in the same answer.
+        expected: ask for the expected objectives.
+        proposals: number of designs.
     """
     fields: dict[str, Any] = {parameter.name: _property(parameter) for parameter in problem.space.parameters}
     if expected:
@@ -58,21 +60,22 @@ def answer_schema(problem: Problem, *, reasoning: bool, expected: bool, proposal
 
 
 def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 1) -> list[Answer]:
-    """The designs of an answer, the first `proposals` if there are more.
+    """Return the designs of an answer, at most `proposals`.
 
-    DesignError, in the words of the design space, refuses it.
+    Raises:
+        DesignError: A design is invalid.
     """
     content = {key: value for key, value in content.items() if key != "reasoning"}
     if "designs" not in content:
         return [_read(content, problem)]
     designs: Any = content["designs"]
     if not isinstance(designs, list) or not designs:
-        raise DesignError("designs holds no design: a list of objects, one a design, is needed")
+        raise DesignError("designs: expected a list of objects, one per design")
     return _read_all(cast("list[Any]", designs)[:proposals], problem)
 
 
 def written_answers(answers: Sequence[Answer], problem: Problem, reasoning: str = "") -> str:
-    """Answers as JSON that `read_text` reads back to the same."""
+    """Return answers as JSON, which `read_text` reads without loss."""
     designs = [_content(answer, problem) for answer in answers]
     return answer_json(designs[0] if len(designs) == 1 else {"designs": designs}, reasoning)
 
@@ -83,43 +86,44 @@ def answer_json(content: Mapping[str, Any], reasoning: str) -> str:
 
 
 def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
-    """The designs of an answer in free text: what comes last, of JSON objects and of ORIGIN, JOINTS and LINKS lines.
+    """Return the last `proposals` designs of a free answer, from JSON objects or ORIGIN, JOINTS and LINKS lines.
 
-    Of several designs one after the other, the last `proposals`. A JSON object that does not end is refused: what
-    stands before it was not the answer.
+    Raises:
+        DesignError: There is no valid design, or the last JSON object is incomplete; earlier ones were not the answer.
     """
-    with suppress(ValueError, RecursionError):  # JSON and nothing else, such as an answer that was kept
+    with suppress(ValueError, RecursionError):  # JSON only, such as a recorded answer
         content = _decoder.decode(text.strip())
         if isinstance(content, dict):
             return read_answers(cast("dict[str, Any]", content), problem, proposals)
     text = without_thoughts(text)[-LONGEST_ANSWER:]
     names = {"designs", "origin", "joints", "links", *(parameter.name for parameter in problem.space.parameters)}
-    found, broken = _objects(text, names)
-    place, lines = designs_in_lines(text)
-    if broken > max(place, found[-1][0] if found else -1):
-        raise DesignError("the last JSON object is not whole: give one value a parameter, and close its braces")
-    if lines and (not found or place > found[-1][0]):
+    objects, incomplete = _objects(text, names)
+    last_object = objects[-1][0] if objects else -1
+    last_line, lines = designs_in_lines(text)
+    if incomplete > max(last_line, last_object):
+        raise DesignError("the last JSON object is incomplete: give one value per parameter, and close its braces")
+    if last_line > last_object:
         return _read_all(lines[-proposals:], problem)
-    if not found:
+    if not objects:
         raise DesignError(
-            "no design found: give JSON with one value a parameter, or the lines ORIGIN, JOINTS and LINKS"
+            "no design found: give JSON with one value per parameter, or the lines ORIGIN, JOINTS and LINKS"
         )
-    last = found[-1][1]
+    last = objects[-1][1]
     if "designs" in last:
         return read_answers(last, problem, proposals)
-    return _read_all([content for _, content in found if "designs" not in content][-proposals:], problem)
+    return _read_all([content for _, content in objects if "designs" not in content][-proposals:], problem)
 
 
 def without_words_around(text: str) -> str:
-    """The last JSON object of a text, as it is written there; the text itself where it holds none."""
+    """Return the last JSON object of a text as it is written there, or the text if it holds none."""
     text = text[-LONGEST_ANSWER:]
-    found, end = text, 0
+    last, end = text, 0
     for brace in islice(re.finditer(r"\{", text), MOST_OBJECTS):
         if brace.start() >= end:
             with suppress(ValueError, RecursionError):
                 _, end = _decoder.raw_decode(text, brace.start())
-                found = text[brace.start() : end]
-    return found
+                last = text[brace.start() : end]
+    return last
 
 
 def _property(parameter: Parameter) -> dict[str, Any]:
@@ -145,32 +149,32 @@ def object_schema(fields: Mapping[str, Any], required: Sequence[str] | None = No
 
 
 def _read_all(designs: Sequence[Any], problem: Problem) -> list[Answer]:
-    """Each design; of several, a refusal says which."""
+    """Read each design; if there are several, errors name the design."""
     answers: list[Answer] = []
     for number, design in enumerate(designs, start=1):
         try:
             if not isinstance(design, Mapping):
-                raise DesignError("not an object with one value a parameter")
+                raise DesignError("expected an object with one value per parameter")
             answers.append(_read(cast("Mapping[str, Any]", design), problem))
-        except DesignError as refusal:
+        except DesignError as error:
             if len(designs) == 1:
                 raise
-            raise DesignError(f"design {number}: {refusal}") from refusal
+            raise DesignError(f"design {number}: {error}") from error
     return answers
 
 
 def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
-    content = words_of_lists({one_line(str(key), LONGEST_VALUE).lower(): value for key, value in content.items()})
+    content = expand_lists({one_line(str(key), LONGEST_VALUE).lower(): value for key, value in content.items()})
     reason = one_line(_as_text(content.pop("reason", None) or ""), LONGEST_REASON)
     names = [f"expected_{objective.name}" for objective in problem.objectives]
-    together: Any = content.pop("expected", None)
-    if isinstance(together, (list, tuple)) and len(cast("list[Any]", together)) == len(names):
-        content |= dict(zip(names, cast("list[Any]", together), strict=True))
+    values: Any = content.pop("expected", None)  # a list in place of the single values
+    if isinstance(values, (list, tuple)) and len(cast("list[Any]", values)) == len(names):
+        content |= dict(zip(names, cast("list[Any]", values), strict=True))
     expected = [_number(content.pop(name, None)) for name in names]
     kinds = {parameter.name: parameter for parameter in problem.space.parameters}
     params = {name: _value(kinds.get(name), value) for name, value in content.items()}
     n_joints = kinds.get("n_joints")
-    if n_joints is not None and "n_joints" not in params:  # lists say it by their length
+    if n_joints is not None and "n_joints" not in params:  # given by the length of a list
         params["n_joints"] = str(sum(name.startswith("joint_") for name in params))
     design = problem.space.design(params)
     known = [value for value in expected if isinstance(value, float) and math.isfinite(value)]
@@ -178,20 +182,19 @@ def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
 
 
 def _value(parameter: Parameter | None, value: Any) -> Any:
-    """The value as the design space wants it, where only its form differs."""
+    """Return the value in the form that the design space expects, or the value itself."""
     if isinstance(parameter, CategoricalParameter):
-        counted = isinstance(value, int) and not isinstance(value, bool)
-        word = str(value).strip().strip("'\"").lower() if counted or isinstance(value, str) else None
-        spoken = {kind: words.partition(",")[0] for kind, words in JOINT_DESCRIPTIONS.items()}
+        is_text = isinstance(value, (str, int)) and not isinstance(value, bool)
+        word = str(value).strip().strip("'\"").lower() if is_text else ""
         for choice in parameter.choices:
-            if word in (choice.lower(), spoken.get(choice)):  # pyright: ignore[reportArgumentType, reportCallIssue]
+            if word == choice.lower() or JOINT_NAMES.get(word) == choice:
                 return choice
         return _short(value)
     return _number(value, "" if parameter is None else parameter.unit)
 
 
 def _number(value: Any, unit: str = "") -> Any:
-    """A number that was written as text (`"0.25"`, `"0.25 m"`), else the value itself."""
+    """Return the number of a text (`"0.25"`, `"0.25 m"`), or the value itself."""
     if isinstance(value, int) and not isinstance(value, bool):
         try:
             return float(value)
@@ -204,10 +207,10 @@ def _number(value: Any, unit: str = "") -> Any:
 
 
 def _short(value: Any) -> Any:
-    """A value that will be refused, so that the refusal is one line."""
-    words = _as_text(value)
-    short = one_line(words, LONGEST_VALUE)
-    return value if short == words else short
+    """Shorten a value that will be refused, so that the error fits on one line."""
+    text = _as_text(value)
+    short = one_line(text, LONGEST_VALUE)
+    return value if short == text else short
 
 
 def _as_text(value: Any) -> str:
@@ -224,8 +227,8 @@ def _content(answer: Answer, problem: Problem) -> dict[str, Any]:
     return {**content, "reason": answer.reason}
 
 
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object; a name that stands there twice with two values is refused later, as neither of them."""
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object. A repeated name gets a value that the design space refuses."""
     content: dict[str, Any] = {}
     for name, value in pairs:
         if name in content and content[name] != value:
@@ -234,27 +237,27 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return content
 
 
-_decoder = json.JSONDecoder(object_pairs_hook=_once)
+_decoder = json.JSONDecoder(object_pairs_hook=_without_repeats)
 
 
 def _objects(text: str, names: set[str]) -> tuple[list[tuple[int, dict[str, Any]]], int]:
-    """The outermost JSON objects that hold one of `names`, with their places; and the place of a broken one, or -1."""
-    # Commas too many and comments are common; blanks keep the places.
+    """Return the outermost JSON objects that have one of `names`, and the position of an incomplete one or -1."""
+    # Trailing commas and comments are common; blanks in their place keep the positions.
     text = re.sub(r'//[^"\n]*$', lambda comment: " " * len(comment[0]), text, flags=re.MULTILINE)
     text = re.sub(r",(?=\s*[}\]])", " ", text)
     braces = [match.start() for match in re.finditer(r'\{\s*"', text)][-MOST_OBJECTS:]
-    found: list[tuple[int, dict[str, Any]]] = []
-    end, broken = 0, -1
-    for place in braces:
-        if place < end:
+    objects: list[tuple[int, dict[str, Any]]] = []
+    end, incomplete = 0, -1
+    for position in braces:
+        if position < end:
             continue
         try:
-            content, end = _decoder.raw_decode(text, place)
+            content, end = _decoder.raw_decode(text, position)
         except (ValueError, RecursionError):
-            start = text[place : place + 200].lower()
-            if any(f'"{name}"' in start for name in names):
-                broken = place
+            beginning = text[position : position + 200].lower()
+            if any(f'"{name}"' in beginning for name in names):
+                incomplete = position
             continue
         if names & {str(name).lower() for name in content}:
-            found.append((place, content))
-    return found, broken
+            objects.append((position, content))
+    return objects, incomplete

@@ -1,6 +1,6 @@
-"""Designs written as lines: ORIGIN, JOINTS, LINKS and more, as a prompt asks for them in free text.
+"""The line format of free answers: ORIGIN, JOINTS, LINKS and more.
 
-A line is read only where every word of it is understood; where numbers are mixed with other words, it is no value.
+A line is read only if all of it is understood; numbers mixed with other words are no value.
 """
 
 import re
@@ -10,13 +10,14 @@ from typing import Any
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
 
 AXES = ("x", "y", "z")
-LISTS = {  # a value for each module, and what its parameters are called
+LISTS = {  # lists with a value per module, and the prefix of their parameters
     "joints": "joint", "links": "link", "motors": "motor", "directions": "direction", "strokes": "stroke",
     "ranges": "limit",
 }  # fmt: skip
 GROUPS = ("origin", "mount", *LISTS)
-NOTHING = "-"  # stands in a list where a module has no such value
-LONGEST_LINE = 2000  # characters; a longer one holds no values
+NOTHING = "-"  # in a list, for a module without such a value
+JOINT_NAMES = {words.partition(",")[0]: kind for kind, words in JOINT_DESCRIPTIONS.items()}  # "yaw": "Y"
+LONGEST_LINE = 2000  # characters; longer lines are ignored
 
 _MINUS = str.maketrans({"−": "-", "﹣": "-", "-": "-", "＋": "+"})
 _NUMBER = r"(?<![\w.])[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|(?:nan|inf(?:inity)?)(?![A-Za-z]))"
@@ -28,10 +29,10 @@ _NAMES_ALONE = re.compile(
 )
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
-_LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # what may stand between values
+_LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # allowed between values
 
 _WORDS = "|".join([*(group.upper() for group in GROUPS), "EXPECTED", "REASON"])
-# At the beginning of a line in any form of list or emphasis; in capitals, also further on in it.
+# At the start of a line with any list marker or emphasis; in capitals also within the line.
 _NAME = re.compile(
     rf"(?:^[ \t>*_#`|•–-]{{0,20}}(?:\d+[.)] ?)?[*_`]{{0,3}}(?P<first>(?i:{_WORDS}))"
     rf"|(?<=[\s;,])[*_`]{{0,3}}(?P<later>{_WORDS}))[ \t*_`]*[:=]",
@@ -49,68 +50,66 @@ def module_lists(names: Collection[str]) -> dict[str, str]:
 
 
 def designs_in_lines(text: str) -> tuple[int, list[dict[str, Any]]]:
-    """The parameters of each design in the order of the text, and where the last one begins, or -1.
+    """Return the position of the last design or -1, and the parameters of each design in order.
 
-    A design begins with its ORIGIN, so that one that was not finished is not filled up from another.
+    A design begins with its ORIGIN, so that an unfinished one takes no values from another.
     """
     designs: list[dict[str, Any]] = []
     last = -1
-    for place, name, words in _named(text):
-        values = _values(name, words) if len(words) <= LONGEST_LINE else None
+    for position, name, line in _named_lines(text):
+        values = _values(name, line) if len(line) <= LONGEST_LINE else None
         if values is None:
             continue
         if name == "origin":
             designs.append({})
-            last = place
+            last = position
         if designs:
             for key, value in values.items():
                 before = designs[-1].setdefault(key, value)
-                if repr(before) != repr(value) and name in GROUPS:  # neither of the two, then
+                if repr(before) != repr(value) and name in GROUPS:  # contradictory: refused later
                     designs[-1][key] = f"{before} and {value}"
     return last, designs
 
 
-def words_of_lists(content: Mapping[str, Any]) -> dict[str, Any]:
-    """An object's values by parameter, where some are given together: "origin": [0, 0.1, 0], "joints": "YPRP"."""
+def expand_lists(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an object's values by parameter; groups may be lists or text, as in "origin": [0, 0.1, 0]."""
     values: dict[str, Any] = {}
     for name, value in content.items():
         if name in GROUPS and isinstance(value, str):
             values.update(_values(name, value) or {name: value})
         elif name in GROUPS and isinstance(value, (list, tuple)):
             items: list[Any] = list(value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-            values.update(
-                {_parameter(name, place): item for place, item in enumerate(items) if item not in (None, NOTHING)}
-            )
+            values.update({_parameter(name, i): item for i, item in enumerate(items) if item not in (None, NOTHING)})
         else:
             values[name] = value
     return values
 
 
 def plain_number(text: str, unit: str = "") -> float | None:
-    """The number that a text is, with or without its unit; None where it is anything else."""
+    """Return the number that a text consists of, with or without its unit; None for any other text."""
     text = text.strip().translate(_MINUS).removesuffix(unit).strip()
     return float(text) if _PLAIN.fullmatch(text) else None
 
 
-def _named(text: str) -> Iterator[tuple[int, str, str]]:
-    """Each name with its place and the words after it: of its line, or of the next where its own has none."""
+def _named_lines(text: str) -> Iterator[tuple[int, str, str]]:
+    """Yield each name with its position and the rest of its line, or the next line if there is no rest."""
     names = list(_NAME.finditer(text))
     ends = [*(match.start() for match in names[1:]), len(text)]
-    for match, end in zip(names, ends, strict=False):  # without a name there is one end too many
+    for match, end in zip(names, ends, strict=False):  # without names there is one end too many
         lines = text[match.end() : end].lstrip(" \t*_`").lstrip("\n").splitlines()
         yield match.start(), (match["first"] or match["later"]).lower(), lines[0] if lines else ""
 
 
 def _values(name: str, words: str) -> dict[str, Any] | None:
-    """The values by parameter; None for words that are no values."""
+    """Return the values of a line by parameter; None if it holds no values."""
     if name == "reason":
         return {"reason": words.strip(" \t*_`")}
     words = _LATEX.sub(" ", words.translate(_MINUS))
     if name == "joints":
         return _joints(words)
     if name == "mount":
-        found = re.findall(r"[A-Za-z]+(?:[-+][xy])?", words)
-        return {"mount": found[0].lower()} if len(found) == 1 else None
+        mounts = re.findall(r"[A-Za-z]+(?:[-+][xy])?", words)
+        return {"mount": mounts[0].lower()} if len(mounts) == 1 else None
     if name == "motors":
         names = re.findall(
             r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*", _spaced(re.sub(r"motor_\d+\s*[:=]", "", words))
@@ -132,46 +131,43 @@ def _values(name: str, words: str) -> dict[str, Any] | None:
         words = re.sub(r"(?<!\S)-(?!\S)", "nan", _spaced(words))
     if name == "expected":
         words = re.sub(r"[A-Za-z]\w*\s*[:=]", "", words)
-    found = _ITEM.findall(words)
-    if not found or not _LEFT_OVER.fullmatch(_ITEM.sub("", words)):
+    items = _ITEM.findall(words)
+    if not items or not _LEFT_OVER.fullmatch(_ITEM.sub("", words)):
         return None
     if name == "expected":
-        return {"expected": [float(number) for number, _ in found]}
+        return {"expected": [float(number) for number, _ in items]}
     if name in ("strokes", "ranges"):
-        return _listed(name, [NOTHING if number == "nan" else _with_unit(number, unit) for number, unit in found])
-    return {_parameter(name, place): _with_unit(*item) for place, item in enumerate(found)}
+        return _listed(name, [NOTHING if number == "nan" else _with_unit(number, unit) for number, unit in items])
+    return {_parameter(name, i): _with_unit(*item) for i, item in enumerate(items)}
 
 
 def _spaced(words: str) -> str:
-    """With blanks around what separates the values of a list."""
+    """Replace the separators of a list by blanks."""
     return re.sub(r"[,;|()\[\]{}]", " ", words)
 
 
 def _listed(group: str, values: Sequence[Any]) -> dict[str, Any] | None:
-    """The values by parameter, those left out that a module does not have."""
-    listed = {_parameter(group, place): value for place, value in enumerate(values) if value != NOTHING}
-    return listed or None
+    """Return the values of a list by parameter; None if there are none."""
+    return {_parameter(group, i): value for i, value in enumerate(values) if value != NOTHING} or None
 
 
 def _joints(words: str) -> dict[str, Any] | None:
-    spoken = {kind.lower(): kind for kind in JOINT_DESCRIPTIONS} | {
-        w.partition(",")[0]: k for k, w in JOINT_DESCRIPTIONS.items()
-    }
+    kinds = {kind.lower(): kind for kind in JOINT_DESCRIPTIONS} | JOINT_NAMES
     words = re.sub(r"joint_\d+\s*[:=]", "", _NAMES_ALONE.sub("", words))
-    words = re.sub(rf"\b([A-Za-z])\s*\((?:{'|'.join(spoken)})\)", r"\1", words, flags=re.IGNORECASE)  # Y (yaw)
+    words = re.sub(rf"\b([A-Za-z])\s*\((?:{'|'.join(kinds)})\)", r"\1", words, flags=re.IGNORECASE)  # Y (yaw)
     words = _in_brackets(words, r"[A-Za-z]")
     types = re.findall(r"[A-Za-z]+", words)
-    if len(types) == 1 and (types[0].isupper() or not set(types[0].lower()) - spoken.keys()):
+    if len(types) == 1 and (types[0].isupper() or not set(types[0].lower()) - kinds.keys()):
         types = list(types[0])  # YPRP as one word
     if not types or not re.fullmatch(r"[\s,;|()\[\]{}$*_`\"'.>–-]*", re.sub(r"[A-Za-z]+", "", words)):
         return None
-    if any(len(kind) > 1 and kind.lower() not in spoken for kind in types):
+    if any(len(kind) > 1 and kind.lower() not in kinds for kind in types):
         return None
-    return {_parameter("joints", place): spoken.get(kind.lower(), kind) for place, kind in enumerate(types)}
+    return {_parameter("joints", i): kinds.get(kind.lower(), kind) for i, kind in enumerate(types)}
 
 
 def _in_brackets(words: str, value: str) -> str:
-    """What the only brackets with a value in them hold, else all without the brackets that hold none."""
+    """Return the content of the only brackets with a value, or the text without brackets that hold none."""
     groups: list[str] = _BRACKETS.findall(words)
     with_values = [group for group in groups if re.search(value, group, re.IGNORECASE)]
     if len(with_values) == 1:
@@ -183,7 +179,7 @@ def _with_unit(number: str, unit: str) -> float | str:
     return float(number) if unit in ("", "m", "rad") else f"{number} {unit}"
 
 
-def _parameter(group: str, place: int) -> str:
-    if group == "origin":
-        return f"origin_{AXES[place]}" if place < len(AXES) else f"origin_{place + 1}"
-    return f"{LISTS.get(group, group)}_{place + 1}"
+def _parameter(group: str, index: int) -> str:
+    if group == "origin" and index < len(AXES):
+        return f"origin_{AXES[index]}"
+    return f"{LISTS.get(group, group)}_{index + 1}"
