@@ -1,13 +1,11 @@
-"""Figures of a comparison: those of the paper, and further ones that tell methods apart."""
+"""Figures of a comparison: those of the paper, times to target and attainment surfaces."""
 
 import math
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import moocore
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -16,23 +14,19 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.run_summary import RunSummary
-from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.report.arm_figures import draw_arm, frame
-from armwright.report.drawing import one_panel, several_panels, write_drawn
-from armwright.report.figures import axis_label, draw_samples
+from armwright.report.attainment import draw_attainment
+from armwright.report.drawing import front_steps, legend_below, method_handle, one_panel, several_panels, write_drawn
+from armwright.report.figures import draw_samples, label_axes
+from armwright.report.reason_figures import draw_reasons
 from armwright.report.style import FRONT, MISSED, TARGET, line, look
-from armwright.runs.config import RunConfig
-from armwright.runs.history import BBO, RANDOM, History
+from armwright.runs.history import BBO, RANDOM
 from armwright.runs.results import FIGURES
 
 MOST_SHOWN = 12  # most tasks in the figure of targets
 COLUMNS = 3  # panels side by side
 MARKERS = 5  # markers on a curve
-LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
-STEPS = ("reasoning", "answer", "parameters")  # transcript steps that contain a model's reasons, the best first
-LONGEST_REASONING = 5_200  # characters; longer text loses its middle
-LINE_LENGTH = 104  # characters
 
 
 @dataclass(frozen=True)
@@ -93,7 +87,7 @@ def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[s
         for i, number in enumerate(dict.fromkeys(solutions or ()), start=1):
             title = f"{task}, {shown}, seed {runs[0].seed}: Solution {i}"
             yield f"solution-{i}-{task}", draw_arm(history, title, history.member(number))
-        reasons = _reasons(runs[0], history, solutions)
+        reasons = draw_reasons(runs[0], history, solutions)
         if reasons is not None:
             yield f"reasoning-{task}", reasons
 
@@ -137,8 +131,7 @@ def draw_area(comparison: Comparison) -> Figure:
     inside = values[[n for n in front_indices(kept) if np.all(values[n] < reference[:2])]]
     axes.scatter(*values.T, s=12, color="#9A9A9A", label="designs")
     if len(inside):
-        x = [inside[0, 0], *inside[:, 0], reference[0]]
-        y = [reference[1], *inside[:, 1], inside[-1, 1]]
+        x, y = front_steps(inside, reference)
         axes.fill_between(
             x,
             y,
@@ -157,7 +150,7 @@ def draw_area(comparison: Comparison) -> Figure:
     axes.annotate("reference point", reference[:2], xytext=(-4, 5), textcoords="offset points", ha="right")
     axes.set_xlim(0, 1.15 * reference[0])
     axes.set_ylim(0, 1.15 * reference[1])
-    _name_axes(axes, config)
+    label_axes(axes, config)
     area = hypervolume(history.masked_objectives[: config.study.n_trials], reference)
     axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
     axes.legend(loc="lower left")
@@ -192,47 +185,14 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
         axes.set_xlim(left=0)
     for axes in panels[:: _columns(comparison.tasks)]:
         axes.set_ylabel("Hypervolume")
-    handles = [_handle(comparison, method) for method in methods]
+    handles = [method_handle(comparison, method) for method in methods]
     if any(comparison.best_known(task) is not None for task in comparison.tasks):
         handles.append(Line2D([], [], color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label="best known"))
-    _legend(figure, handles)
+    legend_below(figure, handles)
     seeds = {len(comparison.runs_of(method, task)) for method in methods for task in comparison.tasks} - {0}
     runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
     caption = f"mean and standard deviation of {runs} runs"
     figure.suptitle(f"{title}: {caption}" if title else caption.capitalize(), fontsize=10)
-    return figure
-
-
-def draw_attainment(comparison: Comparison, task: str) -> Figure:
-    """Draw empirical attainment surfaces: attained by half of a method's runs, by at least one and by all."""
-    figure, axes = one_panel(5.2, 4.2)
-    reference = comparison.reference_point(task)
-    handles: list[Any] = []
-    for method in comparison.methods:
-        runs = comparison.runs_of(method, task)
-        if not runs:
-            continue
-        fronts = [_front(run) for run in runs]
-        sets = np.concatenate([np.full(len(front), i) for i, front in enumerate(fronts)])
-        points = np.vstack(fronts)
-        if not len(points):
-            continue
-        style = line(comparison.methods.index(method))
-        least, median, most = (
-            _stairs(moocore.eaf(points, sets=sets, percentiles=[share]), reference)
-            for share in (100 / len(fronts), 50, 100)
-        )
-        grid = np.unique(np.concatenate([least[0], median[0], most[0]]))
-        low, high = (_at(grid, *stairs) for stairs in (least, most))
-        axes.fill_between(grid, low, high, step="post", color=style.colour, alpha=0.13, linewidth=0)
-        axes.step(*median, where="post", color=style.colour, linestyle=style.pattern, linewidth=1.5)
-        handles.append(_handle(comparison, method, marked=False))
-    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
-    axes.set_xlim(0, 1.1 * reference[0])
-    axes.set_ylim(0, 1.1 * reference[1])
-    _name_axes(axes, next(run for run in comparison.runs if run.task == task).config)
-    axes.set_title(f"{task}: attained by half of the runs (lines), by one and by all (areas)")
-    _legend(figure, handles)
     return figure
 
 
@@ -257,7 +217,7 @@ def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     panels[0].set_ylabel("Runs that reached it")
-    _legend(figure, [_handle(comparison, method, marked=False) for method in methods])
+    legend_below(figure, [method_handle(comparison, method, with_marker=False) for method in methods])
     return figure
 
 
@@ -274,17 +234,7 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
     for row, (task, method) in enumerate(pairs):
         left = 0.0
         for source, share in _gained_shares(comparison.runs_of(method, task)).items():
-            style = look(source)
-            axes.barh(
-                row,
-                share,
-                left=left,
-                height=0.7,
-                facecolor=style.colour,
-                hatch=style.hatch,
-                edgecolor="white",
-                linewidth=0,
-            )
+            axes.barh(row, share, left=left, height=0.7, linewidth=0, **look(source).fill)
             left += share
             sources[source] = None
     axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.label(method)}" for task, method in pairs])
@@ -293,10 +243,7 @@ def draw_credit_shares(comparison: Comparison) -> Figure:
     axes.xaxis.set_major_formatter(PercentFormatter(1.0))
     axes.set_xlabel("Share of the final hypervolume by source")
     axes.grid(axis="y", visible=False)
-    patches = [
-        Patch(facecolor=look(s).colour, hatch=look(s).hatch, edgecolor="white", label=look(s).label) for s in sources
-    ]
-    _legend(figure, patches)
+    legend_below(figure, [Patch(label=look(source).label, **look(source).fill) for source in sources])
     return figure
 
 
@@ -306,88 +253,6 @@ def _gained_shares(runs: Sequence[RunSummary]) -> Mapping[str, float]:
         for source, share in run.gained.items():
             gained.setdefault(source, []).append(share)
     return {source: sum(shares) / len(runs) for source, shares in gained.items() if shares}
-
-
-def _reasons(run: RunSummary, history: History, solutions: tuple[int, int] | None) -> Figure | None:
-    """Draw the reasons given for Solution 1, or for the proposal on the front that is nearest to it."""
-    if solutions is None or not run.proposer:
-        return None
-    proposed = [member.number for member in history.front if history.trials[member.number].proposal is not None]
-    within = [n for n in proposed if history.values[n, 0] >= history.values[solutions[0], 0]]
-    if not within:
-        return None
-    number = within[0]
-    trial = history.trials[number]
-    calls = Transcript(run.folder / TRANSCRIPTS, read_only=True).calls
-    call = _reasoned_call([call for call in calls if call.proposal == trial.proposal and call.fault is None])
-    text = call.answer if call is not None else trial.reason
-    if not text.strip():
-        return None
-    who = "the built-in rules" if call is None else f"{call.model} ({call.origin})"
-    which = "Solution 1" if number == solutions[0] else "the proposal on the front that is nearest to Solution 1"
-    head = f"{run.task}, {run.method}, seed {run.seed}: why #{number}, {which}, was proposed by {who}"
-    return _draw_text(head, _shortened(text))
-
-
-def _reasoned_call(calls: Sequence[Call]) -> Call | None:
-    return next((call for step in STEPS for call in calls if call.step == step), None)
-
-
-def _shortened(text: str) -> str:
-    if len(text) <= LONGEST_REASONING:
-        return text
-    half = LONGEST_REASONING // 2
-    return f"{text[:half].rstrip()}\n\n[… {len(text) - 2 * half:,} characters …]\n\n{text[-half:].lstrip()}"
-
-
-def _draw_text(head: str, text: str) -> Figure:
-    """Draw plain text as a figure; markup is not interpreted."""
-    plain = "".join(c for c in text if c.isprintable() or c == "\n")
-    lines = [part for whole in plain.splitlines() for part in textwrap.wrap(whole, LINE_LENGTH) or [""]]
-    height = 0.7 + 0.148 * len(lines)
-    figure = Figure(figsize=(8.0, height))
-    figure.text(
-        0.02, 1 - 0.15 / height, textwrap.fill(head, 110), va="top", fontsize=9, weight="bold", parse_math=False
-    )
-    figure.text(
-        0.02,
-        1 - 0.5 / height,
-        "\n".join(lines),
-        va="top",
-        fontsize=7.5,
-        family="monospace",
-        parse_math=False,
-        linespacing=1.2,
-    )
-    return figure
-
-
-def _name_axes(axes: Any, config: RunConfig) -> None:
-    axes.set_xlabel(axis_label(config.objectives[0], config.space))
-    axes.set_ylabel(axis_label(config.objectives[1], config.space))
-
-
-def _front(run: RunSummary) -> np.ndarray:
-    """Return the front of a run in the first two objectives, (K, 2)."""
-    counted = run.history().masked_objectives
-    return counted[front_indices(counted)][:, :2]
-
-
-def _stairs(surface: np.ndarray, reference: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return a surface of `moocore.eaf` as the x and y of a step line from the top to the right side of the box."""
-    points = surface[np.argsort(surface[:, 0])][:, :2]
-    points = points[np.all(points < np.asarray(reference[:2]), axis=1)]
-    if not len(points):
-        return np.array([reference[0]]), np.array([reference[1]])
-    x = np.concatenate([points[:1, 0], points[:, 0], [reference[0]]])
-    y = np.concatenate([[reference[1]], points[:, 1], points[-1:, 1]])
-    return x, y
-
-
-def _at(grid: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the heights of the steps at `grid`; left of the first step, the top of the box."""
-    place = np.searchsorted(x, grid, side="right") - 1
-    return np.where(place >= 0, y[np.maximum(place, 0)], y[0])
 
 
 def _columns(tasks: Sequence[str]) -> int:
@@ -404,26 +269,3 @@ def _panels(tasks: Sequence[str], height: float) -> tuple[Figure, Sequence[Any]]
     for axes in panels:
         axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
     return figure, panels[: len(tasks)]
-
-
-def _handle(comparison: Comparison, method: str, marked: bool = True) -> Line2D:
-    style = line(comparison.methods.index(method))
-    marker = style.marker if marked else None
-    return Line2D(
-        [],
-        [],
-        color=style.colour,
-        linestyle=style.pattern,
-        linewidth=1.5,
-        marker=marker,
-        markersize=4,
-        label=comparison.label(method),
-    )
-
-
-def _legend(figure: Figure, handles: Sequence[Any]) -> None:
-    """Add a legend below the panels, with as many columns as fit."""
-    if handles:
-        widest = LEGEND_MARK + LEGEND_LETTER * max(len(str(handle.get_label())) for handle in handles)
-        columns = max(1, min(len(handles), int(figure.get_figwidth() / widest)))
-        figure.legend(handles=handles, loc="outside lower center", ncols=columns)

@@ -15,7 +15,7 @@ from armwright.experiments.compare_arms import ComparedArm, read_existing_arms
 from armwright.pareto import front_indices, hypervolume, knee_index, paper_solution_indices
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, Objective
 from armwright.report.arm_figures import draw_arm, draw_arms
-from armwright.report.drawing import one_panel, several_panels, write_drawn
+from armwright.report.drawing import front_steps, one_panel, several_panels, write_drawn
 from armwright.report.style import (
     EXISTING,
     FRONT,
@@ -26,7 +26,7 @@ from armwright.report.style import (
 )
 from armwright.runs.attribution import front_by_source, gained_by_source
 from armwright.runs.best_known import standing
-from armwright.runs.config import FrontMethod, ObjectiveRecord
+from armwright.runs.config import FrontMethod, ObjectiveRecord, RunConfig
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.results import FIGURES, read_summary
@@ -123,7 +123,7 @@ def draw_hypervolume(history: History) -> Figure:
                 curve[hits],
                 s=style.size,
                 marker=style.marker,
-                **_paint(style),
+                **style.paint,
                 zorder=3,
                 label=f"gained by {style.label}",
             )
@@ -186,7 +186,7 @@ def draw_credit(history: History) -> Figure:
     members.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     if not np.any(history.hypervolume > 0.0):
         _annotate_centre(volume, _explain_empty(history))
-    areas = [Patch(**_fill(look(source)), label=look(source).label) for source in reversed(_sources(history))]
+    areas = [Patch(**look(source).fill, label=look(source).label) for source in reversed(_sources(history))]
     figure.legend(handles=areas, loc="outside right center", title="found by", alignment="left")
     return figure
 
@@ -198,7 +198,7 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
     _scatter(axes, history, reference, faint=True)
     for member in history.front:
         style = look(member.source)
-        axes.scatter(*member.values[:2], s=1.6 * style.size, marker=style.marker, **_paint(style), zorder=4)
+        axes.scatter(*member.values[:2], s=1.6 * style.size, marker=style.marker, **style.paint, zorder=4)
     near = 0  # labels of neighbouring points are stacked
     before = np.full(2, np.inf)
     for title, member in chosen_members(history):
@@ -286,13 +286,12 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
             marker=style.marker,
             alpha=0.25 if faint else 0.85,
             zorder=3,
-            **_paint(style),
+            **style.paint,
         )
     front = values[front_indices(history.masked_objectives)]
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # more than two objectives have no front line
-        x = [inside[0, 0], *inside[:, 0], reference[0]]
-        y = [reference[1], *inside[:, 1], inside[-1, 1]]
+        x, y = front_steps(inside, reference)
         axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
         axes.fill_between(x, y, reference[1], step="post", color="#F0E442", alpha=0.18, linewidth=0, zorder=0.5)
     axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
@@ -316,7 +315,7 @@ def _stack(axes: Any, layers: Mapping[str, np.ndarray]) -> None:
     iterations, lower = np.arange(n), np.zeros(n)
     for source, numbers in layers.items():
         upper = lower + numbers
-        axes.fill_between(iterations, lower, upper, step="post", **_fill(look(source)), linewidth=0)
+        axes.fill_between(iterations, lower, upper, step="post", **look(source).fill, linewidth=0)
         axes.step(iterations, upper, where="post", color="white", linewidth=0.8)
         lower = upper
     axes.step(iterations, lower, where="post", color=FRONT, linewidth=1.2)
@@ -352,18 +351,14 @@ def _mark(style: Look) -> Line2D:
     return Line2D([], [], linestyle="", marker=style.marker, color=style.colour, markersize=5, label=style.label)
 
 
-def _paint(style: Look) -> dict[str, Any]:
-    if style.marker == "x":
-        return {"color": style.colour, "linewidths": 1.0}
-    return {"color": style.colour, "edgecolors": "white", "linewidths": 0.4}
-
-
-def _fill(style: Look) -> dict[str, Any]:
-    return {"facecolor": style.colour, "hatch": style.hatch, "edgecolor": "white"}
-
-
 def _label(history: History, i: int) -> str:
     return axis_label(history.problem.objectives[i], history.problem.space)
+
+
+def label_axes(axes: Any, config: RunConfig) -> None:
+    """Label the axes of a plane of the first two objectives."""
+    axes.set_xlabel(axis_label(config.objectives[0], config.space))
+    axes.set_ylabel(axis_label(config.objectives[1], config.space))
 
 
 def axis_label(objective: Objective | ObjectiveRecord, space: DesignSpace) -> str:

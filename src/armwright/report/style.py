@@ -14,6 +14,18 @@ class Look(NamedTuple):
     size: float  # [pt²]
     hatch: str = ""  # hatch of filled areas
 
+    @property
+    def paint(self) -> dict[str, Any]:
+        """Colour arguments of a scatter plot."""
+        if self.marker == "x":
+            return {"color": self.colour, "linewidths": 1.0}
+        return {"color": self.colour, "edgecolors": "white", "linewidths": 0.4}
+
+    @property
+    def fill(self) -> dict[str, Any]:
+        """Colour arguments of a filled area."""
+        return {"facecolor": self.colour, "hatch": self.hatch, "edgecolor": "white"}
+
 
 _LOOKS = {
     RANDOM: Look("random", "#9A9A9A", "x", 22),
