@@ -10,6 +10,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from armwright.llm.model_options import ModelOptions
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from armwright.problem.problem import Outcomes, Problem
@@ -71,12 +73,14 @@ def main() -> None:
         print("|---|---|---|---|---|---|")
         bare, _ = timed(slow, "none", 100)
         for n_step, in_flight, answer in ((10, 1, "two-step"), (5, 2, "two-step"), (5, 1, "one-step")):
-            proposer = LlmProposer("stand-in", server.url, answer=answer, origin="scripted")
+            proposer = LlmProposer(
+                ModelOptions(model="stand-in", base_url=server.url, answer=answer, origin="scripted")
+            )
             seconds, run = timed(slow, proposer, 100, n_step=n_step, in_flight=in_flight)
             row(f"{EVALUATION:g} s a trial, n_step {n_step}, {answer}, {in_flight} in flight", seconds, bare, run)
         bare, _ = timed(fast, "none", 200)
         for in_flight in (1, 2, 4, 8):
-            proposer = LlmProposer("stand-in", server.url, origin="scripted")
+            proposer = LlmProposer(ModelOptions(model="stand-in", base_url=server.url, origin="scripted"))
             seconds, run = timed(fast, proposer, 200, n_step=10, in_flight=in_flight)
             calls = run.summary["proposer"]["calls"]
             row(f"built-in evaluator, {in_flight} in flight", seconds, max(bare, calls * LATENCY / in_flight), run)

@@ -54,13 +54,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     print(f"Optuna alone:    {result(search(options.n_trials, options.seed))}")
-    model = configured_model(options.model, options.base_url)
+    given = aw.ModelOptions(model=options.model, base_url=options.base_url, origin=options.origin, memory="own")
+    model = configured_model(given)
     if model is None:
         print("No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead.")
         proposer, by = aw.StudyRulesProposer(), "rules"
     else:
-        proposer = aw.StudyLlmProposer(model.model, DESCRIPTION, model.base_url, memory="own", origin=options.origin)
-        by = model.model
+        proposer = aw.StudyLlmProposer(model.options, DESCRIPTION)
+        by = model.options.model
     callback = aw.ProposalCallback(proposer, every=10, seed=options.seed)
     both = search(options.n_trials, options.seed, callback)
     print(f"With proposals:  {result(both)}")

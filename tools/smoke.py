@@ -53,7 +53,17 @@ NEEDS = (
     ("live", "live", "run"),
     ("live", "optimize", "target-1", "--live", "--out", "other"),
     ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
-    ("llm", "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--out", "other"),
+    (
+        "llm",
+        "optimize",
+        "target-1",
+        "--model",
+        "m",
+        "--model-options",
+        "{base_url: 'http://127.0.0.1:9/v1'}",
+        "--out",
+        "other",
+    ),
     ("llm", "experiment", "paper", "--model", "openai-chat:gpt-4o", "--out", "other"),
     ("llm", "draft", "reach a shelf", "--model", "openai-chat:gpt-4o"),
     ("distributed", "experiment", "two-methods.yaml", "--seeds", "3", "--scheduler", "tcp://127.0.0.1:9"),
@@ -119,7 +129,9 @@ def main(folder: Path) -> None:
     armwright("init", "mine.yaml")
     armwright("optimize", "mine.yaml", "--n-total", "10", "--no-figures", "--robust", "--space", "slideopt")
     armwright("prompt", "target-1")
-    armwright("optimize", "target-1", "--proposer", "manual:asked", "--once", "--out", "by-hand")
+    armwright(
+        "optimize", "target-1", "--proposer", "manual:asked", "--model-options", "{wait: false}", "--out", "by-hand"
+    )
     Path("out/urdf").rename("arm.urdf")
     armwright("compare-arms", "target-1", "arm.urdf", "--run", "run")
     health = armwright("doctor").stdout

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from armwright.experiments.compare_arms import ArmComparison, ComparedArm, compare_arms
     from armwright.experiments.compare_runs import Comparison, compare_runs
     from armwright.llm.draft import Draft, draft
+    from armwright.llm.model_options import ModelOptions, PromptOptions
     from armwright.pareto import hypervolume
     from armwright.problem.evaluation import Evaluation, evaluate
     from armwright.problem.evaluators import Evaluator, evaluator, load_evaluator
@@ -72,7 +73,9 @@ _PLACES = {
     "Link": "robot.arm",
     "LlmProposer": "proposers.llm",
     "ManualProposer": "proposers.manual",
+    "ModelOptions": "llm.model_options",
     "Problem": "problem.problem",
+    "PromptOptions": "llm.model_options",
     "Proposal": "proposers.proposer",
     "ProposalCallback": "proposers.for_optuna.callback",
     "ProposalError": "exceptions",
@@ -137,7 +140,9 @@ __all__ = [
     "Link",
     "LlmProposer",
     "ManualProposer",
+    "ModelOptions",
     "Problem",
+    "PromptOptions",
     "Proposal",
     "ProposalCallback",
     "ProposalError",

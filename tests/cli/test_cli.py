@@ -1,7 +1,9 @@
 """The command line as a user meets it."""
 
+import inspect
 import io
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +14,7 @@ import pytest
 import yaml
 from rich.console import Console
 
+from armwright.cli import app as commands
 from armwright.cli.progress import study_progress
 from armwright.cli.show_results import show_result
 from armwright.llm import client as chat
@@ -20,6 +23,7 @@ from armwright.study.study import optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE, armwright, press_ctrl_c, refused
+from tests.support.wire_formats import model_options
 
 
 @pytest.fixture(autouse=True)
@@ -124,7 +128,7 @@ def test_a_model_by_option_environment_and_file(chat_server: ChatServer, in_fold
         assert done.returncode == 0, done.stderr
         return done.stdout.splitlines()[0]
 
-    by_option = first_line("--model", "m", "--base-url", chat_server.url, "--out", "a", "--prompt", "minus")
+    by_option = first_line("--model", "m", *model_options(base_url=chat_server.url), "--out", "a", "--prompt", "minus")
     assert by_option == f"proposer: llm (m at {chat_server.url}, named by --model; prompt minus)"
     by_environment = first_line("--out", "b", ARMWRIGHT_MODEL="m", ARMWRIGHT_BASE_URL=chat_server.url)
     assert "named by ARMWRIGHT_MODEL" in by_environment
@@ -133,6 +137,19 @@ def test_a_model_by_option_environment_and_file(chat_server: ChatServer, in_fold
     config.write_text(f"model: m\nbase_url: {chat_server.url}\n")
     by_file = first_line("--out", "c", XDG_CONFIG_HOME=str(in_folder / "config"))
     assert f"named by {config}" in by_file
+    options = in_folder / "options.yaml"
+    options.write_text(f"base_url: {chat_server.url}\nmodel: other\nprompt: minus\ntemperature: 0.5\n")
+    by_file = first_line("--out", "e", "--model", "m", "--model-options", str(options))
+    assert by_file == f"proposer: llm (m at {chat_server.url}, named by --model; prompt minus)"
+    assert chat_server.requests[-1]["temperature"] == 0.5
+    config.write_text("temperature: 0.25\nbase_url: http://127.0.0.1:9\n")  # defaults for a model named elsewhere
+    where = model_options(base_url=chat_server.url)
+    first_line("--out", "f", "--model", "m", *where, XDG_CONFIG_HOME=str(in_folder / "config"))
+    assert chat_server.requests[-1]["temperature"] == 0.25
+    config.write_text("temprature: 0\n")
+    wrong = refused(2, "optimize", "target-1", "--model", "m", *where, XDG_CONFIG_HOME=str(in_folder / "config"))
+    assert f'{config}: unknown key "temprature"' in wrong
+    assert 'Did you mean "temperature"?' in wrong
     assert "proposer: rules" in first_line("--out", "d", OPENAI_API_KEY="sk-lying-about")  # a key alone spends nothing
     assert len((in_folder / "a" / "transcripts.jsonl").read_text().splitlines()) == 5
 
@@ -164,6 +181,15 @@ def test_version_and_help() -> None:
     assert "--n-step" in armwright("optimize", "--help").stdout
 
 
+def test_optimize_shows_its_options_in_groups() -> None:
+    """At most 25 of them, --help included, and as many parameters: options that travel together are one value."""
+    shown = armwright("optimize", "--help", COLUMNS="120").stdout
+    groups = ["Arguments", "Options", "Task", "Search", "Language model", "Evaluation", "Output"]
+    assert re.findall(r"^╭─ ([\w ]+) ─", shown, re.MULTILINE) == groups
+    assert 15 <= len(re.findall(r"^│ +--", shown, re.MULTILINE)) <= 25
+    assert len(inspect.signature(commands.optimize).parameters) <= 25
+
+
 @pytest.mark.parametrize(
     ("args", "words"),
     [
@@ -171,7 +197,10 @@ def test_version_and_help() -> None:
         (("nothing.yaml",), "there is no file nothing.yaml"),
         (("a" * 300,), "unknown task"),
         (("target-1", "--space", "turns.yaml"), "exceeds ±2π"),
-        (("target-1", "--proposer", "none", "--base-url", "http://x"), "uses no language model"),
+        (
+            ("target-1", "--proposer", "none", *model_options(base_url="http://x")),
+            "none does not use base_url = http://x",
+        ),
         (("target-1", "--proposer", "none", "--prompt", "x"), 'unknown prompt "x"'),
         (("bad.yaml",), 'unknown key "target".'),
         (("nan.yaml",), "finite number (got nan)"),
@@ -186,31 +215,57 @@ def test_version_and_help() -> None:
         (("target-1", "--proposer", "llm"), "needs a language model"),
         (("target-1", "--model", "openai-chat:gpt-4o"), "OPENAI_API_KEY"),
         (("target-1", "--model", "gpt-4o"), "openai-chat:gpt-4o"),
-        (("target-1", "--model", "m", "--base-url", "localhost"), "http://"),
-        (("target-1", "--base-url", "http://127.0.0.1:9"), "needs --model"),
-        (("target-1", "--model", "m", "--proposer", "none"), "uses no language model"),
-        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--prompt", "x"), 'unknown prompt "x"'),
-        (("target-1", "--memory", "owm"), 'Did you mean "own"?'),
-        (("target-1", "--answer", "onestep"), 'Did you mean "one-step"?'),
-        (("target-1", "--answer", "text", "--model", "m", "--base-url", "http://127.0.0.1:9"), "is for people"),
-        (("target-1", "--proposals", "0"), "proposals = 0: a whole number from 1"),
-        (("target-1", "--max-cost", "1"), "--max-cost 1.0 goes with a language model, and none is configured"),
-        (("target-1", "--memory", "none"), "--memory none goes with a language model, and none is configured"),
-        (("target-1", "--proposer", "rules", "--max-calls", "0"), "rules does not use --max-calls 0"),
-        (("target-1", "--proposer", "none", "--temperature", "0"), "none does not use --temperature 0.0; leave it out"),
-        (("target-1", "--proposer", "replay:x", "--temperature", "0"), "replay:x does not use --temperature 0.0"),
-        (("target-1", "--proposer", "manual:x", "--origin", "model"), "manual:x does not use --origin model"),
-        (("target-1", "--proposer", "manual:x", "--answer", "text"), "manual:x does not use --answer text"),
-        (("target-1", "--in-flight", "2"), "goes with --overlap"),
-        (("target-1", "--overlap", "--in-flight", "0"), "in_flight = 0"),
-        (("target-1", "--once"), "--once goes with --proposer manual:PATH"),
+        (("target-1", "--model", "m", *model_options(base_url="localhost")), "http://"),
+        (
+            ("target-1", *model_options(base_url="http://127.0.0.1:9")),
+            "base_url = http://127.0.0.1:9 needs a language model",
+        ),
+        (("target-1", "--model", "m", "--proposer", "none"), "none does not use model = m"),
+        (
+            ("target-1", "--model", "m", *model_options(base_url="http://127.0.0.1:9"), "--prompt", "x"),
+            'unknown prompt "x"',
+        ),
+        (("target-1", *model_options(memory="owm")), 'Did you mean "own"?'),
+        (("target-1", *model_options(answer="onestep")), 'Did you mean "one-step"?'),
+        (
+            ("target-1", "--model", "m", *model_options(answer="text", base_url="http://127.0.0.1:9")),
+            "is for manual answers",
+        ),
+        (
+            ("target-1", *model_options(proposals=0)),
+            "--model-options: proposals: Input should be greater than or equal to 1",
+        ),
+        (("target-1", "--max-cost", "1"), "max_cost = 1.0 needs a language model, and none is configured"),
+        (("target-1", *model_options(memory="none")), "memory = none needs a language model, and none is configured"),
+        (("target-1", "--proposer", "rules", *model_options(max_calls=1)), "rules does not use max_calls = 1"),
+        (
+            ("target-1", "--proposer", "none", *model_options(temperature=0)),
+            "none does not use temperature = 0.0; leave it out",
+        ),
+        (
+            ("target-1", "--proposer", "replay:x", *model_options(temperature=0)),
+            "replay:x does not use temperature = 0.0",
+        ),
+        (
+            ("target-1", "--proposer", "manual:x", *model_options(origin="model")),
+            "manual:x does not use origin = model",
+        ),
+        (("target-1", "--proposer", "manual:x", *model_options(answer="text")), "manual:x does not use answer = text"),
+        (("target-1", *model_options(in_flight=2)), "in_flight = 2 needs a language model"),
+        (("target-1", *model_options(in_flight=0)), "in_flight: Input should be greater than or equal to 1"),
+        (("target-1", *model_options(wait=False)), "auto does not use wait = False"),
+        (("target-1", "--model", "m", *model_options(replay_strict=True)), "auto does not use replay_strict = True"),
+        (("target-1", *model_options(temprature=0)), 'unknown key "temprature"'),
+        (("target-1", *model_options(temprature=0)), 'Did you mean "temperature"?'),
+        (("target-1", "--model-options", "none.yaml"), "cannot read none.yaml"),
+        (("target-1", "--max-cost", "-1"), "command line: max_cost: Input should be greater than 0 (got -1.0)"),
         (("target-1", "--proposer", "manual"), "needs a folder: manual:PATH"),
         (("target-1", "--proposer", "rules:x"), 'unknown proposer "rules:x"'),
-        (("target-1", "--proposer", "manual:x", "--model", "m"), "uses no language model"),
-        (("target-1", "--on-model-failure", "ignore"), "on_model_failure"),
-        (("target-1", "--model", "m", "--base-url", "http://x/v1?key=secret"), "ARMWRIGHT_API_KEY"),
-        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--output", "toool"), 'Did you mean "tool"?'),
-        (("target-1", "--model", "m", "--base-url", "http://127.0.0.1:9", "--origin", "x"), 'unknown origin "x"'),
+        (("target-1", "--proposer", "manual:x", "--model", "m"), "manual:x does not use model = m"),
+        (("target-1", *model_options(on_failure="ignore")), 'unknown on_failure "ignore"'),
+        (("target-1", "--model", "m", *model_options(base_url="http://x/v1?key=secret")), "ARMWRIGHT_API_KEY"),
+        (("target-1", "--model", "m", *model_options(output="toool")), 'Did you mean "tool"?'),
+        (("target-1", "--model", "m", *model_options(origin="x")), 'unknown origin "x"'),
     ],
 )
 def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
@@ -224,12 +279,12 @@ def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...]
 
 
 def test_a_server_that_does_not_answer_is_code_1(in_folder: Path) -> None:
-    message = refused(1, "optimize", "target-1", "--model", "m", "--base-url", "http://127.0.0.1:9/v1")
+    message = refused(1, "optimize", "target-1", "--model", "m", *model_options(base_url="http://127.0.0.1:9/v1"))
     assert "--proposer rules needs none" in message
 
 
 def test_a_server_that_does_not_answer_may_be_passed_over(in_folder: Path) -> None:
-    where = ("--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--on-model-failure", "continue")
+    where = ("--model", "m", *model_options(base_url="http://127.0.0.1:9/v1", on_failure="continue"))
     done = armwright("optimize", "target-1", *SHORT, *where)
     assert done.returncode == 0, done.stderr
     assert "m: Connection error" in done.stdout
@@ -251,12 +306,14 @@ def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer,
     assert "-- model: none is configured" in done.stdout
     assert "planted" not in done.stdout + done.stderr
     assert not chat_server.requests
-    where = ("--model", "m", "--base-url", chat_server.url)
+    where = ("--model", "m", *model_options(base_url=chat_server.url))
     assert not armwright("doctor", *where).stderr
     assert not chat_server.requests  # nothing is sent unless it is asked for
     assert "ok call: m answered" in armwright("doctor", *where, "--call").stdout
     assert len(chat_server.requests) == 1
-    assert "Connection error" in refused(1, "doctor", "--model", "m", "--base-url", "http://127.0.0.1:9", "--call")
+    assert "Connection error" in refused(
+        1, "doctor", "--model", "m", *model_options(base_url="http://127.0.0.1:9"), "--call"
+    )
     wrong = armwright("doctor", "--model", "openai-chat:gpt-4o")
     assert wrong.returncode == 1
     assert (
@@ -325,10 +382,10 @@ def test_ctrl_c_leaves_a_folder_that_can_be_resumed(in_folder: Path) -> None:
     assert (in_folder / "run" / "trials.jsonl").read_text().startswith(kept)
 
 
-@pytest.mark.parametrize("overlap", [[], ["--overlap"]], ids=["waiting", "overlap"])
+@pytest.mark.parametrize("in_flight", [None, 1], ids=["waiting", "overlap"])
 @pytest.mark.parametrize("refused", [0, 1])
 def test_ctrl_c_ends_the_calls_under_way(
-    chat_server: ChatServer, in_folder: Path, overlap: list[str], refused: int
+    chat_server: ChatServer, in_folder: Path, in_flight: int | None, refused: int
 ) -> None:
     """While the server holds its answers back, the command ends, keeps what was paid for, and says how to go on."""
     released = threading.Event()
@@ -343,7 +400,9 @@ def test_ctrl_c_ends_the_calls_under_way(
         return designer(request)
 
     chat_server.answer = answer
-    done = armwright("optimize", "target-1", "--model", "m", "--base-url", chat_server.url, *overlap)
+    done = armwright(
+        "optimize", "target-1", "--model", "m", *model_options(base_url=chat_server.url, in_flight=in_flight)
+    )
     released.set()
     assert (done.returncode, done.stderr) == (130, "")
     assert "Go on with:" in done.stdout

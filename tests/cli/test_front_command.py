@@ -21,7 +21,7 @@ def test_front_polish_and_verify(in_folder: Path) -> None:
     assert summary["search"]["evaluations"] >= 4000
     assert summary["folder"] == "runs/target-1-front-seed4"
 
-    armwright("optimize", "target-1", *SHORT, "--no-verify", "--out", "mine")
+    armwright("optimize", "target-1", *SHORT, "--out", "mine")
     polished = armwright("polish", "mine", "--evaluations", "120")
     assert polished.returncode == 0, polished.stderr
     assert "improved designs" in polished.stdout
@@ -40,7 +40,7 @@ def test_front_polish_and_verify(in_folder: Path) -> None:
 @pytest.mark.slow
 def test_front_and_polish_draw_their_figures(in_folder: Path) -> None:
     armwright("front", "target-1", "--budget", "1000", "--out", "front")
-    armwright("optimize", "target-1", *SHORT, "--no-verify", "--out", "mine")
+    armwright("optimize", "target-1", *SHORT, "--out", "mine")
     armwright("polish", "mine", "--evaluations", "60")
     for folder in ("front", "mine"):
         drawn = {path.name for path in (in_folder / folder / "figures").iterdir()}

@@ -12,7 +12,6 @@ from pydantic import BaseModel
 
 import armwright as aw
 from armwright.experiments.plan import ExperimentPlan, FigurePlan, MethodPlan
-from armwright.llm.configuration import _ConfigurationFile
 from armwright.problem.constraints import QUANTITIES
 from armwright.robot.actuators import ActuatorRecord
 from armwright.spaces.design_space import DesignSpace
@@ -29,7 +28,7 @@ KEYS: dict[str, tuple[type[BaseModel], ...]] = {
     "tasks.md": (Task, Target, Region, Box, Sphere, Cylinder, Ground),
     "spaces.md": (DesignSpace, MassPerMetre, MassPerLink, MassOfTube, ActuatorRecord),
     "experiments.md": (ExperimentPlan, MethodPlan, FigurePlan),
-    "language-models.md": (_ConfigurationFile,),
+    "language-models.md": (aw.ModelOptions,),
 }
 
 

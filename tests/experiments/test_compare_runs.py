@@ -21,7 +21,6 @@ from armwright.experiments.run_list import find_runs, list_runs
 from armwright.experiments.run_summary import RunSummary, read_run_summary
 from armwright.experiments.statistics import interval, paired_test
 from armwright.problem.problem import Problem
-from armwright.proposers.llm import LlmProposer
 from armwright.report.comparison_figures import write_comparison_figures
 from armwright.report.tables import latex, markdown, write_tables
 from armwright.runs.best_known import known_front
@@ -30,6 +29,7 @@ from armwright.study.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.task import Task, load_task
 from tests.support.chat_server import ChatServer, wants_design
+from tests.support.wire_formats import llm_proposer
 
 SEEDS = range(3)
 TASKS = ("target-1", "random-4")
@@ -258,7 +258,7 @@ def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_serv
     known = known_front(problem)
     best = json.dumps({**known.designs[0].params, "reason": "the most precise of all"})  # so it becomes Solution 1
     chat_server.answer = lambda request: best if wants_design(request) else words
-    proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
+    proposer = llm_proposer(chat_server.url, origin="scripted")
     optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
     found = compare_summaries([read_run_summary(tmp_path / "run", "no $\\alpha_{x markup")])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}

@@ -26,6 +26,7 @@ from armwright.experiments.plan import (
     with_seeds,
 )
 from armwright.experiments.runner import run_cell
+from armwright.llm.model_options import ModelOptions
 from armwright.tasks.task import builtin_tasks
 from tests.support.chat_server import ChatServer
 
@@ -55,7 +56,7 @@ def file_of(folder: Path, **changes: Any) -> Path:
 def asking(server: ChatServer, **settings: Any) -> dict[str, Any]:
     """A method that asks our server."""
     named = {"model": "test-model", "base_url": server.url, "origin": "scripted"}
-    return {"label": "BBO/LLM+", "proposer": "llm", "n_step": 3, **named, **settings}
+    return {"label": "BBO/LLM+", "proposer": "llm", "n_step": 3, "model_options": named, **settings}
 
 
 def invoke(*arguments: str | Path) -> Any:
@@ -72,9 +73,10 @@ def test_the_paper_s_experiment_is_the_paper_s() -> None:
     assert plan.task_list == ("target-1", "target-2", "target-3")
     assert plan.seed_list == (0, 1, 2, 3, 4)
     assert (plan.n_init, plan.n_total) == (10, 200)
-    steps = {key: method.n_step for key, method in plan.methods.items() if method.prompt == "plus"}
+    asked = {key: method for key, method in plan.methods.items() if method.asks_a_model}
+    steps = {key: method.n_step for key, method in asked.items() if method.model_options.prompt == "plus"}
     assert steps == {"llm-plus-5": 5, "llm-plus": 10, "llm-plus-50": 50}
-    assert all(method.temperature == 0 for method in plan.methods.values() if method.asks_a_model)
+    assert all(method.model_options.temperature == 0 for method in plan.methods.values() if method.asks_a_model)
     table = published(plan)
     assert table["BBO", "target-1"] == (6.70, 2.03)
     assert table["BBO/LLM-", "target-2"] == (13.87, 2.33)
@@ -143,9 +145,9 @@ def test_cells_without_a_model_are_skipped_and_said_so(tmp_path: Path) -> None:
     assert len(skipped) == 4
     assert "no language model is configured" in skipped[0].reason
     assert {cell.method for cell in cells} == {"bbo", "rules"}
-    cells, skipped = cells_of(with_model(plan_of(methods=methods), "gpt-x", None), tmp_path, tmp_path)
+    cells, skipped = cells_of(with_model(plan_of(methods=methods), ModelOptions(model="gpt-x")), tmp_path, tmp_path)
     assert not skipped
-    assert {cell.plan.model for cell in cells if cell.method == "llm"} == {"gpt-x"}
+    assert {cell.plan.model_options.model for cell in cells if cell.method == "llm"} == {"gpt-x"}
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ from armwright.spaces.design_space import DesignSpace, load_space
 from armwright.tasks.task import Task, load_task
 from tests import ROOT
 from tests.fuzz.mutation import changed
+from tests.support.wire_formats import llm_proposer
 
 LONGEST_REFUSAL = 3000  # characters
 MOST_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and is no other code
@@ -393,7 +394,7 @@ def a_run() -> Path:
     there = folder() / "run"
     with ChatServer() as server:
         server.answer = designer
-        proposer = aw.LlmProposer("test-model", server.url, memory="own", origin="scripted")
+        proposer = llm_proposer(server.url, memory="own", origin="scripted")
         aw.optimize(a_problem(), proposer=proposer, n_init=3, n_step=2, n_total=4, out=there)
     write_report(there)
     (there / "existing_arms.json").write_text(
@@ -685,11 +686,14 @@ def argument_seeds() -> list[bytes]:
         ["tasks", "target-1"], ["tasks", "--json"], ["optimize", "target-1", "--n-total", "2", "--n-init", "1"],
         ["optimize", "target-1", "--sampler", "random", "--objectives", "torque,mass", "--robust", "--seed", "3"],
         ["optimize", "target-1", "--proposer", "rules", "--n-step", "2", "--refine-every", "2", "--json"],
-        ["optimize", "target-1", "--proposer", f"replay:{run}", "--replay-strict", "--memory", "own"],
-        ["optimize", "target-1", "--proposer", "manual:desk", "--once", "--proposals", "2", "--prompt", "minus"],
-        ["optimize", "target-1", "--model", "openai-chat:x", "--base-url", "http://127.0.0.1:9/v1", "--max-calls", "3",
-         "--max-cost", "0.5", "--temperature", "0", "--model-seed", "1", "--answer", "one-step", "--output", "native"],
-        ["prompt", "target-1", "--memory", "own", "--n-init", "3"], ["prompt", "--after", run, "--number", "3"],
+        ["optimize", "target-1", "--proposer", f"replay:{run}", "--model-options",
+         "{replay_strict: true, memory: own}"],
+        ["optimize", "target-1", "--proposer", "manual:desk", "--prompt", "minus", "--model-options",
+         "{wait: false, proposals: 2}"],
+        ["optimize", "target-1", "--model", "openai-chat:x", "--max-cost", "0.5", "--model-options",
+         "{base_url: 'http://127.0.0.1:9', max_calls: 3, temperature: 0, seed: 1, answer: one-step, output: native}"],
+        ["prompt", "target-1", "--model-options", "{memory: own}", "--n-init", "3"],
+        ["prompt", "--after", run, "--number", "3"],
         ["prompt", "--template"], ["prompt", "--variables"], ["prompt", "target-1", "--schema"],
         ["front", "target-1", "--budget", "100", "--no-stall", "--seed", "1"],
         ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print-commands"],

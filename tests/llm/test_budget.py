@@ -6,12 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 from pydantic_ai.messages import ModelResponse
 from pydantic_ai.usage import RequestUsage
 
-from armwright.exceptions import ModelError, ProposalError, SettingsError
+from armwright.exceptions import ModelError, ProposalError
 from armwright.llm import client as chat
 from armwright.llm.backend import CHECK, LlmBackend, Question, Reply
+from armwright.llm.budget import CallBudget
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.session import LlmSession
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -19,6 +22,7 @@ from armwright.study.study import Progress, Run, optimize
 from armwright.tasks.task import load_task
 from tests.support import wire_formats as wires
 from tests.support.chat_server import Answer, ChatServer, Request, designer
+from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
 
@@ -97,39 +101,39 @@ class Session(LlmSession):
 @pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (4, 1), (5, 2), (9, 4), (50, 4)])
 def test_after_so_many_calls_it_asks_no_more(chat_server: ChatServer, most: int, proposals: int) -> None:
     seen: list[Progress] = []
-    result = run(LlmProposer("m", chat_server.url, max_calls=most), seen=seen)
+    result = run(llm_proposer(chat_server.url, model="m", max_calls=most), seen=seen)
     assert len(chat_server.requests) <= most
     assert sum(trial.source == "llm" for trial in result.trials) == proposals
     assert result.summary["proposer"]["failures"] == ({"budget": 4 - proposals} if proposals < 4 else {})
-    assert sum("--max-calls" in note for note in notes(seen)) == (proposals < 4)  # said once
+    assert sum("max_calls" in note for note in notes(seen)) == (proposals < 4)  # said once
 
 
 def test_a_refused_answers_calls_count(chat_server: ChatServer) -> None:
     """Three requests for one answer; the budget bounds the requests within one call, too."""
     good = chat_server.answer
     chat_server.answer = lambda request: "no JSON" if "response_format" in request else good(request)
-    run(LlmProposer("m", chat_server.url, max_calls=4), n_total=6)
+    run(llm_proposer(chat_server.url, model="m", max_calls=4), n_total=6)
     assert len(chat_server.requests) == 4
 
 
 def test_the_budget_is_the_whole_runs(chat_server: ChatServer, tmp_path: Path) -> None:
     """Earlier sessions included; a larger one goes on asking."""
-    run(LlmProposer("m", chat_server.url, max_calls=5), tmp_path / "run", n_total=6)
-    again = run(LlmProposer("m", chat_server.url, max_calls=6), tmp_path / "run", n_total=12)
+    run(llm_proposer(chat_server.url, model="m", max_calls=5), tmp_path / "run", n_total=6)
+    again = run(llm_proposer(chat_server.url, model="m", max_calls=6), tmp_path / "run", n_total=12)
     assert len(chat_server.requests) == 6
     assert [trial.fault for trial in again.trials[10:]] == ["budget", None, None, "budget", None, None]
-    more = run(LlmProposer("m", chat_server.url, max_calls=50), tmp_path / "run", n_total=15)
+    more = run(llm_proposer(chat_server.url, model="m", max_calls=50), tmp_path / "run", n_total=15)
     assert more.trials[16].source == "llm"
 
 
 def test_a_bound_on_cost_needs_a_price(chat_server: ChatServer) -> None:
-    with pytest.raises(ModelError, match="price of m is not known, so --max-cost cannot hold; use --max-calls"):
-        run(LlmProposer("m", chat_server.url, max_cost=1.0))
+    with pytest.raises(ModelError, match="price of m is not known, so max_cost cannot hold; use max_calls"):
+        run(llm_proposer(chat_server.url, model="m", max_cost=1.0))
 
 
 def test_what_a_run_will_take_is_said_before_it_begins(chat_server: ChatServer) -> None:
     seen: list[Progress] = []
-    run(LlmProposer("m", chat_server.url), seen=seen)
+    run(llm_proposer(chat_server.url, model="m"), seen=seen)
     assert seen[0].doing == "beginning"
     assert seen[0].note.startswith("4 proposals: about 9 calls, ")
     assert seen[0].note.endswith("; on a server of your own")
@@ -140,7 +144,7 @@ def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPa
     forecast = LlmProposer("openai-chat:gpt-4o").forecast(PROBLEM, 20)
     assert forecast.startswith("20 proposals: about 41 calls, ")
     assert "USD by public prices" in forecast
-    half = LlmProposer("openai-chat:gpt-4o", answer="one-step", proposals=4).forecast(PROBLEM, 20)
+    half = LlmProposer(ModelOptions(model="openai-chat:gpt-4o", answer="one-step", proposals=4)).forecast(PROBLEM, 20)
     assert half.startswith("20 proposals: about 6 calls, ")
     unknown = LlmProposer("openai-chat:a-model-of-tomorrow").forecast(PROBLEM, 20)
     assert unknown.endswith("price not known")
@@ -149,11 +153,11 @@ def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPa
 def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatServer) -> None:
     """Whatever it is called: forecast, summary and bound agree."""
     seen: list[Progress] = []
-    result = run(LlmProposer("openai-chat:gpt-4o", chat_server.url), seen=seen, n_total=3)
+    result = run(llm_proposer(chat_server.url, model="openai-chat:gpt-4o"), seen=seen, n_total=3)
     assert seen[0].note.endswith("; on a server of your own")
     assert result.summary["proposer"]["cost_usd"] is None
     with pytest.raises(ModelError, match="price of gpt-4o is not known"):
-        run(LlmProposer("gpt-4o", chat_server.url, max_cost=1.0))
+        run(llm_proposer(chat_server.url, model="gpt-4o", max_cost=1.0))
 
 
 @pytest.mark.parametrize(
@@ -171,7 +175,7 @@ def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatS
     ],
 )
 def test_the_price_is_that_of_the_host(model: str, address: str | None, words: str) -> None:
-    assert chat.describe_cost(model, address, 10**6, 10**6) == words
+    assert chat.describe_cost(ModelOptions(model=model, base_url=address), 10**6, 10**6) == words
     place = chat._place(model, address)
     if place is not None:
         usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)
@@ -180,9 +184,9 @@ def test_the_price_is_that_of_the_host(model: str, address: str | None, words: s
 
 
 def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatServer, tmp_path: Path) -> None:
-    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=6)
+    run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=6)
     seen: list[Progress] = []
-    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=12, seen=seen)
+    run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=12, seen=seen)
     # the server counts 100 tokens in and 20 out for each of two calls
     assert seen[0].note == "2 proposals: about 5 calls, 400 tokens in, 80 out; on a server of your own"
 
@@ -202,43 +206,43 @@ def test_after_so_many_dollars_it_asks_no_more(
     assert (proposer["calls"], len(chat_server.requests)) == (5, 5)
     assert proposer["cost_usd"] == pytest.approx(5 * each)
     assert proposer["failures"] == {"budget": 2}
-    assert sum("--max-cost" in progress.note for progress in seen) == 1
+    assert sum("max_cost" in progress.note for progress in seen) == 1
 
 
 @pytest.mark.parametrize("wrong", [{"max_calls": 0}, {"max_calls": -1}, {"max_cost": -1.0}, {"max_cost": float("nan")}])
 def test_a_budget_that_makes_no_sense_is_refused(chat_server: ChatServer, wrong: dict[str, Any]) -> None:
-    with pytest.raises(SettingsError, match=f"{next(iter(wrong))} = .* is needed"):
-        LlmProposer("m", chat_server.url, **wrong)
+    with pytest.raises(ValidationError, match=f"{next(iter(wrong))}\n  Input should be"):
+        llm_proposer(chat_server.url, model="m", **wrong)
 
 
 def test_a_bound_on_cost_holds_without_a_price_too(chat_server: ChatServer) -> None:
     """However the run was told to go on."""
     seen: list[Progress] = []
-    result = run(LlmProposer("m", chat_server.url, max_cost=1.0), seen=seen, on_model_failure="continue")
+    result = run(llm_proposer(chat_server.url, model="m", max_cost=1.0), seen=seen, on_model_failure="continue")
     assert len(chat_server.requests) == 1  # the check, which showed that there is no price
     assert result.summary["proposer"]["failures"] == {"budget": 4}
-    assert sum("--max-cost cannot hold" in note for note in notes(seen)) == 1
+    assert sum("max_cost cannot hold" in note for note in notes(seen)) == 1
 
 
 def test_a_bound_on_cost_holds_for_a_run_whose_calls_had_no_price(chat_server: ChatServer, tmp_path: Path) -> None:
-    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=3)
+    run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=3)
     chat_server.requests.clear()
     seen: list[Progress] = []
-    again = run(LlmProposer("m", chat_server.url, max_cost=1.0), tmp_path / "run", seen=seen)
+    again = run(llm_proposer(chat_server.url, model="m", max_cost=1.0), tmp_path / "run", seen=seen)
     assert not chat_server.requests
     assert again.summary["proposer"]["failures"] == {"budget": 3}
-    assert sum("--max-cost 1 cannot hold; use --max-calls" in note for note in notes(seen)) == 1
+    assert sum("max_cost 1 cannot hold; use max_calls" in note for note in notes(seen)) == 1
 
 
 @pytest.mark.parametrize("in_flight", [None, 2])
 def test_a_run_whose_budget_is_used_up_goes_on(chat_server: ChatServer, tmp_path: Path, in_flight: int | None) -> None:
-    run(LlmProposer("m", chat_server.url, max_calls=3), tmp_path / "run", n_total=3, in_flight=in_flight)
+    run(llm_proposer(chat_server.url, model="m", max_calls=3), tmp_path / "run", n_total=3, in_flight=in_flight)
     seen: list[Progress] = []
-    proposer = LlmProposer("m", chat_server.url, max_calls=3)
+    proposer = llm_proposer(chat_server.url, model="m", max_calls=3)
     again = run(proposer, tmp_path / "run", seen=seen, in_flight=in_flight)
     assert len(chat_server.requests) == 3
     assert again.summary["proposer"]["failures"] == {"budget": 3}
-    assert sum("--max-calls 3 is used up" in note for note in notes(seen)) == 1
+    assert sum("max_calls 3 is used up" in note for note in notes(seen)) == 1
 
 
 @pytest.mark.parametrize(("status", "kind", "asked"), [(401, "key", 1), (400, "rejected", 4)])
@@ -246,11 +250,11 @@ def test_a_run_that_has_begun_goes_on_without_its_model(
     chat_server: ChatServer, tmp_path: Path, status: int, kind: str, asked: int
 ) -> None:
     """Said once; where asking again is of no use, nothing more is asked."""
-    run(LlmProposer("m", chat_server.url), tmp_path / "run", n_total=3)
+    run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=3)
     chat_server.requests.clear()
     chat_server.answer = lambda request: (status, '{"error": {"message": "not today"}}')
     seen: list[Progress] = []
-    again = run(LlmProposer("m", chat_server.url), tmp_path / "run", seen=seen)
+    again = run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", seen=seen)
     assert again.summary["proposer"]["failures"] == {kind: 3}
     assert len(chat_server.requests) == asked
     assert [p.note for p in seen if p.doing == "beginning" and "not today" in p.note]
@@ -263,7 +267,7 @@ def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_
         return "no design" if "response_format" in request else designer(request)
 
     chat_server.answer = answer
-    run(LlmProposer("m", chat_server.url, answer="one-step", max_calls=most), n_total=24, in_flight=4)
+    run(llm_proposer(chat_server.url, model="m", answer="one-step", max_calls=most), n_total=24, in_flight=4)
     assert len(chat_server.requests) == most
 
 
@@ -271,21 +275,21 @@ def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_
 @pytest.mark.parametrize("threads", [3, 4, 8])
 def test_questions_beside_each_other_share_one_budget(budget: dict[str, Any], threads: int) -> None:
     backend = Greedy()
-    came = Session(backend, "asking", **budget).ask_together(threads, lambda: None)
+    came = Session(backend, "asking", CallBudget(**budget)).ask_together(threads, lambda: None)
     assert backend.requests == min(10, 3 * threads)
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["budget"] * max(0, threads - 4)
 
 
 def test_what_was_set_aside_and_not_taken_is_there_for_others() -> None:
     backend = Greedy(most=1)
-    came = Session(backend, "asking", max_calls=7).ask_together(9, lambda: None)
+    came = Session(backend, "asking", CallBudget(max_calls=7)).ask_together(9, lambda: None)
     assert backend.requests == 7
     assert came.count("so be it") == 7
 
 
 def test_who_waits_for_the_budget_of_others_is_let_go_at_the_end() -> None:
     backend = Greedy()
-    session = Session(backend, "asking", max_calls=3)
+    session = Session(backend, "asking", CallBudget(max_calls=3))
     came = session.ask_together(4, session.cancel)
     assert backend.requests == 3
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["cancelled"] * 3

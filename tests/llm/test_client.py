@@ -14,12 +14,13 @@ from armwright.proposers.llm import LlmProposer
 from armwright.study.study import Run, optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
 
 
 def run(server: ChatServer, out: Path | None = None, n_total: int = 6, prompt: str = "plus") -> Run:
-    proposer = LlmProposer("test-model", server.url, prompt)
+    proposer = llm_proposer(server.url, prompt=prompt)
     return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=0, out=out)
 
 
@@ -149,7 +150,7 @@ def test_a_model_that_fails_before_the_first_trial_is_an_error(chat_server: Chat
 
 
 def test_a_server_that_is_not_there_is_an_error() -> None:
-    proposer = LlmProposer("test-model", "http://127.0.0.1:9/v1")
+    proposer = llm_proposer("http://127.0.0.1:9/v1")
     with pytest.raises(ModelError, match="test-model"):
         optimize(PROBLEM, proposer=proposer, n_total=1)
 
@@ -198,7 +199,7 @@ def test_what_belongs_to_another_host_is_never_sent_and_no_key_is_written(
 
 def test_an_address_with_a_password_is_refused() -> None:
     with pytest.raises(SettingsError, match="ARMWRIGHT_API_KEY"):
-        LlmProposer("m", "http://user:secret@127.0.0.1:9/v1")
+        llm_proposer("http://user:secret@127.0.0.1:9/v1", model="m")
 
 
 def test_a_finished_or_extended_run_keeps_its_account(chat_server: ChatServer, tmp_path: Path) -> None:
@@ -212,7 +213,7 @@ def test_a_finished_or_extended_run_keeps_its_account(chat_server: ChatServer, t
 
 def test_after_a_server_that_was_not_there_another_proposer_may_take_the_folder(tmp_path: Path) -> None:
     with pytest.raises(ModelError):
-        optimize(PROBLEM, proposer=LlmProposer("m", "http://127.0.0.1:9/v1"), n_total=1, out=tmp_path / "run")
+        optimize(PROBLEM, proposer=llm_proposer("http://127.0.0.1:9/v1", model="m"), n_total=1, out=tmp_path / "run")
     assert optimize(PROBLEM, proposer="rules", n_init=2, n_total=1, out=tmp_path / "run").trials[2].source == "rules"
 
 
@@ -236,17 +237,17 @@ def test_a_wrong_model_name_is_refused(model: str, words: str) -> None:
 
 
 def test_a_model_is_not_asked_as_people_are(chat_server: ChatServer) -> None:
-    with pytest.raises(SettingsError, match='answer "text" is for people; a model needs "two-step" or "one-step"'):
-        LlmProposer("test-model", chat_server.url, answer="text")
+    with pytest.raises(SettingsError, match='answer "text" is for manual answers; a model needs'):
+        llm_proposer(chat_server.url, answer="text")
 
 
 def test_a_wrong_prompt_name_is_refused(chat_server: ChatServer) -> None:
     with pytest.raises(SettingsError, match='Did you mean "plus"'):
-        LlmProposer("test-model", chat_server.url, "pluss")
+        llm_proposer(chat_server.url, prompt="pluss")
 
 
 def test_feedback_shows_at_most_five_of_each_and_depends_on_the_seed_alone(chat_server: ChatServer) -> None:
-    proposer = LlmProposer("test-model", chat_server.url)
+    proposer = llm_proposer(chat_server.url)
     history = optimize(PROBLEM, proposer="none", n_total=40).history
     prompts: list[str] = []
     for seed in (1, 1, 2):

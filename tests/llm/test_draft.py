@@ -9,11 +9,13 @@ from typing import Any
 
 import pytest
 import yaml
+from pydantic import ValidationError
 
 import armwright as aw
 from armwright.exceptions import FailureError, ModelError, SettingsError, TaskError
 from armwright.llm.draft import DRAFTS, Draft
 from armwright.llm.draft_prompt import LONGEST_WORDS, SPACE_EXAMPLE, draft_prompt, read_documents
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.problem.objectives import OBJECTIVES
@@ -23,6 +25,7 @@ from tests.support import wire_formats as wires
 from tests.support.chat_server import Answer, ChatServer, Request
 from tests.support.command_line import PATIENCE, armwright, press_ctrl_c, refused
 from tests.support.model_faults import FAULTS
+from tests.support.wire_formats import model_options
 
 WORDS = "paint a 1 × 2 m wall from a cart, payload 0.5 kg, cheap servos"
 TASK = """\
@@ -55,13 +58,15 @@ ANSWER = f"The wall is wide.\n\nTASK\n```yaml\n{TASK}```\nSPACE\n```yaml\n{SPACE
 ALONE = f"TASK\n```yaml\n{TASK.replace('[worst_error, torque_utilisation, price]', '[worst_error, torque]')}```\n"
 
 
-def drafted(server: ChatServer, answer: Answer | Iterable[Answer], out: Path | None = None, **settings: Any) -> Draft:
+def drafted(
+    server: ChatServer, answer: Answer | Iterable[Answer], out: Path | None = None, force: bool = False, **options: Any
+) -> Draft:
     if isinstance(answer, (str, tuple, dict)):
         server.answer = lambda request: answer
     else:
         answers = iter(answer)
         server.answer = lambda request: next(answers)
-    return aw.draft(WORDS, "test-model", server.url, out=out, **settings)
+    return aw.draft(WORDS, ModelOptions(model="test-model", base_url=server.url, **options), out=out, force=force)
 
 
 def files(folder: Path) -> set[str]:
@@ -76,8 +81,8 @@ def test_words_become_a_task_and_a_space(
         monkeypatch.setenv(name, value)
     chat_server.answer = lambda request: ANSWER
     model = wires.WIRES[wire]
-    named = ("test-model", chat_server.url) if model is None else (model,)
-    draft = aw.draft(WORDS, *named, out=tmp_path)
+    options = ModelOptions(model=model or "test-model", base_url=None if model else chat_server.url)
+    draft = aw.draft(WORDS, options, out=tmp_path)
     task, space = (yaml.safe_load(text) for text in (TASK, SPACE))
     assert [list(point) for point in draft.task.targets] == task["targets"]
     assert draft.task == aw.load_task(tmp_path / "wall.yaml")
@@ -259,7 +264,7 @@ def test_what_is_not_seen_does_not_reach_files_and_terminal(chat_server: ChatSer
 def test_words_with_line_ends_stay_in_their_comment(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = lambda request: ANSWER
     words = f"paint\nname: evil\n{'-' * 12}\x1b[0m\u2028targets: []"
-    draft = aw.draft(words, "m", chat_server.url, out=tmp_path / "a\nname: b")
+    draft = aw.draft(words, ModelOptions(model="m", base_url=chat_server.url), out=tmp_path / "a\nname: b")
     assert aw.load_task(draft.files[0]) == drafted(chat_server, ANSWER).task
     assert "# From the words: paint name: evil ------------ targets: []\n" in draft.task_yaml
     (prompt, _) = chat_server.prompts()
@@ -281,10 +286,9 @@ def test_the_second_answer_is_told_of_the_first(chat_server: ChatServer, tmp_pat
 def test_faults_are_one_line_and_write_no_task(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, name: str
 ) -> None:
-    monkeypatch.setattr("armwright.llm.client.CALL_SECONDS", 1.0)
     monkeypatch.setattr("armwright.llm.client.RETRY_SECONDS", 0.01)
     with pytest.raises(ModelError) as fault:
-        drafted(chat_server, FAULTS[kind][name], tmp_path)
+        drafted(chat_server, FAULTS[kind][name], tmp_path, timeout=1.0)
     assert str(fault.value).startswith("no draft: test-model: ")
     assert str(fault.value).endswith("armwright init my-task.yaml writes a task to edit without a model")
     assert "\n" not in str(fault.value)
@@ -342,7 +346,7 @@ def test_a_scripted_answer_is_never_a_models(chat_server: ChatServer, tmp_path: 
     assert [call.origin for call in Transcript(tmp_path / DRAFTS).calls] == ["scripted"]
     with pytest.raises(ModelError, match="a scripted stand-in for a model"):
         drafted(chat_server, "no", tmp_path, origin="scripted")
-    with pytest.raises(SettingsError, match='unknown origin "robot"'):
+    with pytest.raises(ValidationError, match='unknown origin "robot"'):
         drafted(chat_server, ANSWER, tmp_path, origin="robot")
 
 
@@ -350,7 +354,7 @@ def test_calls_are_bounded_each_draft_by_itself(chat_server: ChatServer, tmp_pat
     wrong = REFUSED["unknown key"][0]
     for most in (1, 2):
         before = len(chat_server.requests)
-        with pytest.raises(ModelError, match=f'unknown key "paylod".*--max-calls {most} is used up') as fault:
+        with pytest.raises(ModelError, match=f'unknown key "paylod".*max_calls {most} is used up') as fault:
             drafted(chat_server, wrong, tmp_path, max_calls=most)
         assert fault.value.final == "budget"
         assert len(chat_server.requests) == before + most
@@ -367,13 +371,13 @@ def test_costs_are_bounded_by_public_prices(
     for name, value in wires.environment(chat_server).items():
         monkeypatch.setenv(name, value)
     chat_server.answer = lambda request: REFUSED["unknown key"][0]
-    with pytest.raises(SettingsError, match="the price of test-model is not known, so --max-cost 1 cannot hold"):
+    with pytest.raises(SettingsError, match="the price of test-model is not known, so max_cost = 1 cannot hold"):
         drafted(chat_server, ANSWER, tmp_path, max_cost=1.0)
-    with pytest.raises(SettingsError, match=r"a draft takes about 0\.0\d+ USD, more than --max-cost 0\.001"):
-        aw.draft(WORDS, "openai-chat:gpt-4o", out=tmp_path, max_cost=0.001)
+    with pytest.raises(SettingsError, match=r"a draft takes about 0\.0\d+ USD, more than max_cost = 0\.001"):
+        aw.draft(WORDS, ModelOptions(model="openai-chat:gpt-4o", max_cost=0.001), out=tmp_path)
     assert chat_server.requests == []
     chat_server.answer = lambda request: ANSWER
-    draft = aw.draft(WORDS, "openai-chat:gpt-4o", out=tmp_path, max_cost=0.5)
+    draft = aw.draft(WORDS, ModelOptions(model="openai-chat:gpt-4o", max_cost=0.5), out=tmp_path)
     assert draft.account.cost_usd is not None
     assert 0.0 < draft.account.cost_usd < 0.01
 
@@ -390,15 +394,15 @@ def test_without_a_model_there_is_one_error_that_says_what_to_do(in_folder: Path
 @pytest.mark.parametrize("words", ["", " \n ", "\x1b[0m"])
 def test_no_words_are_refused(chat_server: ChatServer, words: str) -> None:
     with pytest.raises(SettingsError, match="there are no words to draft from"):
-        aw.draft(words, "m", chat_server.url)
+        aw.draft(words, ModelOptions(model="m", base_url=chat_server.url))
     with pytest.raises(SettingsError, match="at most 10,000 are taken"):
-        aw.draft("w" * (LONGEST_WORDS + 1), "m", chat_server.url)
+        aw.draft("w" * (LONGEST_WORDS + 1), ModelOptions(model="m", base_url=chat_server.url))
     assert chat_server.requests == []
 
 
 def test_the_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     chat_server.answer = lambda request: ANSWER
-    server = ("--base-url", chat_server.url, "--model", "test-model")
+    server = (*model_options(base_url=chat_server.url), "--model", "test-model")
     done = armwright("draft", *WORDS.split(), *server)  # without quotes, too
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
@@ -413,7 +417,7 @@ def test_the_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     assert files(in_folder) == {"wall.yaml", "wall-space.yaml", DRAFTS}  # nothing was run
     assert WORDS in chat_server.prompts()[0]
 
-    short = ("--n-init", "2", "--n-total", "1", "--no-figures", "--no-verify")
+    short = ("--n-init", "2", "--n-total", "1", "--no-figures")
     for line, more in zip(lines[-2:], ((), short), strict=True):
         assert armwright(*line.split()[1:], *more).returncode == 0
     taken = armwright("draft", WORDS, *server, "--json")
@@ -422,7 +426,15 @@ def test_the_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     assert asking.startswith("asking test-model")
     assert "wall.yaml exists already" in error
     assert error.endswith("--force replaces files; --out names another folder")
-    forced = armwright("draft", WORDS, *server, "--force", "--json", "--origin", "scripted")
+    forced = armwright(
+        "draft",
+        WORDS,
+        "--model",
+        "test-model",
+        "--force",
+        "--json",
+        *model_options(base_url=chat_server.url, origin="scripted"),
+    )
     record = json.loads(forced.stdout)
     assert (record["files"], record["origin"], record["calls"]) == (["wall.yaml", "wall-space.yaml"], "scripted", 1)
     assert record["task"]["payload"] == 0.5
@@ -447,7 +459,7 @@ def test_ctrl_c_ends_the_call_and_writes_no_task(chat_server: ChatServer, in_fol
         return ANSWER
 
     chat_server.answer = answer
-    done = armwright("draft", WORDS, "--model", "m", "--base-url", chat_server.url)
+    done = armwright("draft", WORDS, "--model", "m", *model_options(base_url=chat_server.url))
     released.set()
     assert (done.returncode, done.stderr) == (130, "")
     assert done.stdout.endswith("\nstopped; no task was written\n")

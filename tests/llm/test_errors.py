@@ -15,7 +15,6 @@ from armwright.llm import client as chat
 from armwright.llm.backend import FINAL, CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
-from armwright.proposers.llm import LlmProposer
 from armwright.study.study import Progress, Run, optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import (
@@ -31,7 +30,7 @@ from tests.support.chat_server import (
     streamed_events,
 )
 from tests.support.model_faults import FAULTS, anthropic_error, openai_error, rate_limit, said
-from tests.support.wire_formats import WIRES, proposer
+from tests.support.wire_formats import WIRES, llm_proposer, proposer
 
 PROBLEM = Problem(load_task("target-1"))
 ENDLESS = ("slow first byte", "dripping body")
@@ -53,10 +52,21 @@ def ask(
 ) -> Callable[..., tuple[Run, list[Progress]]]:
     """A short run in tmp_path/run, and all that it reported."""
 
-    def run(wire: str, n_total: int = 6, n_step: int = 3, **how: Any) -> tuple[Run, list[Progress]]:
+    def run(
+        wire: str, n_total: int = 6, n_step: int = 3, slow_at: int | None = None, timeout: float = 120.0, **how: Any
+    ) -> tuple[Run, list[Progress]]:
         shown: list[Progress] = []
-        watch = how.pop("watch", shown.append)
-        asked = proposer(wire, chat_server, monkeypatch)
+        asked = proposer(wire, chat_server, monkeypatch, timeout=timeout)
+
+        also = how.pop("watch", None)
+
+        def watch(progress: Progress) -> None:
+            shown.append(progress)
+            if also is not None:
+                also(progress)
+            if progress.number == slow_at and isinstance(asked.backend, chat.ModelClient):
+                asked.backend.timeout = 0.2
+
         result = optimize(
             PROBLEM, proposer=asked, n_init=4, n_step=n_step, n_total=n_total, out=tmp_path / "run", watch=watch, **how
         )
@@ -116,15 +126,8 @@ def test_later_a_fault_is_a_black_box_trial_and_is_counted(
     kind: str,
     name: str,
 ) -> None:
-    shown: list[Progress] = []
-
-    def watch(progress: Progress) -> None:
-        shown.append(progress)
-        if name in ENDLESS and progress.number == 7:
-            monkeypatch.setattr(chat, "CALL_SECONDS", 0.2)
-
     chat_server.answer = after(3, FAULTS[kind][name])
-    run, _ = ask(wire, watch=watch)
+    run, shown = ask(wire, slow_at=7 if name in ENDLESS else None)
     assert sources(run) == ["llm", "bbo", "bbo"] + ["bbo"] * 3
     assert [trial.fault for trial in run.trials[4:]] == [None, None, None, kind, None, None]
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())["proposer"]
@@ -187,9 +190,8 @@ def test_a_server_that_wants_a_moment_gets_it(
 def test_a_server_that_wants_more_patience_than_the_deadline_has_failed_at_once(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Callable[..., Any], wire: str, retry_after: str
 ) -> None:
-    monkeypatch.setattr(chat, "CALL_SECONDS", 60.0)  # a test that waited for it would be seen
     chat_server.answer = after(3, rate_limit(retry_after=retry_after))
-    run, _ = ask(wire)
+    run, _ = ask(wire, timeout=60.0)  # a test that waited for it would be seen
     assert run.trials[7].fault == "rate_limit"
     assert len(chat_server.requests) == 4
 
@@ -261,7 +263,7 @@ def test_a_key_that_no_header_can_hold_is_named_as_that(
 ) -> None:
     monkeypatch.setenv("ARMWRIGHT_API_KEY", key)
     with pytest.raises(ModelError, match="its key cannot be sent") as caught:
-        optimize(PROBLEM, proposer=LlmProposer("m", chat_server.url), n_total=1)
+        optimize(PROBLEM, proposer=llm_proposer(chat_server.url, model="m"), n_total=1)
     assert "planted" not in str(caught.value)
 
 

@@ -39,9 +39,11 @@ def run_alone(server: ChatServer, *arguments: str, **environment: str) -> subpro
     return subprocess.run(command, capture_output=True, text=True, env=env, stdin=subprocess.DEVNULL)
 
 
-def model_of(wire: str, server: ChatServer) -> tuple[str, ...]:
+def model_of(wire: str, server: ChatServer, **options: str) -> tuple[str, ...]:
     model = WIRES[wire]
-    return ("--model", "m", "--base-url", server.url) if model is None else ("--model", model)
+    if model is None:
+        return ("--model", "m", *wires.model_options(base_url=server.url, **options))
+    return ("--model", model, *wires.model_options(**options))
 
 
 def words_of(file: Path) -> str:
@@ -169,7 +171,7 @@ def test_no_key_is_on_a_command_line(chat_server: ChatServer, in_folder: Path) -
         return json.dumps(GOOD_DESIGN)
 
     chat_server.answer = answer
-    how = (*model_of("openai", chat_server), "--answer", "one-step", "--no-figures", "--live", "--out", "run")
+    how = (*model_of("openai", chat_server, answer="one-step"), "--no-figures", "--live", "--out", "run")
     done = run_alone(chat_server, "optimize", "target-1", *SHORT, *how)
     assert done.returncode == 0, done.stderr
     own = [command for command in seen if str(in_folder) in command or "optimize target-1" in command]

@@ -60,7 +60,7 @@ ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
     "page of a run": ("live", "starlette", lambda: begin_server(Path("run"))),
     "model": ("llm", "pydantic_ai", lambda: aw.LlmProposer("openai-chat:gpt-4o")),
     "model of a study": ("llm", "openai", lambda: aw.StudyLlmProposer("openai-chat:gpt-4o", "two numbers")),
-    "draft": ("llm", "openai", lambda: aw.draft("reach a shelf", model="openai-chat:gpt-4o")),
+    "draft": ("llm", "openai", lambda: aw.draft("reach a shelf", "openai-chat:gpt-4o")),
 }
 
 

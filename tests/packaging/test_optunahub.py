@@ -38,7 +38,9 @@ def test_optunahub_loads_it(module: ModuleType) -> None:
 
 def test_the_model_is_asked_through_it(module: ModuleType, chat_server: ChatServer) -> None:
     chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.5}, "reason": "a half"}'
-    proposer = module.StudyLlmProposer("m", "a parabola", chat_server.url, answer="one-step", origin="scripted")
+    proposer = module.StudyLlmProposer(
+        module.ModelOptions(model="m", base_url=chat_server.url, answer="one-step", origin="scripted"), "a parabola"
+    )
     study = optuna.create_study()
     study.optimize(
         lambda trial: trial.suggest_float("x", -9, 9) ** 2,

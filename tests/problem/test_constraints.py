@@ -28,7 +28,6 @@ from armwright.pareto import (
 from armwright.problem.constraints import QUANTITIES, Constraint, read_constraints
 from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.proposer import study_history
-from armwright.proposers.llm import LlmProposer
 from armwright.proposers.replay import ReplayProposer
 from armwright.report.figures import write_figures
 from armwright.runs.attribution import credit_by_source
@@ -50,6 +49,7 @@ from armwright.tasks.task import Task, load_task
 from armwright.tasks.task_template import task_template
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.fixed_problem import FixedProblem, fixed_history
+from tests.support.wire_formats import llm_proposer
 
 EXAMPLES = settings(deadline=None, max_examples=200, derandomize=True, database=None)
 SPACE = paper_space()
@@ -339,7 +339,7 @@ def test_a_replay_has_the_same_constraints_to_the_bit(chat_server: ChatServer, t
 
     chat_server.answer = answer
     problem, how = Problem(task(*BOUNDS)), {"n_init": 4, "n_step": 3, "n_total": 12, "seed": 1}
-    proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
+    proposer = llm_proposer(chat_server.url, origin="scripted")
     optimize(problem, proposer=proposer, out=tmp_path / "first", **how)  # type: ignore[arg-type]
     optimize(problem, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **how)  # type: ignore[arg-type]
     assert lines(tmp_path / "again") == lines(tmp_path / "first")

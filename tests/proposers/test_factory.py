@@ -1,4 +1,4 @@
-"""Which proposer a run gets, and what has no use with it."""
+"""Which proposer a run gets, and which options it refuses."""
 
 from pathlib import Path
 from typing import Any
@@ -6,33 +6,45 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import ReplayError, SettingsError
-from armwright.proposers.factory import Wishes, choose_proposer
+from armwright.llm.model_options import ModelOptions
+from armwright.proposers.factory import choose_proposer
 
 
 @pytest.mark.parametrize("name", ["rules", "none", "auto", "replay:x", "manual:x"])
 @pytest.mark.parametrize(
-    ("said", "value"),
+    ("option", "value"),
     [
         ("prompt", "minus"),
         ("memory", "none"),
         ("answer", "two-step"),
         ("proposals", 1),
         ("temperature", 0.0),
-        ("model_seed", 0),
+        ("seed", 0),
         ("output", "auto"),
         ("origin", "model"),
-        ("max_calls", 0),
-        ("max_cost", 0.0),
+        ("in_flight", 1),
+        ("max_calls", 1),
+        ("max_cost", 1.0),
+        ("on_failure", "stop"),
+        ("replay_strict", False),
+        ("wait", True),
     ],
 )
-def test_an_option_that_has_no_use_is_refused(tmp_path: Path, name: str, said: str, value: Any) -> None:
-    """Also where it says what would be so by itself."""
-    wishes = Wishes(name.replace("x", str(tmp_path / "x")), **{said: value})
-    if name == "manual:x" and said in ("prompt", "memory", "proposals"):
-        assert choose_proposer(wishes).proposer is not None
-    elif name == "replay:x" and said in ("prompt", "memory", "answer", "proposals"):  # checked against the record
+def test_an_option_without_effect_is_refused(tmp_path: Path, name: str, option: str, value: Any) -> None:
+    """Also if it states the default."""
+    chosen, options = name.replace("x", str(tmp_path / "x")), ModelOptions(**{option: value})
+    if name == "manual:x" and option in ("prompt", "memory", "proposals", "wait"):
+        assert choose_proposer(chosen, options).proposer is not None
+    elif name == "replay:x" and option in (
+        "prompt",
+        "memory",
+        "answer",
+        "proposals",
+        "in_flight",
+        "replay_strict",
+    ):  # checked against the record
         with pytest.raises(ReplayError, match="to replay"):
-            choose_proposer(wishes)
+            choose_proposer(chosen, options)
     else:
-        with pytest.raises(SettingsError, match=f"--{said.replace('_', '-')} {value}"):
-            choose_proposer(wishes)
+        with pytest.raises(SettingsError, match=f"{option} = {value}"):
+            choose_proposer(chosen, options)

@@ -13,6 +13,7 @@ import pytest
 
 from armwright.exceptions import AnswerPendingError, FailureError, SettingsError
 from armwright.llm import manual as people
+from armwright.llm.model_options import PromptOptions
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.manual import ManualProposer
@@ -22,6 +23,7 @@ from armwright.study.study import Run, optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import GOOD_DESIGN
 from tests.support.command_line import armwright
+from tests.support.wire_formats import model_options
 
 PROBLEM = Problem(load_task("target-1"))
 LINES = """\
@@ -42,13 +44,13 @@ def run(proposer: ManualProposer | ReplayProposer, out: Path | None, n_total: in
 
 def pending(folder: Path, out: Path, **how: str) -> AnswerPendingError:
     with pytest.raises(AnswerPendingError) as waits:
-        run(ManualProposer(folder, wait=False, **how), out)
+        run(ManualProposer(folder, PromptOptions(**how), wait=False), out)
     return waits.value
 
 
 def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> None:
     command = (
-        *("optimize", "target-1", "--proposer", "manual:ask", "--once"),
+        *("optimize", "target-1", "--proposer", "manual:ask", *model_options(wait=False)),
         *("--n-init", "4", "--n-step", "3", "--n-total", "6", "--no-figures", "--out", "run"),
     )
 
@@ -66,7 +68,7 @@ def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> N
     assert names() == {"004-prompt.md"}
     question = (in_folder / first).read_text(encoding="utf-8")
     assert "REASON: the main reason" in question
-    assert preview_after(in_folder / "run", {}).prompt == question
+    assert preview_after(in_folder / "run").prompt == question
 
     (in_folder / last).write_text(LINES.replace("0.2)", "2.5)"), encoding="utf-8")
     done = go("--json")
@@ -173,7 +175,7 @@ def test_several_designs_and_what_is_expected_of_them(tmp_path: Path) -> None:
 
 def test_only_files_that_wait_are_announced(tmp_path: Path) -> None:
     """Neither questions that lie answered, nor trials for which a design lies ready."""
-    proposer = ManualProposer(tmp_path / "ask", proposals=2, wait=False)
+    proposer = ManualProposer(tmp_path / "ask", PromptOptions(proposals=2), wait=False)
     notes: list[str] = []
     for text in (LINES + LINES.replace("0.01", "0.02"), ""):
         with pytest.raises(AnswerPendingError) as waits:
@@ -191,7 +193,7 @@ def test_people_are_not_asked_while_trials_go_on(tmp_path: Path) -> None:
 def test_a_folder_with_what_is_left_of_another_run_is_refused(tmp_path: Path) -> None:
     pending(tmp_path / "ask", tmp_path / "run")
     with pytest.raises(FailureError, match=r"004-prompt\.md holds a question of another run"):
-        run(ManualProposer(tmp_path / "ask", "minus", wait=False), tmp_path / "other")
+        run(ManualProposer(tmp_path / "ask", PromptOptions(prompt="minus"), wait=False), tmp_path / "other")
     (tmp_path / "ask" / "004-answer.md").write_text(LINES, encoding="utf-8")
     (tmp_path / "ask" / "007-answer.md").write_text(LINES, encoding="utf-8")
     with pytest.raises(FailureError, match=r"007-answer\.md lies there before its question"):

@@ -11,14 +11,15 @@ from typing import Any
 import pytest
 
 from armwright.exceptions import ReplayError, SettingsError
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
-from armwright.proposers.factory import Wishes, choose_proposer
-from armwright.proposers.llm import LlmProposer
+from armwright.proposers.factory import choose_proposer
 from armwright.proposers.replay import ReplayProposer
 from armwright.study.study import Progress, Run, optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
 SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 12, "seed": 1}
@@ -41,7 +42,7 @@ def varied(chat_server: ChatServer) -> ChatServer:
 
 
 def recorded(server: ChatServer, out: Path, asking: dict[str, Any] | None = None, **settings: Any) -> Run:
-    proposer = LlmProposer("test-model", server.url, **(asking or {}), origin="scripted")
+    proposer = llm_proposer(server.url, origin="scripted", **asking or {})
     return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
 
 
@@ -223,32 +224,32 @@ def test_what_a_transcript_cannot_say_is_taken_from_the_wishes(varied: ChatServe
     recorded(varied, tmp_path / "first", {"prompt": str(mine), "memory": "own"})
     shutil.copy(tmp_path / "first" / "transcripts.jsonl", tmp_path / "alone.jsonl")
     for record in ("first", "alone.jsonl"):
-        wishes = Wishes(f"replay:{tmp_path / record}", prompt=str(mine), memory="own", replay_strict=True)
-        again = optimize(PROBLEM, proposer=choose_proposer(wishes).proposer, **SETTINGS)
+        options = ModelOptions(prompt=str(mine), memory="own", replay_strict=True)
+        again = optimize(PROBLEM, proposer=choose_proposer(f"replay:{tmp_path / record}", options).proposer, **SETTINGS)
         assert again.summary["proposer"]["failures"] == {}
 
 
 @pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize(
-    ("wish", "words"),
+    ("option", "words"),
     [
-        ({"memory": "own"}, "recorded with memory none; leave out --memory own"),
-        ({"answer": "one-step"}, "recorded with answer two-step; leave out --answer one-step"),
-        ({"proposals": 4}, "recorded with proposals 1; leave out --proposals 4"),
-        ({"prompt": "minus"}, "recorded with prompt plus; leave out --prompt minus"),
+        ({"memory": "own"}, "recorded with memory = none; leave out memory = own"),
+        ({"answer": "one-step"}, "recorded with answer = two-step; leave out answer = one-step"),
+        ({"proposals": 4}, "recorded with proposals = 1; leave out proposals = 4"),
+        ({"prompt": "minus"}, "recorded with prompt = plus; leave out prompt = minus"),
     ],
 )
 def test_wishes_that_contradict_the_record_are_refused(
-    chat_server: ChatServer, tmp_path: Path, wish: dict[str, Any], words: str, alone: bool
+    chat_server: ChatServer, tmp_path: Path, option: dict[str, Any], words: str, alone: bool
 ) -> None:
     recorded(chat_server, tmp_path / "first", n_total=1)
     if alone:
         (tmp_path / "first" / "config.yaml").unlink()
-    if alone and wish.keys() & {"prompt", "memory"}:  # which nothing in the transcript says
-        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", **wish))
+    if alone and option.keys() & {"prompt", "memory"}:  # which nothing in the transcript says
+        choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option))
         return
     with pytest.raises(SettingsError, match=words):
-        choose_proposer(Wishes(f"replay:{tmp_path / 'first'}", **wish))
+        choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option))
 
 
 def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatServer, tmp_path: Path) -> None:
@@ -284,9 +285,9 @@ def test_what_cannot_be_replayed_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ReplayError, match="holds no proposal"):
         ReplayProposer(tmp_path)
     with pytest.raises(SettingsError, match="needs a run: replay:PATH"):
-        choose_proposer(Wishes("replay:"))
-    with pytest.raises(SettingsError, match="--replay-strict goes with"):
-        choose_proposer(Wishes("rules", replay_strict=True))
+        choose_proposer("replay:")
+    with pytest.raises(SettingsError, match="rules does not use replay_strict"):
+        choose_proposer("rules", ModelOptions(replay_strict=True))
 
 
 def test_a_record_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:

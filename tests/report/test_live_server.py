@@ -23,6 +23,7 @@ from tests.support.browser import Tab
 from tests.support.chat_server import Answer, ChatServer, Request, designer, wants_design
 from tests.support.command_line import PATIENCE, refused, start
 from tests.support.live_server import ask, served, wish
+from tests.support.wire_formats import model_options
 
 __all__ = ["served"]  # a fixture
 
@@ -98,7 +99,15 @@ def live() -> Iterator[ExitStack]:
 
 
 def model(server: ChatServer) -> list[str]:
-    return ["--model", "test-model", "--base-url", server.url, "--origin", "scripted", "--n-init", "4", "--n-step", "4"]
+    return [
+        "--model",
+        "test-model",
+        *model_options(base_url=server.url, origin="scripted"),
+        "--n-init",
+        "4",
+        "--n-step",
+        "4",
+    ]
 
 
 def test_designs_arrive_a_hint_is_used_and_stop_stops(

@@ -25,6 +25,7 @@ from armwright.runs.history import History
 from armwright.runs.selection import pick_from, read_condition
 from tests.support.browser import Tab
 from tests.support.chat_server import ChatServer, wants_design
+from tests.support.wire_formats import llm_proposer
 
 HOSTILE = (
     '</script><script>window.hacked = 1</script><img src=x onerror="window.hacked = 2"> &lt;b&gt; ${window.hacked=3}'
@@ -345,7 +346,7 @@ def test_words_of_others_stay_words(tmp_path: Path, tab: Tab, chat_server: ChatS
     best = dict(known_front(aw.Problem(task=task)).designs[0].params)
     answer = json.dumps({**best, "reason": HOSTILE})
     chat_server.answer = lambda request: answer if wants_design(request) else HOSTILE
-    proposer = aw.LlmProposer(HOSTILE, chat_server.url, origin="scripted")
+    proposer = llm_proposer(chat_server.url, model=HOSTILE, origin="scripted")
     problem = aw.Problem(task=task, space=aw.paper_space().model_copy(update={"name": HOSTILE[:100]}))
     run = aw.optimize(problem, proposer=proposer, n_init=4, n_step=2, n_total=4, out=tmp_path / "run")
     number = next(trial.number for trial in run.trials if trial.proposal)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -22,6 +23,7 @@ from armwright.exceptions import (
 from armwright.experiments.plan import ExperimentPlan, cells_of
 from armwright.experiments.runner import run_cell
 from armwright.llm import client as chat
+from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import Prompt, load_prompt, whole_template
 from armwright.llm.transcript import Call, Transcript, hints_of, used_hints
 from armwright.problem.problem import Problem
@@ -54,6 +56,7 @@ from armwright.tasks.task import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.command_line import armwright
 from tests.support.fixed_problem import FixedProblem, fixed_history
+from tests.support.wire_formats import llm_proposer, model_options
 
 PROBLEM = Problem(load_task("target-1"))
 SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2}
@@ -67,7 +70,7 @@ def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -
 
 
 def asks(server: ChatServer, **asking: Any) -> LlmProposer:
-    return LlmProposer("test-model", server.url, **asking)
+    return llm_proposer(server.url, **asking)
 
 
 def lines(folder: Path) -> list[dict[str, Any]]:
@@ -228,11 +231,20 @@ def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in
         return designer(request)
 
     chat_server.answer = answer
-    settings = ["optimize", "target-1", "--model", "m", "--base-url", chat_server.url, "--n-total", "6", "--no-figures"]
+    settings = [
+        "optimize",
+        "target-1",
+        "--model",
+        "m",
+        *model_options(base_url=chat_server.url),
+        "--n-total",
+        "6",
+        "--no-figures",
+    ]
     settings += ["--out", "run"]
     done = armwright(*settings)
     assert (done.returncode, done.stderr) == (130, "")
-    assert f"stopped; every finished trial is in run/. Go on with:\n  python -m armwright {' '.join(settings)}" in (
+    assert f"stopped; every finished trial is in run/. Go on with:\n  python -m armwright {shlex.join(settings)}" in (
         done.stdout
     )
     assert len(lines(out)) == 11  # the present design was evaluated
@@ -242,7 +254,8 @@ def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in
 
 
 def test_a_cell_that_is_stopped_has_failed_in_words(chat_server: ChatServer, tmp_path: Path) -> None:
-    method = {"label": "LLM", "proposer": "llm", "n_step": 3, "model": "m", "base_url": chat_server.url}
+    method: dict[str, Any] = {"label": "LLM", "proposer": "llm", "n_step": 3}
+    method["model_options"] = {"model": "m", "base_url": chat_server.url}
     plan = ExperimentPlan.model_validate(
         {"name": "one", "tasks": ["target-1"], "seeds": 1, "n_init": 4, "n_total": 6, "methods": {"llm": method}}
     )
@@ -522,7 +535,7 @@ def test_a_hint_of_a_question_that_was_interrupted_is_asked_again(chat_server: C
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
         run(out, asks(chat_server), watch=after(3, lambda: (add_hint(out, "first"), interrupt())))
-    shown = preview_after(out, {}).prompt
+    shown = preview_after(out).prompt
     assert NOTE + "first\n" in shown
     run(out, asks(chat_server))
     assert [call.prompt for call in calls(out) if call.hints] == [shown]
@@ -568,15 +581,15 @@ def test_another_hint_of_the_same_number_is_another_hint(chat_server: ChatServer
 def test_what_is_shown_is_what_is_sent(chat_server: ChatServer, tmp_path: Path) -> None:
     out = tmp_path / "run"
     run(out, asks(chat_server), n_total=3)
-    plain = preview_after(out, {}).prompt
+    plain = preview_after(out).prompt
     add_hint(out, "first")
-    shown = preview_after(out, {}).prompt
+    shown = preview_after(out).prompt
     assert shown.replace(f"{NOTE}first\n\n", "") == plain
-    assert NOTE in preview_after(out, {"prompt": "minus"}).prompt
+    assert NOTE in preview_after(out, PromptOptions(prompt="minus")).prompt
     run(out, asks(chat_server), n_total=6)
     assert [call.prompt for call in calls(out) if call.hints] == [shown]
-    assert preview_after(out, {}, number=7).prompt == shown
-    assert NOTE not in preview_after(out, {}).prompt
+    assert preview_after(out, number=7).prompt == shown
+    assert NOTE not in preview_after(out).prompt
 
 
 PAPER = FixedProblem(load_task("target-1"))

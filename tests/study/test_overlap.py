@@ -17,6 +17,7 @@ from armwright.runs.history import History
 from armwright.study.study import Progress, Run, optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
+from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
 N_INIT = 4
@@ -254,7 +255,7 @@ def test_nothing_is_paid_for_twice_when_a_run_is_interrupted(
     chat_server: ChatServer, tmp_path: Path, stop: int
 ) -> None:
     def proposer() -> LlmProposer:
-        return LlmProposer("test-model", chat_server.url)
+        return llm_proposer(chat_server.url)
 
     def interrupt(progress: Progress) -> None:
         if progress.doing == "finished" and progress.number == stop:
@@ -287,7 +288,7 @@ def test_an_interrupt_ends_the_questions_under_way(chat_server: ChatServer) -> N
 
     chat_server.answer = answer
     with pytest.raises(KeyboardInterrupt):
-        search(LlmProposer("test-model", chat_server.url), in_flight=3, watch=interrupt)
+        search(llm_proposer(chat_server.url), in_flight=3, watch=interrupt)
     for thread in threading.enumerate():
         if thread.name.startswith("armwright-request"):
             thread.join(30)

@@ -13,13 +13,13 @@ from armwright.exceptions import ArmwrightError, RunConflictError
 from armwright.llm.prompt_values import VARIABLES
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
-from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposer
 from armwright.study.study import Progress, Run, optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import armwright
 from tests.support.fixed_problem import SIX_AXIS
+from tests.support.wire_formats import llm_proposer, model_options
 
 PROBLEM = Problem(load_task("target-1"))
 OWN = '{% extends "proposal.md.j2" %}{% block role %}Only {{ n_finished }} designs so far.{% endblock %}'
@@ -60,7 +60,7 @@ def test_what_is_printed_is_what_is_sent(chat_server: ChatServer, in_folder: Pat
     if how.get("prompt") == "file":
         (in_folder / "own.md").write_text(OWN, encoding="utf-8")
         how = {"prompt": str(in_folder / "own.md")}
-    run(out, 3, LlmProposer("test-model", chat_server.url, **how))
+    run(out, 3, llm_proposer(chat_server.url, **how))
     (in_folder / "own.md").unlink(missing_ok=True)  # the run has it
     before, words = shown("target-1", "--after", "run")
     assert words.startswith("about ")
@@ -68,7 +68,7 @@ def test_what_is_printed_is_what_is_sent(chat_server: ChatServer, in_folder: Pat
     if (in_folder / "run" / "config.yaml").read_text().count("template:"):
         (in_folder / "own.md").write_text(OWN, encoding="utf-8")
         assert before.startswith("Only 7 designs so far.")
-    run(out, 4, LlmProposer("test-model", chat_server.url, **how))
+    run(out, 4, llm_proposer(chat_server.url, **how))
     first, second = asked(out)
     assert before == second.prompt
     assert shown("--after", "run", "--number", "7")[0] == second.prompt
@@ -81,11 +81,11 @@ def test_what_is_printed_is_what_is_sent(chat_server: ChatServer, in_folder: Pat
 
 
 def test_options_take_precedence_over_the_runs(chat_server: ChatServer, in_folder: Path) -> None:
-    run(in_folder / "run", 3, LlmProposer("test-model", chat_server.url, "minus", memory="own"))
+    run(in_folder / "run", 3, llm_proposer(chat_server.url, prompt="minus", memory="own"))
     told = shown("--after", "run")[0]
     assert "Step 1" not in told
     assert "Your earlier proposals" in told
-    told = shown("--after", "run", "--prompt", "plus", "--memory", "none", "--proposals", "2")[0]
+    told = shown("--after", "run", "--prompt", "plus", *model_options(memory="none", proposals=2))[0]
     assert "Step 1" in told
     assert "Your earlier proposals" not in told
     assert "2 new designs" in told
@@ -93,7 +93,7 @@ def test_options_take_precedence_over_the_runs(chat_server: ChatServer, in_folde
 
 def test_a_new_run(chat_server: ChatServer, in_folder: Path) -> None:
     before = shown("target-1", "--n-init", "4", "--seed", "5", "--prompt", "minus")[0]
-    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, "minus"))
+    run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt="minus"))
     assert [call.prompt for call in asked(in_folder / "run")] == [before]
 
 
@@ -106,20 +106,20 @@ def test_a_run_in_a_space_of_its_own_and_without_a_model(in_folder: Path) -> Non
 
 
 def test_what_is_still_to_come_is_said(chat_server: ChatServer, in_folder: Path) -> None:
-    run(in_folder / "run", 2, LlmProposer("test-model", chat_server.url))
+    run(in_folder / "run", 2, llm_proposer(chat_server.url))
     assert shown("--after", "run")[1].endswith("for trial 7; 1 trial comes before it, and will be in it\n")
     designs = [json.loads(json.dumps(dict(design.params))) for design in PROBLEM.space.sample(3, 1)]
     chat_server.answer = lambda request: json.dumps({"designs": designs}) if "response_format" in request else "so"
-    run(in_folder / "many", 3, LlmProposer("test-model", chat_server.url, proposals=3))
+    run(in_folder / "many", 3, llm_proposer(chat_server.url, proposals=3))
     assert shown("--after", "many")[1].endswith(
         "for trial 13; 6 trials come before it, 2 of them of the calls so far, and will be in it\n"
     )
-    run(in_folder / "many", 10, LlmProposer("test-model", chat_server.url, proposals=3))
+    run(in_folder / "many", 10, llm_proposer(chat_server.url, proposals=3))
     assert [call.proposal for call in asked(in_folder / "many")] == ["llm-0004", "llm-0013"]
 
 
 def test_past_prompts_of_an_overlapped_run(chat_server: ChatServer, in_folder: Path) -> None:
-    run(in_folder / "run", 7, LlmProposer("test-model", chat_server.url), in_flight=2)
+    run(in_folder / "run", 7, llm_proposer(chat_server.url), in_flight=2)
     calls = asked(in_folder / "run")
     assert len(calls) == 3
     for call in calls:
@@ -132,7 +132,7 @@ def interrupted(out: Path, stop: int, server: ChatServer, in_flight: int | None)
         if progress.doing == "finished" and progress.number == stop:
             raise KeyboardInterrupt
 
-    proposer = LlmProposer("test-model", server.url)
+    proposer = llm_proposer(server.url)
     with pytest.raises(KeyboardInterrupt):
         optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=9, seed=5, out=out, in_flight=in_flight,
                  watch=interrupt)  # fmt: skip
@@ -152,7 +152,7 @@ def test_after_an_interrupt_what_is_printed_is_what_is_sent_next(chat_server: Ch
     answered.set()
     told, words = shown("--after", "run")
     assert words.endswith("tokens; for trial 4\n")
-    run(in_folder / "run", 9, LlmProposer("test-model", chat_server.url), in_flight=2)
+    run(in_folder / "run", 9, llm_proposer(chat_server.url), in_flight=2)
     assert told == next(call.prompt for call in asked(in_folder / "run") if call.proposal == "llm-0004")
 
 
@@ -160,13 +160,13 @@ def test_after_an_interrupt_what_is_printed_is_what_is_sent_next(chat_server: Ch
 def test_where_only_the_thoughts_have_come_their_parameters_are_asked_for_next(
     chat_server: ChatServer, in_folder: Path, in_flight: int | None
 ) -> None:
-    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url), in_flight=in_flight)
+    run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)
     for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 2)):  # as a kill after the first answer leaves it
         file = in_folder / "run" / name
         file.write_text("".join(file.read_text().splitlines(keepends=True)[:lines]))
     told, words = shown("--after", "run")
     assert words.endswith("tokens; for trial 4\n")
-    run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url), in_flight=in_flight)
+    run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)
     calls = Transcript(in_folder / "run" / "transcripts.jsonl").calls
     assert told == next(call.prompt for call in calls if (call.proposal, call.step) == ("llm-0004", "parameters"))
     assert shown("--after", "run", "--number", "4")[0] == asked(in_folder / "run")[0].prompt
@@ -192,9 +192,9 @@ def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Pa
         (["target-1", "--number", "4"], "--number 4 goes with --after RUN"),
         (["target-1", "--prompt", "pluss"], 'unknown prompt "pluss". Did you mean "plus"?'),
         (["target-1", "--prompt", "."], "prompt . is a folder, not a template file"),
-        (["target-1", "--memory", "onw"], 'unknown memory "onw". Did you mean "own"?'),
-        (["target-1", "--answer", "two"], 'unknown answer "two"'),
-        (["target-1", "--proposals", "0"], "proposals = 0: a whole number from 1 to 100 is needed"),
+        (["target-1", *model_options(memory="onw")], 'unknown memory "onw". Did you mean "own"?'),
+        (["target-1", *model_options(answer="two")], 'unknown answer "two"'),
+        (["target-1", *model_options(proposals=0)], "proposals: Input should be greater than or equal to 1 (got 0)"),
         (["target-1", "--after", "nowhere"], "nowhere is not a run folder"),
         (["target-2", "--after", "run"], "run is a run of another task: target-1"),
         (["--after", "run", "--space", "space.yaml"], "run is a run of another space: paper"),
@@ -202,7 +202,7 @@ def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Pa
         (["--after", "run", "--n-init", "4"], "--n-init 4 goes with a new run; run has its own"),
         (["--after", "run", "--number", "5"], "--number 5: the proposals of run were asked for trials 4"),
         (["--after", "run", "--number", "-1"], "--number -1: the proposals of run were asked for trials 4"),
-        (["--after", "run", "--memory", "all"], 'unknown memory "all"'),
+        (["--after", "run", *model_options(memory="all")], 'unknown memory "all"'),
     ],
 )
 def test_mistakes_are_one_line(in_folder: Path, args: list[str], message: str) -> None:
@@ -227,8 +227,8 @@ def test_another_template_for_the_same_run_is_refused_in_one_line(chat_server: C
     for text in (OWN, OWN.replace("Only", "\n".join("Just"))):
         own.write_text(text, encoding="utf-8")
         if text == OWN:
-            run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, str(own)))
+            run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt=str(own)))
     with pytest.raises(RunConflictError, match=r"proposer\.template: .* there, .* asked") as refusal:
-        run(in_folder / "run", 1, LlmProposer("test-model", chat_server.url, str(own)))
+        run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt=str(own)))
     assert "\n" not in str(refusal.value)
     assert len(str(refusal.value)) < 400

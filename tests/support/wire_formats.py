@@ -1,10 +1,12 @@
 """The ways in which a model is spoken to, each with the proposer that speaks so to a test's server."""
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
 import pytest
 
+from armwright.llm.model_options import ModelOptions
 from armwright.proposers.llm import LlmProposer
 from tests.support.chat_server import ChatServer
 
@@ -32,9 +34,19 @@ def environment(server: ChatServer) -> dict[str, str]:
     }
 
 
-def proposer(wire: str, server: ChatServer, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> LlmProposer:
+def llm_proposer(url: str, **options: Any) -> LlmProposer:
+    """Ask the server at an address."""
+    return LlmProposer(ModelOptions(**{"model": "test-model", "base_url": url, **options}))
+
+
+def model_options(**options: Any) -> tuple[str, str]:
+    """Return options of a model for a command line."""
+    return "--model-options", json.dumps(options)
+
+
+def proposer(wire: str, server: ChatServer, monkeypatch: pytest.MonkeyPatch, **options: Any) -> LlmProposer:
     """Speaks as `wire` says, to the test's server instead of the vendor's."""
     for name, value in environment(server).items():
         monkeypatch.setenv(name, value)
     model = WIRES[wire]
-    return LlmProposer("test-model", server.url, **settings) if model is None else LlmProposer(model, **settings)
+    return llm_proposer(server.url, **options) if model is None else LlmProposer(ModelOptions(model=model, **options))

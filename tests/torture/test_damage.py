@@ -13,7 +13,6 @@ import pytest
 
 from armwright.exceptions import ArmwrightError, RunConflictError
 from armwright.problem.problem import Problem
-from armwright.proposers.llm import LlmProposer
 from armwright.report.page import write_report
 from armwright.runs.config import versions
 from armwright.runs.folder import read_config
@@ -21,6 +20,7 @@ from armwright.study.front_run import find_front
 from armwright.study.study import Run, optimize
 from armwright.tasks.task import load_task
 from tests.support.chat_server import ChatServer
+from tests.support.wire_formats import llm_proposer
 from tests.torture.lives import trials
 from tests.torture.test_kills import thoughtful
 
@@ -176,7 +176,7 @@ def test_damaged_transcripts(tmp_path: Path, chat_server: ChatServer, kills: int
     chat_server.answer = thoughtful
 
     def ask(folder: Path) -> Run:
-        return short(folder, proposer=LlmProposer("m", chat_server.url))
+        return short(folder, proposer=llm_proposer(chat_server.url, model="m"))
 
     intact = tmp_path / "intact"
     ask(intact)

@@ -18,6 +18,7 @@ import yaml
 
 from armwright.runs.folder import is_held
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
+from tests.support.wire_formats import model_options
 from tests.torture.lives import (
     Scenario,
     files,
@@ -39,7 +40,7 @@ SHARES = {
     "optimize, a larger --n-total": 0.05,
     "optimize, a local worker": 0.05,
     "optimize, a model": 0.125,
-    "optimize, a model with --overlap": 0.125,
+    "optimize, a model while it goes on": 0.125,
     "front": 0.15,
     "experiment": 0.125,
     "the first start, kernels compiled": 0.025,
@@ -136,7 +137,7 @@ def test_a_study_that_asks_a_model(
     torture: Callable[[str, Scenario], Counter[str]], chat_server: ChatServer, record_property: Tell
 ) -> None:
     chat_server.answer = thoughtful
-    asked = study(40, "--model", "m", "--base-url", chat_server.url, "--no-figures")
+    asked = study(40, "--model", "m", *model_options(base_url=chat_server.url), "--no-figures")
 
     def same(folder: Path, whole: Path) -> None:
         paid_once(folder)
@@ -157,7 +158,7 @@ def test_a_study_that_asks_a_model_while_it_goes_on(
 ) -> None:
     """What it comes to depends on when answers come, so its oracle is its own record, played again."""
     chat_server.answer = thoughtful
-    settings = ("--model", "m", "--base-url", chat_server.url, "--overlap", "--in-flight", "3", "--no-figures")
+    settings = ("--model", "m", *model_options(base_url=chat_server.url, in_flight=3), "--no-figures")
     asked = study(40, *settings)
 
     def numbered(folder: Path, whole: Path) -> None:
@@ -169,12 +170,14 @@ def test_a_study_that_asks_a_model_while_it_goes_on(
         assert sum(trial["source"] == "llm" for trial in trials(folder)) == 10
         n_requests = len(chat_server.requests)
         again = folder.with_name(f"{folder.name}-again")
-        replay = study(40, "--proposer", f"replay:{folder}", "--replay-strict", "--no-figures").arguments(again)
+        replay = study(
+            40, "--proposer", f"replay:{folder}", *model_options(replay_strict=True), "--no-figures"
+        ).arguments(again)
         subprocess.run([sys.executable, "-m", "armwright", *replay], check=True, capture_output=True)
         assert trials(again) == trials(folder)
         assert len(chat_server.requests) == n_requests
 
-    torture("optimize, a model with --overlap", Scenario(asked.arguments, asked.progress, numbered, same))
+    torture("optimize, a model while it goes on", Scenario(asked.arguments, asked.progress, numbered, same))
 
 
 # Its state is written every 5 s; here more often, so that short searches go on, too.

@@ -119,30 +119,74 @@ def options(
     """Options of armwright itself."""
 
 
+# Groups of options, as `--help` shows them.
+TASK, SEARCH, MODEL = "Task", "Search", "Language model"
+EVALUATION, OUTPUT = "Evaluation", "Output"
+
 # Options that several commands share.
 TaskName = Annotated[str, typer.Argument(help="A built-in task (see `armwright tasks`) or a YAML file.")]
-SpaceFile = Annotated[Path | None, typer.Option(help="Design space as a YAML file; without it, the paper's.")]
-ModelName = Annotated[str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.")]
+SpaceFile = Annotated[
+    Path | None, typer.Option(help="Design space as a YAML file; without it, the paper's.", rich_help_panel=TASK)
+]
 Objectives = Annotated[
-    str | None, typer.Option(help="What is minimised, instead of the task's: names with commas, see docs/method.md, 3.")
-]
-Robust = Annotated[
-    bool, typer.Option("--robust", help="Count a design by its worst case with the base or a link 1 mm off.")
-]
-DeviceName = Annotated[str, typer.Option(help="Where arms are evaluated: auto, cpu or cuda.")]
-Figures = Annotated[
-    bool, typer.Option("--figures/--no-figures", help="Make the page (report.html) and the figures of a finished run.")
+    str | None,
+    typer.Option(
+        help="Objectives to minimise instead of the task's: names with commas, see docs/method.md, 3.",
+        rich_help_panel=TASK,
+    ),
 ]
 EvaluatorName = Annotated[
     str | None,
     typer.Option(
-        help="A Python function of your own that measures arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run."
+        help="A custom Python function that evaluates arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run.",
+        rich_help_panel=TASK,
     ),
 ]
-BaseUrl = Annotated[str | None, typer.Option(help="Address of any OpenAI-compatible server.")]
+Robust = Annotated[
+    bool,
+    typer.Option(
+        "--robust", help="Count a design by its worst case with the base or a link 1 mm off.", rich_help_panel=TASK
+    ),
+]
+Seed = Annotated[int, typer.Option(help="Seed of everything random.", rich_help_panel=SEARCH)]
+ModelName = Annotated[
+    str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.", rich_help_panel=MODEL)
+]
+PromptName = Annotated[
+    str | None,
+    typer.Option(
+        help="Prompt: plus (with analysis instructions), minus, or a template file.",
+        show_default="plus",
+        rich_help_panel=MODEL,
+    ),
+]
+MaxCost = Annotated[float | None, typer.Option(help="Stop asking the model after so many USD.", rich_help_panel=MODEL)]
+ModelOptionsFile = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE",
+        help="All other settings of the model (base_url, temperature, in_flight, ...): a YAML file, or a mapping in "
+        "place such as '{temperature: 0}'; see docs/language-models.md.",
+        rich_help_panel=MODEL,
+    ),
+]
+DeviceName = Annotated[str, typer.Option(help="Evaluate arms on: auto, cpu or cuda.", rich_help_panel=EVALUATION)]
+Figures = Annotated[
+    bool,
+    typer.Option(
+        "--figures/--no-figures",
+        help="Make the page (report.html) and the figures of a finished run.",
+        rich_help_panel=OUTPUT,
+    ),
+]
+SummaryJson = Annotated[bool, typer.Option("--json", help="Print only summary.json to stdout.", rich_help_panel=OUTPUT)]
+Json = Annotated[bool, typer.Option("--json", help="Print as JSON.", rich_help_panel=OUTPUT)]
 Scheduler = Annotated[
     str | None,
-    typer.Option(help="Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight."),
+    typer.Option(
+        help="Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight.",
+        rich_help_panel=EVALUATION,
+    ),
 ]
 
 
@@ -152,104 +196,78 @@ def optimize(
     space: SpaceFile = None,
     objectives: Objectives = None,
     evaluator: EvaluatorName = None,
-    workers: Annotated[
-        int, typer.Option(help="Local processes that evaluate designs; 0: this process (extra distributed).")
-    ] = 0,
-    scheduler: Scheduler = None,
-    sampler: Annotated[
-        str, typer.Option(help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.")
-    ] = "tpe",
+    robust: Robust = False,
     proposer: Annotated[
         str,
         typer.Option(
             help="Who proposes every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
-            "replay:RUN (a recorded run again), manual:DIR (you, by files)."
+            "replay:RUN (a recorded run again), manual:DIR (you, by files).",
+            rich_help_panel=SEARCH,
         ),
     ] = "auto",
-    model: ModelName = None,
-    base_url: BaseUrl = None,
-    prompt: Annotated[
-        str | None,
+    sampler: Annotated[
+        str,
         typer.Option(
-            help="Prompt: plus (with analysis instructions), minus, or a template file of your own.  [default: plus]"
+            help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.",
+            rich_help_panel=SEARCH,
         ),
-    ] = None,
-    memory: Annotated[
-        str | None,
-        typer.Option(help="What the model sees of its own earlier proposals: none or own.  [default: none]"),
-    ] = None,
-    answer: Annotated[
-        str | None,
-        typer.Option(help="two-step (free reasoning, then a second call) or one-step.  [default: two-step]"),
-    ] = None,
-    proposals: Annotated[int | None, typer.Option(help="Designs that one call asks for.  [default: 1]")] = None,
-    temperature: Annotated[
-        float | None, typer.Option(help="Sent to the model only if given; the paper's is 0.")
-    ] = None,
-    model_seed: Annotated[int | None, typer.Option(help="Sent to the model only if given.")] = None,
-    output: Annotated[
-        str | None,
-        typer.Option(help="How answers are held to the schema: tool, native, prompted, auto.  [default: auto]"),
-    ] = None,
-    origin: Annotated[
-        str | None,
-        typer.Option(
-            help="What answers: model, or scripted for a stand-in; written with every call.  [default: model]"
-        ),
-    ] = None,
-    max_calls: Annotated[int | None, typer.Option(help="Ask no more after so many calls.")] = None,
-    max_cost: Annotated[float | None, typer.Option(help="Ask no more after so many USD.")] = None,
-    on_model_failure: Annotated[
-        str, typer.Option(help="If the model fails before the first trial: stop, or continue without it.")
-    ] = "stop",
-    overlap: Annotated[bool, typer.Option("--overlap", help="Ask while black-box trials go on.")] = False,
-    in_flight: Annotated[int | None, typer.Option(help="With --overlap: questions at a time.  [default: 1]")] = None,
-    replay_strict: Annotated[
-        bool, typer.Option("--replay-strict", help="A prompt that differs from the recorded one is an error.")
-    ] = False,
-    once: Annotated[
-        bool, typer.Option("--once", help="With manual:DIR: take the answers that are there, and exit at a question.")
-    ] = False,
-    robust: Robust = False,
+    ] = "tpe",
+    n_total: Annotated[int, typer.Option(help="Counted trials.", rich_help_panel=SEARCH)] = 200,
+    n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.", rich_help_panel=SEARCH)] = 10,
+    n_step: Annotated[
+        int, typer.Option(help="Trials in a block; the first is the proposer's.", rich_help_panel=SEARCH)
+    ] = 10,
     initial_design: Annotated[
         list[Path] | None,
-        typer.Option(help="A design to begin with, such as designs/0042/design.json of a run; several may be given."),
+        typer.Option(
+            help="An initial design, such as designs/0042/design.json of a run (may be repeated).",
+            rich_help_panel=SEARCH,
+        ),
     ] = None,
     refine_every: Annotated[
         int | None,
-        typer.Option(help="After so many counted trials, one refines a design of the front by 1000 evaluations."),
+        typer.Option(
+            help="After so many counted trials, one refines a design of the front by 1000 evaluations.",
+            rich_help_panel=SEARCH,
+        ),
     ] = None,
-    verify: Annotated[
-        bool, typer.Option("--verify/--no-verify", help="Mark each design of the front robust or sensitive.")
-    ] = True,
+    seed: Seed = 0,
+    model: ModelName = None,
+    prompt: PromptName = None,
+    max_cost: MaxCost = None,
+    model_options: ModelOptionsFile = None,
     device: DeviceName = "auto",
+    workers: Annotated[
+        int,
+        typer.Option(
+            help="Local processes that evaluate designs; 0: this process (extra distributed).",
+            rich_help_panel=EVALUATION,
+        ),
+    ] = 0,
+    scheduler: Scheduler = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Run folder; without it, runs/TASK-seedSEED.", rich_help_panel=OUTPUT)
+    ] = None,
     figures: Figures = True,
     live: Annotated[
-        bool, typer.Option("--live", help="Serve the page of the run on 127.0.0.1 while it goes on (extra live).")
+        bool,
+        typer.Option(
+            "--live", help="Serve the page of the run on 127.0.0.1 while it runs (extra live).", rich_help_panel=OUTPUT
+        ),
     ] = False,
-    n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.")] = 10,
-    n_step: Annotated[int, typer.Option(help="Trials in a block; the first is the proposer's.")] = 10,
-    n_total: Annotated[int, typer.Option(help="Counted trials.")] = 200,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Run folder; without it, runs/TASK-seedSEED.")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+    json_: SummaryJson = False,
 ) -> None:
     """Search designs for TASK. The same command again resumes or shows the run; a larger --n-total extends it."""
     from armwright.cli import console as view
-    from armwright.proposers.factory import Wishes, choose_proposer
+    from armwright.llm.configuration import load_model_options
+    from armwright.proposers.factory import choose_proposer
     from armwright.spaces.design_file import read_design
     from armwright.study.study import optimize as run_study
 
     words = view.stderr_console() if json_ else view.stdout_console()
     problem = _problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
-    wishes = Wishes(
-        proposer, model, base_url, prompt, memory, answer, proposals, temperature, model_seed, output, origin,
-        max_calls, max_cost, replay_strict, once,
-    )  # fmt: skip
-    if in_flight is not None and not overlap:
-        raise SettingsError(f"--in-flight {in_flight} goes with --overlap")
-    choice = choose_proposer(wishes)
+    choice = choose_proposer(proposer, load_model_options(model_options, model=model, prompt=prompt, max_cost=max_cost))
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     words.print(choice.reason)
     if live:
@@ -265,11 +283,10 @@ def optimize(
                 n_init=n_init,
                 n_step=n_step,
                 n_total=n_total,
-                in_flight=(1 if in_flight is None else in_flight) if overlap else None,
+                in_flight=choice.options.in_flight,
                 refine_every=refine_every,
                 initial_designs=initial_designs,
-                on_model_failure=on_model_failure,
-                verify=verify,
+                on_model_failure=choice.options.on_failure,
                 workers=_workers(workers, scheduler),
                 seed=seed,
                 out=folder,
@@ -315,17 +332,18 @@ def prompt_(
     ] = None,
     space: SpaceFile = None,
     prompt: Annotated[
-        str | None, typer.Option(help="Prompt: plus, minus, or a template file.  [default: the run's, else plus]")
+        str | None, typer.Option(help="Prompt: plus, minus, or a template file.", show_default="the run's, else plus")
     ] = None,
-    memory: Annotated[str | None, typer.Option(help="none or own.  [default: the run's, else none]")] = None,
-    answer: Annotated[
-        str | None, typer.Option(help="two-step, one-step, text (people).  [default: the run's, else two-step]")
+    model_options: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="memory, answer and proposals, in a YAML file or in place, such as '{memory: own}'.",
+            show_default="the run's",
+        ),
     ] = None,
-    proposals: Annotated[
-        int | None, typer.Option(help="Designs that one call asks for.  [default: the run's, else 1]")
-    ] = None,
-    n_init: Annotated[int | None, typer.Option(help="Random trials of the new run.  [default: 10]")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the new run.  [default: 0]")] = None,
+    n_init: Annotated[int | None, typer.Option(help="Random trials of the new run.", show_default="10")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the new run.", show_default="0")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the answer's JSON schema instead.")] = False,
     template: Annotated[
         bool, typer.Option("--template", help="Print the template of --prompt instead, to make your own from.")
@@ -333,9 +351,9 @@ def prompt_(
     variables: Annotated[bool, typer.Option("--variables", help="Print what a template may use instead.")] = False,
 ) -> None:
     """Print exactly what would be sent to a model for TASK, or how to write a prompt of your own."""
+    from armwright.llm.configuration import load_model_options
     from armwright.llm.prompt import whole_template
     from armwright.llm.prompt_values import VARIABLES
-    from armwright.proposers.prompted import Asking
     from armwright.spaces.design_space import load_space
     from armwright.study.prompt_preview import preview, preview_after
     from armwright.tasks.task import load_task
@@ -346,22 +364,21 @@ def prompt_(
     if template:
         print(whole_template(prompt or "plus"), end="")
         return
-    said = {"prompt": prompt, "memory": memory, "answer": answer, "proposals": proposals}
-    wishes: dict[str, Any] = {name: value for name, value in said.items() if value is not None}
+    options = load_model_options(model_options, prompt=prompt)
     if after is None:
         if task is None:
             raise SettingsError("armwright prompt needs a TASK (or --after RUN, --template, or --variables)")
         if number is not None:
             raise SettingsError(f"--number {number} goes with --after RUN")
         n_init = 10 if n_init is None else n_init
-        shown = preview(_problem(task, space), Asking(**wishes), n_init=n_init, seed=seed or 0)
+        shown = preview(_problem(task, space), options, n_init=n_init, seed=seed or 0)
     else:
         for option, value in (("--n-init", n_init), ("--seed", seed)):
             if value is not None:
                 raise SettingsError(f"{option} {value} goes with a new run; {after} has its own")
         shown = preview_after(
             after,
-            wishes,
+            options,
             task=None if task is None else load_task(task),
             space=None if space is None else load_space(space),
             number=number,
@@ -394,9 +411,9 @@ def front(
     stall: Annotated[
         bool, typer.Option("--stall/--no-stall", help="End early when the hypervolume hardly grows any more.")
     ] = True,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Run folder; without it, runs/TASK-front-seedSEED.")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+    json_: SummaryJson = False,
 ) -> None:
     """Find the whole front of TASK in seconds, by a search over designs in batches. A larger --budget goes on."""
     from armwright.cli import console as view
@@ -449,15 +466,15 @@ def experiment(
     method: Annotated[list[str] | None, typer.Option(help="Only this method of the file (may be repeated).")] = None,
     task: Annotated[list[str] | None, typer.Option(help="Only this task of the file (may be repeated).")] = None,
     model: ModelName = None,
-    base_url: BaseUrl = None,
+    model_options: ModelOptionsFile = None,
     replay: Annotated[
         Path | None, typer.Option(help="Folder of an earlier experiment, whose recorded calls stand for the model.")
     ] = None,
     workers: Annotated[
         int | None,
         typer.Option(
-            help="Local processes that run the cells; 0: this process.  [default: one a core with the extra "
-            "distributed, else 0]"
+            help="Local processes that run the cells; 0: this process.",
+            show_default="one per core with the extra distributed, else 0",
         ),
     ] = None,
     scheduler: Scheduler = None,
@@ -473,6 +490,7 @@ def experiment(
     from armwright.cli import console as view
     from armwright.experiments import outcome, plan
     from armwright.experiments import runner as running
+    from armwright.llm.configuration import load_model_options
     from armwright.report.experiment import write_experiment_figures, write_experiment_tables
 
     if print_:
@@ -480,7 +498,10 @@ def experiment(
         return
     words = view.stderr_console() if json_ or print_commands else view.stdout_console()
     whole, beside = plan.load_experiment(name)
-    chosen = plan.with_model(plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds), model, base_url)
+    chosen = plan.with_model(
+        plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds),
+        load_model_options(model_options, model=model),
+    )
     out = out or Path("experiments") / chosen.name
     cells, skipped = plan.cells_of(chosen, beside, out, replay)
     before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
@@ -520,7 +541,7 @@ def experiment(
 def compare(
     places: Annotated[list[Path], typer.Argument(help="Run folders, or folders with such below.")],
     baseline: Annotated[
-        str | None, typer.Option(help="The method that the others are compared with.  [default: of the first run]")
+        str | None, typer.Option(help="The method that the others are compared with.", show_default="of the first run")
     ] = None,
     figures: Figures = True,
     out: Annotated[
@@ -565,15 +586,16 @@ def compare_arms_(
         str | None, typer.Option(help="Where the base links stand, x,y,z in metres; without it, it is searched.")
     ] = None,
     tip: Annotated[
-        str | None, typer.Option(help="The link of the URDFs that is to reach the targets.  [default: the last one]")
+        str | None,
+        typer.Option(help="The link of the URDFs that is to reach the targets.", show_default="the last one"),
     ] = None,
     base_link: Annotated[
-        str | None, typer.Option(help="The link of the URDFs that stands at the base.  [default: the root]")
+        str | None, typer.Option(help="The link of the URDFs that stands at the base.", show_default="the root")
     ] = None,
     space: SpaceFile = None,
     figures: Figures = True,
     seed: Annotated[int, typer.Option(help="Seed of the search for the base.")] = 0,
-    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+    json_: Json = False,
 ) -> None:
     """Buy or build: evaluate arms that exist on TASK, beside the designs of a run."""
     from armwright.cli import console as view
@@ -613,8 +635,8 @@ def _point(words: str) -> tuple[float, float, float]:
 
 @app.command()
 def runs(
-    places: Annotated[list[Path] | None, typer.Argument(help="Folders to look in.  [default: runs]")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+    places: Annotated[list[Path] | None, typer.Argument(help="Folders to look in.", show_default="runs")] = None,
+    json_: Json = False,
 ) -> None:
     """List the runs that lie in a folder, and how far each has come."""
     from armwright.cli import console as view
@@ -640,7 +662,7 @@ def pick_(
     ] = None,
     robust: Annotated[bool, typer.Option("--robust", help="Only designs that hold when built 1 mm off.")] = False,
     most: Annotated[int, typer.Option("-n", help="So many designs, the best first.")] = 1,
-    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+    json_: Json = False,
 ) -> None:
     """Choose a design of RUN's front: by conditions, by one number or weights; else the knee of the front."""
     from armwright.cli import console as view
@@ -733,7 +755,7 @@ def live(
 def polish(
     run: Annotated[Path, typer.Argument(help="A finished run folder.")],
     evaluations: Annotated[int, typer.Option(help="Evaluations for each design of the front.")] = 1000,
-    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+    json_: SummaryJson = False,
 ) -> None:
     """Tune the lengths and the base of RUN's Pareto designs, and add what became better to the run."""
     from armwright.cli import console as view
@@ -750,7 +772,7 @@ def polish(
 @app.command()
 def verify(
     run: Annotated[Path, typer.Argument(help="A finished run folder.")],
-    json_: Annotated[bool, typer.Option("--json", help="Print summary.json alone to stdout.")] = False,
+    json_: SummaryJson = False,
 ) -> None:
     """Compute RUN's Pareto designs again, exactly and a little off, and mark each robust or sensitive."""
     from armwright.cli import console as view
@@ -769,22 +791,24 @@ def verify(
 @app.command()
 def doctor(
     model: ModelName = None,
-    base_url: BaseUrl = None,
+    model_options: ModelOptionsFile = None,
     call: Annotated[bool, typer.Option("--call", help="Make one tiny call to the configured model.")] = False,
 ) -> None:
     """Say what is installed and which models are configured; nothing is sent unless --call is given."""
     from armwright.cli import console as view
     from armwright.cli.doctor import WRONG, examine, try_model
+    from armwright.llm.configuration import load_model_options
 
     words = view.stdout_console()
+    options = load_model_options(model_options, model=model)
     wrong = False
-    for finding in examine(model, base_url):
+    for finding in examine(options):
         words.print(f"{finding.mark} {finding.subject}: {finding.words}")
         wrong = wrong or finding.mark == WRONG
     if wrong:
         sys.exit(FailureError.exit_code)
     if call:
-        words.print(try_model(model, base_url))
+        words.print(try_model(options))
 
 
 @app.command()
@@ -792,7 +816,7 @@ def tasks(
     names: Annotated[
         list[str] | None, typer.Argument(help="Tell all of these tasks (built-in, random-N, files).")
     ] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+    json_: Json = False,
 ) -> None:
     """List the built-in tasks; with names, tell their points and where they come from."""
     from armwright.cli import console as view
@@ -820,7 +844,7 @@ def tasks(
 
 
 @app.command()
-def actuators(json_: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> None:
+def actuators(json_: Json = False) -> None:
     """List the actuators of the catalogue, which a space file may name."""
     from armwright.cli import console as view
     from armwright.robot.actuators import catalogue
@@ -836,14 +860,8 @@ def actuators(json_: Annotated[bool, typer.Option("--json", help="Print as JSON.
 def draft(
     words: Annotated[list[str], typer.Argument(metavar="WORDS...", help="What the arm has to do, in any language.")],
     model: ModelName = None,
-    base_url: BaseUrl = None,
-    temperature: Annotated[float | None, typer.Option(help="Sent to the model only if given.")] = None,
-    model_seed: Annotated[int | None, typer.Option(help="Sent to the model only if given.")] = None,
-    origin: Annotated[
-        str, typer.Option(help="What answers: model, or scripted for a stand-in; written into the files.")
-    ] = "model",
-    max_calls: Annotated[int | None, typer.Option(help="Ask no more after so many calls.")] = None,
-    max_cost: Annotated[float | None, typer.Option(help="Ask no more after so many USD.")] = None,
+    max_cost: MaxCost = None,
+    model_options: ModelOptionsFile = None,
     out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("."),
     force: Annotated[bool, typer.Option("--force", help="Replace files of the same name.")] = False,
     print_prompt: Annotated[
@@ -853,6 +871,7 @@ def draft(
 ) -> None:
     """Have a language model draft a task file, and a space file where one is needed, from WORDS. Nothing is run."""
     from armwright.cli import console as view
+    from armwright.llm.configuration import load_model_options
     from armwright.llm.draft import Drafter, drafting_model
     from armwright.llm.draft_prompt import draft_prompt
 
@@ -861,16 +880,8 @@ def draft(
         print(draft_prompt(said), end="")
         return
     console = view.stderr_console() if json_ else view.stdout_console()
-    drafter = Drafter(
-        drafting_model(model, base_url),
-        out,
-        force,
-        temperature=temperature,
-        seed=model_seed,
-        max_calls=max_calls,
-        max_cost=max_cost,
-        origin=origin,
-    )
+    options = load_model_options(model_options, model=model, max_cost=max_cost)
+    drafter = Drafter(drafting_model(options), out, force)
     console.print(drafter.forecast(said))
     try:
         drafted = drafter.draft(said)

@@ -9,6 +9,7 @@ from armwright.exceptions import ArmwrightError, ModelError
 from armwright.extras import EXTRAS, install_command, is_installed, missing_packages
 from armwright.llm.backend import CallError
 from armwright.llm.configuration import configuration_path, configured_model
+from armwright.llm.model_options import ModelOptions
 from armwright.runs.config import versions
 
 OK, MISSING, WRONG = "ok", "--", "!!"
@@ -35,29 +36,30 @@ class Finding:
     words: str
 
 
-def examine(model: str | None = None, base_url: str | None = None) -> Iterator[Finding]:
+def examine(options: ModelOptions | None = None) -> Iterator[Finding]:
     """What is there, without sending anything anywhere. Values of keys are never shown."""
     yield Finding(OK, "versions", ", ".join(f"{name} {number}" for name, number in versions().items()))
     yield _kernels()
     yield from map(_extra, EXTRAS)
     yield from _vendors()
-    yield _configured(model, base_url)
+    yield _configured(options)
 
 
-def try_model(model: str | None = None, base_url: str | None = None) -> str:
+def try_model(options: ModelOptions | None = None) -> str:
     """One tiny call to the configured model; ModelError where it fails."""
-    configured = configured_model(model, base_url)
+    configured = configured_model(options)
     if configured is None:
         raise ModelError("no model is configured; give --model, or set ARMWRIGHT_MODEL")
     from armwright.llm.client import ModelClient
 
     try:
-        reply = ModelClient(configured.model, configured.base_url).check()
+        reply = ModelClient(configured.options).check()
     except CallError as fault:
         raise ModelError(f"{fault} ({fault.kind})") from fault
     cost = "price not known" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
+    answer = " ".join(reply.text.split())[:60]
     return (
-        f'{OK} call: {configured.model} answered "{" ".join(reply.text.split())[:60]}" in {reply.seconds:.1f} s, '
+        f'{OK} call: {configured.options.model} answered "{answer}" in {reply.seconds:.1f} s, '
         f"{reply.input_tokens} tokens in, {reply.output_tokens} out, {cost}"
     )
 
@@ -96,9 +98,9 @@ def _vendors() -> Iterator[Finding]:
             yield Finding(OK, vendor, words)
 
 
-def _configured(model: str | None, base_url: str | None) -> Finding:
+def _configured(options: ModelOptions | None) -> Finding:
     try:
-        configured = configured_model(model, base_url)
+        configured = configured_model(options)
     except ArmwrightError as fault:
         return Finding(WRONG, "model", str(fault))
     if configured is None:
@@ -107,13 +109,10 @@ def _configured(model: str | None, base_url: str | None) -> Finding:
             "model",
             f"none is configured (--model, ARMWRIGHT_MODEL, {configuration_path()}); the rules propose",
         )
-    named = f"{configured.model}, named by {configured.named_by}"
-    if configured.base_url:
-        named += f", at {configured.base_url}"
     try:
         from armwright.llm.client import ModelClient
 
-        ModelClient(configured.model, configured.base_url)
+        ModelClient(configured.options)
     except ArmwrightError as fault:
-        return Finding(WRONG, "model", f"{named}: {fault}")
-    return Finding(OK, "model", f"{named}; --call tries it")
+        return Finding(WRONG, "model", f"{configured}: {fault}")
+    return Finding(OK, "model", f"{configured}; --call tries it")

@@ -34,7 +34,7 @@ def show_plan(
     with_model = [cell for cell in due if cell.plan.asks_a_model and cell.replay is None]
     if with_model:
         proposals = sum(-(-cell.n_total // cell.plan.n_step) for cell in with_model)
-        models = ", ".join(sorted({str(cell.plan.model) for cell in with_model}))
+        models = ", ".join(sorted({str(cell.plan.model_options.model) for cell in with_model}))
         console.print(f"{len(with_model)} of them ask {models} for about {proposals:,} proposals in total")
 
 

@@ -14,20 +14,16 @@ from pydantic import AfterValidator, BaseModel, Field, field_validator, model_va
 from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.files import check_name
 from armwright.llm.configuration import configured_model
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import PROMPTS
 from armwright.llm.transcript import TRANSCRIPTS
-from armwright.proposers.factory import PROPOSERS, Wishes
+from armwright.proposers.factory import PROPOSERS, Choice, choose_proposer
 from armwright.tasks.task import builtin_names, load_task
 from armwright.yaml_documents import parse_document, read_document
 
 ALL_TASKS = "all"  # instead of a list: every built-in task
 RUNS = "runs"  # in an experiment's folder
 MOST_SEEDS = 10_000
-_OF_WISHES = (
-    "model", "base_url", "prompt", "memory", "answer", "proposals", "temperature", "model_seed", "output", "origin",
-    "max_calls", "max_cost",
-)  # fmt: skip
-
 MOST_CELLS = 100_000
 Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$"), AfterValidator(check_name)]
 Count = Annotated[int, Field(ge=1, le=2**31 - 1)]
@@ -44,31 +40,19 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     front: str | None = None  # a budget of `armwright front`, which then runs instead of a study
     sampler: str = "tpe"
     n_step: Count = 10
-    in_flight: Count | None = None
     refine_every: Count | None = None
-    model: str | None = None
-    base_url: str | None = None
-    prompt: str | None = None
-    memory: str | None = None
-    answer: str | None = None
-    proposals: Count | None = None
-    temperature: float | None = None
-    model_seed: int | None = None
-    output: str | None = None
-    origin: str | None = None
-    max_calls: Count | None = None
-    max_cost: float | None = None
+    model_options: ModelOptions = ModelOptions()
 
     @property
     def asks_a_model(self) -> bool:
         """Whether it can only run with a language model, or with a record of one."""
         return self.front is None and self.proposer == "llm"
 
-    def wishes(self, replay: Path | None = None) -> Wishes:
-        """What it says of the proposer; with a recorded run, that it is played again."""
+    def choose_proposer(self, replay: Path | None = None) -> Choice:
+        """Return its proposer; with a recorded run, that of the replay."""
         if replay is not None:
-            return Wishes(f"replay:{replay}")
-        return Wishes(self.proposer, **{name: getattr(self, name) for name in _OF_WISHES})
+            return choose_proposer(f"replay:{replay}")
+        return choose_proposer(self.proposer, self.model_options)
 
     @model_validator(mode="after")
     def _check_proposer(self) -> Self:
@@ -184,20 +168,18 @@ class Cell:
         return shlex.join([*_program(), *(self._front_options() if self.plan.front else self._study_options())])
 
     def _study_options(self) -> list[str]:
-        plan = self.plan
-        said: dict[str, Any] = {"proposer": f"replay:{self.replay}" if self.replay else plan.proposer}
-        if self.replay is None:
-            said |= {name: getattr(plan, name) for name in _OF_WISHES}
-        said |= {
+        plan, options = self.plan, self.plan.model_options
+        replayed = ModelOptions(in_flight=options.in_flight) if options.in_flight else ModelOptions()
+        said: dict[str, Any] = {
+            "proposer": f"replay:{self.replay}" if self.replay else plan.proposer,
+            **(replayed if self.replay else options).command_options(),
             "sampler": plan.sampler,
             "n-init": self.n_init,
             "n-step": plan.n_step,
             "n-total": self.n_total,
-            "in-flight": plan.in_flight,
             "refine-every": plan.refine_every,
         }
-        flags = ["--no-figures"] + ["--overlap"] * (plan.in_flight is not None)
-        return ["optimize", self.task, *self._options(said), *flags]
+        return ["optimize", self.task, *self._options(said), "--no-figures"]
 
     def _front_options(self) -> list[str]:
         return ["front", self.task, *self._options({"budget": self.plan.front}), "--no-figures"]
@@ -305,21 +287,23 @@ def _source_of_model(cell: Cell, replay: Path | None) -> tuple[Cell, str]:
         if (recorded / TRANSCRIPTS).is_file():
             return replace(cell, replay=recorded), ""
         return cell, f"{replay} holds no record of it"
-    if cell.plan.model is None:
+    if cell.plan.model_options.model is None:
         return cell, "no language model is configured; --model names one, --replay DIR plays recorded runs"
     return cell, ""
 
 
-def with_model(plan: ExperimentPlan, model: str | None, base_url: str | None) -> ExperimentPlan:
-    """The plan with the configured model, if there is one, for those of its methods that ask one and name none."""
-    configured = configured_model(model, base_url)
-    if configured is None:
-        return plan
-    named = {"model": configured.model, "base_url": configured.base_url}
-    methods = {
-        key: method.model_copy(update=named) if method.asks_a_model and method.model is None else method
-        for key, method in plan.methods.items()
-    }
+def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
+    """Return the plan with the configured model, if there is one, for the methods that ask one and name none.
+
+    What a method states goes before the options.
+    """
+    methods: dict[str, MethodPlan] = {}
+    for key, method in plan.methods.items():
+        if method.asks_a_model and method.model_options.model is None:
+            configured = configured_model(method.model_options.with_defaults(options))
+            if configured is not None:
+                method = method.model_copy(update={"model_options": configured.options})
+        methods[key] = method
     return plan.model_copy(update={"methods": methods})
 
 
@@ -368,10 +352,12 @@ def _task(name: str, beside: Path) -> tuple[str, str]:
 
 
 def _with_prompt(method: MethodPlan, beside: Path) -> MethodPlan:
-    """The method with its prompt's file as an absolute path."""
-    if method.prompt is None or method.prompt in PROMPTS:
+    """Return the method with its prompt's file as an absolute path."""
+    options = method.model_options
+    if options.prompt in PROMPTS:
         return method
-    return method.model_copy(update={"prompt": str((beside / method.prompt).resolve())})
+    options = options.model_copy(update={"prompt": str((beside / options.prompt).resolve())})
+    return method.model_copy(update={"model_options": options})
 
 
 def _program() -> list[str]:

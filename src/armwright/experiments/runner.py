@@ -13,7 +13,6 @@ from armwright.experiments.plan import Cell
 from armwright.extras import missing_packages
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem.problem import Problem
-from armwright.proposers.factory import choose_proposer
 from armwright.runs.config import check_same_run
 from armwright.runs.folder import read_config
 from armwright.runs.results import read_summary
@@ -62,12 +61,12 @@ def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
         return found.summary, found.resumed == found.summary["search"]["evaluations"]
     run = optimize(
         problem,
-        proposer=choose_proposer(plan.wishes(cell.replay)).proposer or "none",
+        proposer=plan.choose_proposer(cell.replay).proposer or "none",
         sampler=plan.sampler,
         n_init=cell.n_init,
         n_step=plan.n_step,
         n_total=cell.n_total,
-        in_flight=plan.in_flight,
+        in_flight=plan.model_options.in_flight,
         refine_every=plan.refine_every,
         seed=cell.seed,
         out=cell.folder,
@@ -91,9 +90,15 @@ def finished_before(cell: Cell) -> Outcome | None:
         return None
     plan = cell.plan
     try:
-        proposer = choose_proposer(plan.wishes(cell.replay)).proposer
+        proposer = plan.choose_proposer(cell.replay).proposer
         method = study_method(
-            proposer, plan.sampler, cell.n_init, plan.n_step, cell.n_total, plan.in_flight, plan.refine_every
+            proposer,
+            plan.sampler,
+            cell.n_init,
+            plan.n_step,
+            cell.n_total,
+            plan.model_options.in_flight,
+            plan.refine_every,
         )
         check_same_run(cell.folder, read_config(cell.folder), study_config(_problem(cell), method, cell.seed))
     except ArmwrightError:

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 
-from armwright.exceptions import ProposalError, SettingsError
+from armwright.exceptions import ProposalError
 from armwright.llm.backend import MOST_REQUESTS
 from armwright.llm.transcript import Call
 
@@ -18,11 +18,7 @@ class CallBudget:
     one question is asked at a time.
     """
 
-    def __init__(self, max_calls: int | None, max_cost: float | None) -> None:
-        if max_calls is not None and not (max_calls >= 1 and max_calls == int(max_calls)):
-            raise SettingsError(f"max_calls = {max_calls}: a whole number from 1 is needed")
-        if max_cost is not None and not 0.0 < max_cost < math.inf:
-            raise SettingsError(f"max_cost = {max_cost}: a number of USD above 0 is needed")
+    def __init__(self, max_calls: int | None = None, max_cost: float | None = None) -> None:
         self.max_calls = max_calls
         self.max_cost = max_cost
         self._change = threading.Condition()
@@ -93,12 +89,12 @@ class CallBudget:
     def _check(self) -> None:
         """ProposalError where nothing would be left even if those under way took nothing."""
         if self.price_is_missing:
-            words = f"what its calls cost is not known, so --max-cost {self.max_cost:g} cannot hold; use --max-calls"
+            words = f"what its calls cost is not known, so max_cost {self.max_cost:g} cannot hold; use max_calls"
             raise ProposalError("budget", words, final=True)
         if self.max_calls is not None and self._requests >= self.max_calls:
-            raise ProposalError("budget", f"--max-calls {self.max_calls} is used up", final=True)
+            raise ProposalError("budget", f"max_calls {self.max_calls} is used up", final=True)
         if self._left(0) < 1:
-            raise ProposalError("budget", f"--max-cost {self.max_cost:g} USD is used up", final=True)
+            raise ProposalError("budget", f"max_cost {self.max_cost:g} USD is used up", final=True)
 
     def _left(self, set_aside: int) -> int:
         """Requests of the next question, where so many are set aside for others."""

@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import math
 import os
 import re
 import threading
@@ -13,13 +12,14 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, replace
 from functools import cache
 from ipaddress import ip_address
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
-from armwright.exceptions import DesignError, MissingExtraError, SettingsError, did_you_mean
+from armwright.exceptions import DesignError, MissingExtraError, SettingsError
 from armwright.extras import requires_extra
 from armwright.llm.answer import without_words_around
 from armwright.llm.backend import CHECK, MOST_REQUESTS, CallError, Interrupted, LlmBackend, Question, Reader, Reply
+from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
 from armwright.llm.redaction import WithoutKeys, redacted, without_keys
 
 with requires_extra("llm", "a language model"):
@@ -41,17 +41,13 @@ with requires_extra("llm", "a language model"):
 # A price that cannot be known is no news to the user, who is told of costs by `describe_cost` and the budget.
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
 
-CALL_SECONDS = 120.0  # of one request, all attempts included
 CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
 REASKS = MOST_REQUESTS - 1  # after a refused answer
 RETRIES = 2  # after a fault that may pass
 RETRY_SECONDS = 0.5  # before the first retry, where the server says nothing; doubled before the next
-ORIGINS = ("model", "scripted")
-SERVER_KEY = "ARMWRIGHT_API_KEY"  # for --base-url, where the server wants a key
+SERVER_KEY = "ARMWRIGHT_API_KEY"  # for base_url, if the server wants a key
 NEAR = (".local", ".lan", ".home", ".internal")  # endings of names in a network of one's own
 
-OutputMode = Literal["auto", "tool", "native", "prompted"]
-OUTPUT_MODES: tuple[str, ...] = get_args(OutputMode)
 _OUTPUTS: Mapping[str, Any] = {"tool": ToolOutput, "native": NativeOutput, "prompted": PromptedOutput}
 
 # Servers of one's own that have a name: where they listen, and the environment's words for address and key.
@@ -82,7 +78,7 @@ class _Server(WrapperModel):
         model_settings: ModelSettings | None,
         model_request_parameters: ModelRequestParameters,
     ) -> ModelResponse:
-        deadline = time.monotonic() + (model_settings or {}).get("request_timeout", CALL_SECONDS)
+        deadline = time.monotonic() + (model_settings or {}).get("request_timeout", MODEL_SECONDS)
         retries = 0
         while True:
             try:
@@ -100,46 +96,25 @@ class _Server(WrapperModel):
 class ModelClient(LlmBackend):
     """One model behind one server. Every call is new: the model remembers nothing between calls.
 
-    model: `openai-chat:gpt-4o`, `anthropic:…`, `google:…`, `azure:…`, `openrouter:…`, `ollama:…`, `vllm:…`.
-    base_url: the address of any OpenAI-compatible server instead.
-    output: how an answer is held to a schema: by calling a tool (hosted models), natively (servers of one's own), or
-        by words in the prompt; auto chooses.
-    temperature, seed: sent only if they are set.
-    origin: `scripted` where a stand-in answers instead of a model; it is written with every call.
+    By "auto", an answer is held to its schema by a tool call with hosted models, and natively with other servers.
     """
 
-    def __init__(
-        self,
-        model: str,
-        base_url: str | None = None,
-        *,
-        output: str = "auto",
-        temperature: float | None = None,
-        seed: int | None = None,
-        origin: str = "model",
-    ) -> None:
-        if output not in OUTPUT_MODES:
-            raise SettingsError(
-                f'unknown output "{output}".{did_you_mean(output, OUTPUT_MODES)} Outputs: {", ".join(OUTPUT_MODES)}'
-            )
-        if origin not in ORIGINS:
-            raise SettingsError(f'unknown origin "{origin}": {" or ".join(ORIGINS)} is needed')
+    def __init__(self, options: ModelOptions) -> None:
+        model = options.model or ""
         if not model.rpartition(":")[2].strip():
             raise SettingsError(f'model "{model}" names no model: openai-chat:gpt-4o would')
-        if temperature is not None and not 0.0 <= temperature < math.inf:
-            raise SettingsError(f"temperature = {temperature}: a number from 0 is needed")
         self.model = model
-        self.origin = origin
-        self._place = _place(model, base_url)
+        self.origin = options.origin
+        self.timeout = options.timeout
+        self._place = _place(model, options.base_url)
         self._model = _Server(_model(model) if self._place is None else _own_server(self._place))
-        if output == "auto":
-            output = "tool" if self._place is None else "native"
-        self._output = _OUTPUTS[output]
+        hosted = "tool" if self._place is None else "native"
+        self._output = _OUTPUTS[hosted if options.output == "auto" else options.output]
         self._settings = ModelSettings()
-        if temperature is not None:
-            self._settings["temperature"] = temperature
-        if seed is not None:
-            self._settings["seed"] = seed
+        if options.temperature is not None:
+            self._settings["temperature"] = options.temperature
+        if options.seed is not None:
+            self._settings["seed"] = options.seed
         self._pending: set[Future[Any]] = set()
         self._cancelled = False
 
@@ -153,7 +128,7 @@ class ModelClient(LlmBackend):
 
     def ask(self, question: Question) -> Reply:
         """The free answer to a prompt."""
-        reply = self._run(Agent(self._model, retries=REASKS), question, CALL_SECONDS)
+        reply = self._run(Agent(self._model, retries=REASKS), question, self.timeout)
         if not reply.text.strip():
             raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
@@ -174,7 +149,7 @@ class ModelClient(LlmBackend):
         output = self._output(StructuredDict(dict(schema)))
         agent: Agent[None, Any] = Agent(self._model, output_type=output, retries=REASKS)
         agent.output_validator(accept)
-        return replace(self._run(agent, question, CALL_SECONDS), text=accepted[-1])
+        return replace(self._run(agent, question, self.timeout), text=accepted[-1])
 
     def cancel(self) -> None:
         """Ends all calls under way, and those that are about to begin."""
@@ -232,10 +207,10 @@ class ModelClient(LlmBackend):
             self._pending.discard(future)
 
 
-def estimated_cost(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> float | None:
-    """About what so many tokens will cost [USD], by the prices that calls are counted by; None where none is known."""
-    place = _place(model, base_url)
-    vendor, _, name = model.partition(":")
+def estimated_cost(options: ModelOptions, input_tokens: int, output_tokens: int) -> float | None:
+    """Return about what so many tokens cost [USD], by the prices that calls are accounted with; None if unknown."""
+    place = _place(options.model or "", options.base_url)
+    vendor, _, name = (options.model or "").partition(":")
     usage = Usage(input_tokens=input_tokens, output_tokens=output_tokens)
     try:
         if place is None:
@@ -247,12 +222,12 @@ def estimated_cost(model: str, base_url: str | None, input_tokens: int, output_t
     return float(price.total_price)
 
 
-def describe_cost(model: str, base_url: str | None, input_tokens: int, output_tokens: int) -> str:
-    """The same in words."""
-    cost = estimated_cost(model, base_url, input_tokens, output_tokens)
+def describe_cost(options: ModelOptions, input_tokens: int, output_tokens: int) -> str:
+    """Return the estimated cost in one phrase."""
+    cost = estimated_cost(options, input_tokens, output_tokens)
     if cost is not None:
         return f"about {cost:.2f} USD by public prices"
-    place = _place(model, base_url)
+    place = _place(options.model or "", options.base_url)
     if place is None:
         return "price not known"
     return "on a server of your own" if place.is_near else f"at {place.address}; its price is not known"
@@ -293,9 +268,7 @@ def _place(model: str, base_url: str | None) -> _Place | None:
 def _model(name: str) -> Model:
     """A vendor's model by its name; SettingsError where that is unknown, or its key is not set."""
     if ":" not in name:
-        raise SettingsError(
-            f'model "{name}": a vendor is needed before it, like openai-chat:{name}; or give --base-url'
-        )
+        raise SettingsError(f'model "{name}": a vendor is needed before it, like openai-chat:{name}; or set base_url')
     try:
         return infer_model(name)
     except faults.UserError as fault:
@@ -310,12 +283,12 @@ def _own_server(at: _Place) -> Model:
     """A model behind an OpenAI-compatible server. Nothing that belongs to a vendor goes there."""
     base_url = at.address
     if not base_url.startswith(("http://", "https://")):
-        raise SettingsError(f"--base-url {base_url}: an address that begins with http:// or https:// is needed")
+        raise SettingsError(f"base_url {base_url}: an address that begins with http:// or https:// is needed")
     place = base_url.partition("://")[2]
     if "@" in place.partition("/")[0] or "?" in place or "#" in place:
-        raise SettingsError(f"--base-url holds more than an address; put the server's key into {SERVER_KEY}")
+        raise SettingsError(f"base_url holds more than an address; put the server's key into {SERVER_KEY}")
     if not _is_address(base_url):
-        raise SettingsError(f"--base-url {base_url} is no address, such as http://localhost:8080/v1")
+        raise SettingsError(f"base_url {base_url} is no address, such as http://localhost:8080/v1")
     client = AsyncOpenAI(
         base_url=base_url,
         api_key=os.environ.get(at.key) or "no-key",

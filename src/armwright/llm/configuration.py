@@ -1,52 +1,73 @@
-"""Which language model is configured. A key lying in the environment configures none: it must be named."""
+"""Which language model is configured. A key in the environment configures none: the model must be named."""
 
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from platformdirs import user_config_path
-from pydantic import BaseModel
 
 from armwright.exceptions import SettingsError
-from armwright.yaml_documents import read_document
+from armwright.llm.model_options import ModelOptions
+from armwright.yaml_documents import check_document, parse_document, read_document
 
 
 @dataclass(frozen=True)
-class ModelName:
-    """A model (`openai-chat:gpt-4o`), the server where it is not the vendor's own, and who named it."""
+class ConfiguredModel:
+    """Options that name a model, and where its name comes from."""
 
-    model: str
-    base_url: str | None
+    options: ModelOptions
     named_by: str
 
-
-class _ConfigurationFile(BaseModel, frozen=True, extra="forbid"):
-    """What holds where neither an option nor the environment says otherwise."""
-
-    model: str | None = None  # such as openai-chat:gpt-4o
-    base_url: str | None = None  # of any OpenAI-compatible server
+    def __str__(self) -> str:
+        """Return model, server and origin of the name in one phrase."""
+        server = f" at {self.options.base_url}" if self.options.base_url else ""
+        return f"{self.options.model}{server}, named by {self.named_by}"
 
 
 def configuration_path() -> Path:
-    """The configuration file; it need not exist."""
+    """Return the path of the user's configuration file, which need not exist."""
     return user_config_path("armwright", appauthor=False) / "config.yaml"
 
 
-def configured_model(model: str | None = None, base_url: str | None = None) -> ModelName | None:
-    """The model by the option, else ARMWRIGHT_MODEL, else the configuration file; None where none is named.
+def load_model_options(source: str | None = None, **direct: Any) -> ModelOptions:
+    """Return the options of `--model-options`, overridden by single options of the command line.
 
-    The address comes from the option, else ARMWRIGHT_BASE_URL, else, for a model of the file, from the file: a
-    server of one's own in the file says nothing of a vendor's model that is named elsewhere.
+    Args:
+        source: A YAML file, or a mapping in place ("{temperature: 0}").
+        **direct: Fields of `ModelOptions`; None if not given.
+
+    Raises:
+        SettingsError: The file cannot be read, or a key or a value is not valid.
     """
-    base_url = base_url or os.environ.get("ARMWRIGHT_BASE_URL")
-    if model:
-        return ModelName(model, base_url, "--model")
-    named = os.environ.get("ARMWRIGHT_MODEL")
-    if named:
-        return ModelName(named, base_url, "ARMWRIGHT_MODEL")
+    given = {name: value for name, value in direct.items() if value is not None}
+    options = check_document(given, ModelOptions, SettingsError, "command line")
+    if source is None:
+        return options
+    if source.lstrip().startswith("{"):
+        stated = parse_document(source, ModelOptions, SettingsError, "--model-options")
+    else:
+        stated = read_document(Path(source), ModelOptions, SettingsError)
+    return options.with_defaults(stated)
+
+
+def configured_model(options: ModelOptions | None = None) -> ConfiguredModel | None:
+    """Return the options completed by the environment and the user's configuration file; None if no model is named.
+
+    The model's name comes from the options, else from ARMWRIGHT_MODEL, else from the configuration file. The address
+    comes from the options, else from ARMWRIGHT_BASE_URL. That of the configuration file is used only with the model
+    of the same file, since it says nothing of a model named elsewhere. The file's other settings are defaults for
+    every model.
+    """
+    given = options or ModelOptions()
     path = configuration_path()
-    if os.path.isfile(path):
-        content = read_document(path, _ConfigurationFile, SettingsError)
-        if content.model:
-            return ModelName(content.model, base_url or content.base_url, str(path))
-    return None
+    defaults = read_document(path, ModelOptions, SettingsError) if os.path.isfile(path) else ModelOptions()
+    named = {"--model": given.model, "ARMWRIGHT_MODEL": os.environ.get("ARMWRIGHT_MODEL"), str(path): defaults.model}
+    named_by = next((place for place, model in named.items() if model), None)
+    if named_by is None:
+        return None
+    base_url = given.base_url or os.environ.get("ARMWRIGHT_BASE_URL")
+    if named_by == str(path):
+        base_url = base_url or defaults.base_url
+    found = {"model": named[named_by], "base_url": base_url}
+    return ConfiguredModel(given.with_defaults(defaults).model_copy(update=found), named_by)

@@ -29,8 +29,10 @@ from armwright.exceptions import (
 )
 from armwright.files import replace_file
 from armwright.llm.backend import CallError, Question
-from armwright.llm.configuration import ModelName, configuration_path, configured_model
+from armwright.llm.budget import CallBudget
+from armwright.llm.configuration import ConfiguredModel, configuration_path, configured_model
 from armwright.llm.draft_prompt import draft_prompt, read_documents
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import estimated_tokens
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import Transcript
@@ -114,26 +116,13 @@ class Drafter(LlmSession):
 
     out: the folder of the files; None writes nothing, and keeps nothing of what was said.
     force: whether files of the same name are replaced; else a name that is taken is refused to the model.
-    max_calls, max_cost: after so many calls, or [USD], it asks no more.
-    origin: "scripted" where a stand-in answers instead of a model: written with every call, and into the files.
     """
 
-    def __init__(
-        self,
-        configured: ModelName,
-        out: Path | None = None,
-        force: bool = False,
-        *,
-        temperature: float | None = None,
-        seed: int | None = None,
-        max_calls: int | None = None,
-        max_cost: float | None = None,
-        origin: str = "model",
-    ) -> None:
+    def __init__(self, configured: ConfiguredModel, out: Path | None = None, force: bool = False) -> None:
         from armwright.llm.client import ModelClient
 
-        chat = ModelClient(configured.model, configured.base_url, temperature=temperature, seed=seed, origin=origin)
-        super().__init__(chat, "draft", max_calls=max_calls, max_cost=max_cost)
+        options = configured.options
+        super().__init__(ModelClient(options), "draft", CallBudget(options.max_calls, options.max_cost))
         self.configured = configured
         self.out = out
         self.force = force
@@ -147,12 +136,12 @@ class Drafter(LlmSession):
         """Who is asked, and about what that will take, in one line for the user."""
         from armwright.llm.client import describe_cost
 
-        named, given = self.configured, estimated_tokens(draft_prompt(words))
-        server = f" at {named.base_url}" if named.base_url else ""
-        cost = describe_cost(named.model, named.base_url, given, ANSWER_TOKENS)
+        options, given = self.configured.options, estimated_tokens(draft_prompt(words))
+        server = f" at {options.base_url}" if options.base_url else ""
+        cost = describe_cost(options, given, ANSWER_TOKENS)
         return (
-            f"asking {self._by()}{server}, named by {named.named_by}: about {given:,} tokens in, {ANSWER_TOKENS:,} "
-            f"out, up to {MOST_ANSWERS} times; {cost}"
+            f"asking {self._by()}{server}, named by {self.configured.named_by}: about {given:,} tokens in, "
+            f"{ANSWER_TOKENS:,} out, up to {MOST_ANSWERS} times; {cost}"
         )
 
     def summary(self) -> ProposerSummary:
@@ -248,7 +237,7 @@ class Drafter(LlmSession):
 
     def _by(self) -> str:
         """Who answers; a stand-in is never called a model."""
-        model = self.configured.model
+        model = str(self.configured.options.model)
         return model if self.backend.origin == "model" else f"a {self.backend.origin} stand-in for a model ({model})"
 
     def _check_price(self, prompt: str) -> None:
@@ -258,20 +247,20 @@ class Drafter(LlmSession):
         most = self._budget.max_cost
         if most is None:
             return
-        named = self.configured
-        cost = estimated_cost(named.model, named.base_url, estimated_tokens(prompt), ANSWER_TOKENS)
+        options = self.configured.options
+        cost = estimated_cost(options, estimated_tokens(prompt), ANSWER_TOKENS)
         if cost is None:
             raise SettingsError(
-                f"the price of {named.model} is not known, so --max-cost {most:g} cannot hold; use --max-calls"
+                f"the price of {options.model} is not known, so max_cost = {most:g} cannot hold; use max_calls"
             )
         if cost > most:
-            raise SettingsError(f"a draft takes about {cost:.3f} USD, more than --max-cost {most:g}")
+            raise SettingsError(f"a draft takes about {cost:.3f} USD, more than max_cost = {most:g}")
 
     def _failure(self, fault: ProposalError, refusal: str) -> ModelError:
         before = f"the answer was refused ({refusal}), and " if refusal else ""
         said = refusal or (isinstance(fault, CallError) and fault.reply.text.strip())
         kept = self._kept() if said else ""
-        hint = "" if fault.kind == "budget" else "Check the model, its key and --base-url; "
+        hint = "" if fault.kind == "budget" else "Check the model, its key and base_url; "
         return ModelError(
             f"no draft: {before}{one_line(str(fault), LONGEST_REFUSAL).rstrip('.')}. {kept}{hint}"
             "armwright init my-task.yaml writes a task to edit without a model",
@@ -284,43 +273,25 @@ class Drafter(LlmSession):
 
 def draft(
     words: str,
-    model: str | None = None,
-    base_url: str | None = None,
+    options: ModelOptions | str | None = None,
     *,
     out: str | Path | None = None,
     force: bool = False,
-    temperature: float | None = None,
-    seed: int | None = None,
-    max_calls: int | None = None,
-    max_cost: float | None = None,
-    origin: str = "model",
 ) -> Draft:
-    """A task and, where the default does not fit, a design space drafted by a language model from words.
+    """Draft a task and, if the default does not fit, a design space from words, by a language model.
 
-    model, base_url: as of LlmProposer; without them, what is configured.
-    out: a folder, into which NAME.yaml, NAME-space.yaml and drafts.jsonl (what was said) are written; None: nowhere.
-    force: whether files of these names are replaced.
-    temperature, seed: sent only if they are set.
-    max_calls, max_cost: after so many calls, or [USD], it asks no more.
-    origin: "scripted" where a stand-in answers instead of a model.
+    Args:
+        words: What the arm has to do, in any language.
+        options: Which model, how it is called, what it may spend; or a model's name; None for the configured model.
+        out: Folder for NAME.yaml, NAME-space.yaml and drafts.jsonl (the calls); None to write nothing.
+        force: Replace files of these names.
     """
-    folder = None if out is None else Path(out)
-    drafter = Drafter(
-        drafting_model(model, base_url),
-        folder,
-        force,
-        temperature=temperature,
-        seed=seed,
-        max_calls=max_calls,
-        max_cost=max_cost,
-        origin=origin,
-    )
-    return drafter.draft(words)
+    return Drafter(drafting_model(options), None if out is None else Path(out), force).draft(words)
 
 
-def drafting_model(model: str | None = None, base_url: str | None = None) -> ModelName:
-    """The configured model; SettingsError where none is, for there is no draft without one."""
-    configured = configured_model(model, base_url)
+def drafting_model(options: ModelOptions | str | None = None) -> ConfiguredModel:
+    """Return the configured model; SettingsError if there is none."""
+    configured = configured_model(ModelOptions.of(options))
     if configured is None:
         raise SettingsError(
             "a draft needs a language model, and none is configured: give --model openai-chat:gpt-4o (with its key in "

@@ -15,20 +15,20 @@ NEVER_MADE = ("missing", "cancelled")  # faults of calls that cost nothing, as l
 
 
 class LlmSession:
-    """What all that ask have in common; several threads may ask at a time.
+    """Ask one backend, within a budget, and record every call; several threads may ask at a time.
 
-    name: the `source` of its trials.
-    max_calls, max_cost: after so many calls, or [USD], of the whole transcript it asks no more.
+    Args:
+        backend: Who answers.
+        name: The `source` of its trials.
+        budget: Limits of the whole transcript; None for no limits.
     """
 
-    def __init__(
-        self, backend: LlmBackend, name: str, *, max_calls: int | None = None, max_cost: float | None = None
-    ) -> None:
+    def __init__(self, backend: LlmBackend, name: str, budget: CallBudget | None = None) -> None:
         self.name = name
         self.backend = backend
-        self._budget = CallBudget(max_calls, max_cost)
+        self._budget = budget or CallBudget()
         self._transcript = Transcript(None)
-        self._over = threading.Event()  # of the session, set when nothing more is wanted
+        self._over = threading.Event()  # set when no more answers are wanted in this session
 
     def summary(self) -> ProposerSummary:
         """Calls, tokens and cost of the whole run, earlier sessions included."""

@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from armwright.exceptions import SettingsError
+from armwright.llm.budget import CallBudget
 from armwright.llm.feedback import N_PARETO, N_RANDOM
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MOST_TOKENS, estimated_tokens, parameters_prompt
 from armwright.llm.prompt_values import MOST_TARGETS
 from armwright.problem.problem import Problem
-from armwright.proposers.prompted import Asking, PromptedProposer
+from armwright.proposers.prompted import PromptedProposer
 from armwright.runs.history import History
 
 TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, by what prompts came to
@@ -16,66 +18,41 @@ THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # that a model is taken to write, 
 
 
 class LlmProposer(PromptedProposer):
-    """Asks a language model for each proposal, and keeps what was said.
+    """Ask a language model for each proposal, and record what was asked and answered.
 
-    model: vendor and name, `openai-chat:gpt-4o`, `anthropic:claude-…`, `google:…`, `azure:…`, `openrouter:…`,
-        `ollama:…`, `vllm:…`.
-    base_url: the address of any OpenAI-compatible server instead.
-    prompt: "plus" (with instructions on how to analyse the parameters), "minus", or a template file.
-    memory: "none" (every call is new), or "own": the earlier proposals of the run are shown.
-    answer: "two-step" (free reasoning, then a second call into the schema) or "one-step".
-    proposals: designs a call.
-    temperature, seed: sent only if they are set.
-    output: how an answer is held to a schema: "tool", "native", "prompted"; "auto" chooses by the server.
-    max_calls, max_cost: after so many calls, or [USD], of the whole run it asks no more.
-    origin: "scripted" where a stand-in answers instead of a model: written with every call, and the trials' source.
+    Args:
+        options: Which model, what it is asked, how it is called, what it may spend; or a model's name.
     """
 
-    def __init__(
-        self,
-        model: str,
-        base_url: str | None = None,
-        prompt: str = "plus",
-        *,
-        memory: str = "none",
-        answer: str = "two-step",
-        proposals: int = 1,
-        temperature: float | None = None,
-        seed: int | None = None,
-        output: str = "auto",
-        max_calls: int | None = None,
-        max_cost: float | None = None,
-        origin: str = "model",
-    ) -> None:
+    def __init__(self, options: ModelOptions | str) -> None:
         from armwright.llm.client import ModelClient
 
-        asking = Asking(prompt, memory, answer, proposals)
-        if answer == "text":
-            raise SettingsError('answer "text" is for people; a model needs "two-step" or "one-step"')
-        chat = ModelClient(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
-        # A stand-in's designs must never be taken for a model's: they have a source of their own.
-        name = "llm" if origin == "model" else origin
-        super().__init__(chat, asking, name, max_calls=max_calls, max_cost=max_cost)
-        self.model = model
-        self.base_url = base_url
-        self._sent = {"output": output, "temperature": temperature, "seed": seed, "origin": origin}
+        options = ModelOptions.of(options)
+        if options.answer == "text":
+            raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
+        # The designs of a stand-in have a source of their own: they must not count as a model's.
+        name = "llm" if options.origin == "model" else options.origin
+        budget = CallBudget(options.max_calls, options.max_cost)
+        super().__init__(ModelClient(options), options, name, budget=budget)
+        self.options = options
 
     def settings(self) -> Mapping[str, Any]:
-        """Model, server, prompt and what is sent with it."""
-        return {"model": self.model, "base_url": self.base_url, **super().settings(), **self._sent}
+        """Return model, server, prompt and what is sent with it."""
+        sent = {name: getattr(self.options, name) for name in ("output", "temperature", "seed", "origin")}
+        return {"model": self.options.model, "base_url": self.options.base_url, **super().settings(), **sent}
 
     def forecast(self, problem: Problem, n: int) -> str:
         """About what `n` proposals will take, before any is asked for."""
         from armwright.llm.client import describe_cost
 
-        calls = -(-n // self.asking.proposals)
+        calls = -(-n // self.options.proposals)
         given, written = self._tokens_each(problem)
         steps = 2 if self._form == "then-schema" else 1
         words = (
             f"{n} proposals: about {steps * calls + 1} calls, {_thousands(calls * given)} tokens in, "
             f"{_thousands(calls * written)} out"
         )
-        return f"{words}; {describe_cost(self.model, self.base_url, calls * given, calls * written)}"
+        return f"{words}; {describe_cost(self.options, calls * given, calls * written)}"
 
     def _tokens_each(self, problem: Problem) -> tuple[int, int]:
         """Tokens in and out of one proposal: as those so far in this run, else as a full prompt has."""
@@ -88,7 +65,7 @@ class LlmProposer(PromptedProposer):
         given = min(
             MOST_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + _feedback_tokens(problem)
         )
-        written = self.asking.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
+        written = self.options.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
         if self._form == "then-schema":
             given += estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS
         return given, written

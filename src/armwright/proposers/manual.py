@@ -6,32 +6,28 @@ from armwright.exceptions import SettingsError
 from armwright.llm.answer import read_text, written_answers
 from armwright.llm.backend import Question, Reply
 from armwright.llm.manual import ManualBackend
+from armwright.llm.model_options import PromptOptions
 from armwright.problem.problem import Problem
-from armwright.proposers.prompted import Asking, PromptedProposer
+from armwright.proposers.prompted import PromptedProposer
 
 
 class ManualProposer(PromptedProposer):
     """Writes each prompt to FOLDER/NNN-prompt.md and takes the answer from FOLDER/NNN-answer.md (or .json).
 
-    prompt, memory, proposals: as of LlmProposer.
-    wait: whether to wait for an answer; else AnswerPendingError is raised, and the same call goes on once it is there.
+    Args:
+        folder: Folder of questions and answers.
+        options: Prompt, memory and number of designs; answers are always text.
+        wait: Wait for an answer; if false, raise AnswerPendingError. The same call continues once it is there.
     """
 
     overlaps = False  # a person answers one question at a time, and may be days over it
 
-    def __init__(
-        self,
-        folder: str | Path,
-        prompt: str = "plus",
-        *,
-        memory: str = "none",
-        proposals: int = 1,
-        wait: bool = True,
-    ) -> None:
+    def __init__(self, folder: str | Path, options: PromptOptions | None = None, *, wait: bool = True) -> None:
         if Path(folder).exists() and not Path(folder).is_dir():
             raise SettingsError(f"{folder} is a file; manual needs a folder for its questions")
         self.manual = ManualBackend(Path(folder), wait)
-        super().__init__(self.manual, Asking(prompt, memory, "text", proposals), "manual")
+        answers = (options or PromptOptions()).model_copy(update={"answer": "text"})
+        super().__init__(self.manual, answers, "manual")
 
     def check(self) -> None:
         """Nobody is asked before there is a question."""
@@ -47,6 +43,6 @@ class ManualProposer(PromptedProposer):
         """The answer's designs; what is refused is put aside with the reason, and another answer is waited for."""
 
         def read(text: str) -> str:
-            return written_answers(read_text(text, problem, self.asking.proposals), problem)
+            return written_answers(read_text(text, problem, self.options.proposals), problem)
 
         return self.manual.ask_text(question, read)

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import DesignError, ModelError, ProposalError, SettingsError, did_you_mean
+from armwright.exceptions import DesignError, ModelError, ProposalError
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.llm.backend import CHECK, LlmBackend, Question, Reply
-from armwright.llm.prompt import MEMORIES, Form, Prompt, load_prompt, parameters_prompt
+from armwright.llm.budget import CallBudget
+from armwright.llm.model_options import ANSWERS, PromptOptions
+from armwright.llm.prompt import Form, Prompt, load_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import TRANSCRIPTS, Transcript, hints_of
 from armwright.problem.problem import Problem
@@ -18,58 +19,34 @@ from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.control import Hint
 from armwright.runs.history import History
 
-ANSWERS: Mapping[str, Form] = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
 LAST_STEPS = ("parameters", "answer")  # the steps whose answers are designs
-MOST_PROPOSALS = 100  # a call
-
-
-@dataclass(frozen=True)
-class Asking:
-    """How designs are asked for.
-
-    prompt: "plus" (with instructions on how to analyse the parameters), "minus", or a template file.
-    memory: "none" (every call is new), or "own": the earlier proposals of the run are shown.
-    answer: "two-step" (free reasoning, then a second call into the schema) or "one-step"; people answer in "text".
-    proposals: designs a call.
-    """
-
-    prompt: str = "plus"
-    memory: str = "none"
-    answer: str = "two-step"
-    proposals: int = 1
-
-    def __post_init__(self) -> None:
-        for name, value, allowed in (("memory", self.memory, MEMORIES), ("answer", self.answer, tuple(ANSWERS))):
-            if value not in allowed:
-                raise SettingsError(
-                    f'unknown {name} "{value}".{did_you_mean(value, allowed)} One of: {", ".join(allowed)}'
-                )
-        if not 1 <= self.proposals <= MOST_PROPOSALS:
-            raise SettingsError(f"proposals = {self.proposals}: a whole number from 1 to {MOST_PROPOSALS} is needed")
 
 
 class PromptedProposer(LlmSession, Proposer):
-    """Asks a backend for each proposal, and records what was asked and answered.
+    """Ask a backend for each proposal, and record what was asked and answered.
 
-    name: the `source` of its trials.
-    max_calls, max_cost: after so many calls, or [USD], of the whole run it asks no more.
+    Args:
+        backend: Who answers.
+        options: How designs are asked for.
+        name: The `source` of its trials.
+        prompt: A prompt that is loaded already, in place of the one that `options` names.
+        budget: Limits of the whole run.
     """
 
     def __init__(
         self,
         backend: LlmBackend,
-        asking: Asking,
+        options: PromptOptions,
         name: str,
         *,
         prompt: Prompt | None = None,
-        max_calls: int | None = None,
-        max_cost: float | None = None,
+        budget: CallBudget | None = None,
     ) -> None:
-        super().__init__(backend, name, max_calls=max_calls, max_cost=max_cost)
-        self.asking = asking
-        self.per_call = asking.proposals
-        self.prompt = prompt or load_prompt(asking.prompt)
-        self._form: Form = ANSWERS[asking.answer]
+        super().__init__(backend, name, budget)
+        self.options = options
+        self.per_call = options.proposals
+        self.prompt = prompt or load_prompt(options.prompt)
+        self._form: Form = ANSWERS[options.answer]
         self._hints = Hints(None)
 
     def settings(self) -> Mapping[str, Any]:
@@ -78,9 +55,9 @@ class PromptedProposer(LlmSession, Proposer):
         return {
             "prompt": self.prompt.name,
             **own,
-            "memory": self.asking.memory,
-            "answer": self.asking.answer,
-            "proposals": self.asking.proposals,
+            "memory": self.options.memory,
+            "answer": self.options.answer,
+            "proposals": self.options.proposals,
         }
 
     def open(self, folder: Path | None) -> None:
@@ -106,12 +83,12 @@ class PromptedProposer(LlmSession, Proposer):
             if fault.kind == "budget":
                 return
             raise ModelError(
-                f"{fault}. Check the model, its key and --base-url; --proposer rules needs none",
+                f"{fault}. Check the model, its key and base_url; --proposer rules needs none",
                 final=fault.kind if fault.final else None,
             ) from fault
         if self._budget.price_is_missing:
             raise ModelError(
-                f"the price of {self.backend.model} is not known, so --max-cost cannot hold; use --max-calls",
+                f"the price of {self.backend.model} is not known, so max_cost cannot hold; use max_calls",
                 final="budget",
             )
 
@@ -122,7 +99,7 @@ class PromptedProposer(LlmSession, Proposer):
         for call in self._transcript.calls:
             if call.step in LAST_STEPS and call.fault is None:
                 with suppress(DesignError):  # a transcript that was changed by hand: asked again
-                    answers = read_text(call.answer, history.problem, self.asking.proposals)
+                    answers = read_text(call.answer, history.problem, self.options.proposals)
                     found.update({p.id: p for p in self._proposals(call.proposal, answers, call.known)})
         return [proposal for proposal in found.values() if proposal.id not in used]
 
@@ -144,7 +121,7 @@ class PromptedProposer(LlmSession, Proposer):
         except ProposalError as fault:
             fault.known = question.known
             raise
-        answers = read_text(text, problem, self.asking.proposals)
+        answers = read_text(text, problem, self.options.proposals)
         return self._proposals(question.proposal, answers, question.known)
 
     def question(self, history: History, seed: int, number: int) -> Question:
@@ -174,7 +151,7 @@ class PromptedProposer(LlmSession, Proposer):
         return hints_of(self._transcript.calls, self.identity(number))
 
     def _extracting(self, problem: Problem, identity: str, said: str, known: int) -> Question:
-        prompt = parameters_prompt(problem, said, proposals=self.asking.proposals, expected=self._expects)
+        prompt = parameters_prompt(problem, said, proposals=self.options.proposals, expected=self._expects)
         return Question(identity, "parameters", prompt, known)
 
     def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
@@ -182,9 +159,9 @@ class PromptedProposer(LlmSession, Proposer):
         return self.prompt.render(
             history,
             seed,
-            memory=self.asking.memory,
+            memory=self.options.memory,
             name=self.name,
-            proposals=self.asking.proposals,
+            proposals=self.options.proposals,
             form=self._form,
             hints=[hint.text for hint in hints],
         )
@@ -195,21 +172,21 @@ class PromptedProposer(LlmSession, Proposer):
             problem,
             reasoning=self._form == "schema",
             expected=self._expects,
-            proposals=self.asking.proposals,
+            proposals=self.options.proposals,
         )
 
     def ask_designs(self, question: Question, problem: Problem) -> Reply:
         """The answer that holds the designs, as JSON that `read_text` reads."""
 
         def read(content: Mapping[str, Any]) -> str:
-            answers = read_answers(content, problem, self.asking.proposals)
+            answers = read_answers(content, problem, self.options.proposals)
             return written_answers(answers, problem, str(content.get("reasoning", "")))
 
         return self.backend.ask_for(question, self.schema(problem), read)
 
     @property
     def _expects(self) -> bool:
-        return self.asking.memory == "own"
+        return self.options.memory == "own"
 
     def _proposals(self, identity: str, answers: Sequence[Answer], known: int) -> list[Proposal]:
         ids = [identity] if len(answers) == 1 else [f"{identity}.{i}" for i in range(1, len(answers) + 1)]

@@ -4,15 +4,16 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError
+from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import ReplayBackend
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of
-from armwright.proposers.prompted import LAST_STEPS, Asking, PromptedProposer
+from armwright.proposers.prompted import LAST_STEPS, PromptedProposer
 from armwright.proposers.proposer import Proposal, Record, RecordedTurn
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Hint
@@ -21,6 +22,7 @@ from armwright.runs.history import History
 from armwright.runs.summary import ProposerSummary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.trials_file import TRIALS
+from armwright.yaml_documents import check_document
 
 
 class ReplayProposer(PromptedProposer):
@@ -29,11 +31,11 @@ class ReplayProposer(PromptedProposer):
     With the settings of the recorded run, on the same machine with the same versions, the run comes out equal to the
     bit. Where a prompt differs from the recorded one, it is reported; with `strict` it is an error.
 
-    asking: how the recorded run asked, where nothing says so: prompt and memory of a transcript without its
+    options: how the recorded run asked, where nothing says so: prompt and memory of a transcript without its
         config.yaml. What differs from the defaults and from the record is refused.
     """
 
-    def __init__(self, source: str | Path, strict: bool = False, asking: Asking | None = None) -> None:
+    def __init__(self, source: str | Path, strict: bool = False, options: PromptOptions | None = None) -> None:
         self.source = Path(source)
         folder = self.source if self.source.is_dir() else self.source.parent
         file = folder / TRANSCRIPTS if self.source.is_dir() else self.source
@@ -44,7 +46,7 @@ class ReplayProposer(PromptedProposer):
             raise ReplayError(f"{file} holds no proposal")
         name = next(call.proposal for call in calls if call.proposal).rpartition("-")[0]
         recorded = read_config(folder) if (folder / CONFIG).is_file() else None
-        prompt, then = _as_recorded(file, recorded, calls, asking or Asking())
+        prompt, then = _as_recorded(file, recorded, calls, options or PromptOptions())
         super().__init__(ReplayBackend(calls, file, strict), then, name, prompt=prompt)
         self.recording: ReplayBackend = self.backend  # pyright: ignore[reportAttributeAccessIssue]
         self._trials = _recorded_trials(folder, recorded)
@@ -109,32 +111,41 @@ class ReplayProposer(PromptedProposer):
         )
 
 
-def recorded_asking(config: RunConfig | None) -> tuple[Prompt | None, Asking]:
+def recorded_options(config: RunConfig | None) -> tuple[Prompt | None, PromptOptions]:
     """How the proposer of a run asked, and its prompt where that was a template of the user's own."""
     settings = config.study.proposer if config is not None else None
     if not settings or "prompt" not in settings:
-        return None, Asking()
+        return None, PromptOptions()
     own = Prompt(settings["prompt"], settings["template"]) if "template" in settings else None
-    name = settings["prompt"] if settings["prompt"] in PROMPTS else PROMPTS[0]
-    return own, Asking(name, settings["memory"], settings["answer"], settings["proposals"])
+    stated = {name: settings[name] for name in PromptOptions.model_fields if name in settings}
+    name = stated["prompt"] if stated["prompt"] in PROMPTS else PROMPTS[0]
+    return own, check_document({**stated, "prompt": name}, PromptOptions, SettingsError, f"{CONFIG}: proposer")
 
 
-def _as_recorded(file: Path, config: RunConfig | None, calls: Sequence[Call], wished: Asking) -> tuple[Prompt, Asking]:
-    """How a record was asked for; SettingsError where something else is wished."""
+def _as_recorded(
+    file: Path, config: RunConfig | None, calls: Sequence[Call], given: PromptOptions
+) -> tuple[Prompt, PromptOptions]:
+    """Return how a record was asked for; SettingsError if the given options contradict it."""
     if config is not None and "prompt" in (config.study.proposer or {}):
-        own, then = recorded_asking(config)
-        prompt = own or load_prompt(then.prompt)
+        own, recorded = recorded_options(config)
+        prompt = own or load_prompt(recorded.prompt)
     else:  # a transcript alone does not name its prompt and memory
-        prompt, then = load_prompt(wished.prompt), replace(asking_of(calls), memory=wished.memory)
-    for name, there in {**asdict(then), "prompt": prompt.name}.items():
-        wish = getattr(wished, name)
-        same = load_prompt(wish).template == prompt.template if name == "prompt" else wish == there
-        if not same and wish != getattr(Asking(), name):
-            raise SettingsError(f"{file} was recorded with {name} {there}; leave out --{name} {wish}")
-    return prompt, then
+        prompt = load_prompt(given.prompt)
+        recorded = options_of(calls).model_copy(update={"memory": given.memory})
+    for name, value in given.given.items():
+        if name == "prompt":
+            found, same = prompt.name, load_prompt(given.prompt).template == prompt.template
+        elif name in PromptOptions.model_fields:
+            found = getattr(recorded, name)
+            same = found == value
+        else:
+            continue
+        if not same:
+            raise SettingsError(f"{file} was recorded with {name} = {found}; leave out {name} = {value}")
+    return prompt, recorded
 
 
-def asking_of(calls: Sequence[Call]) -> Asking:
+def options_of(calls: Sequence[Call]) -> PromptOptions:
     """How calls were asked for, as far as they show it: the form of the answer, and how many designs a call."""
     proposed = [call for call in calls if call.proposal]
     if all(call.step != "answer" for call in proposed):
@@ -142,7 +153,7 @@ def asking_of(calls: Sequence[Call]) -> Asking:
     else:
         form = "text" if any(call.origin == "manual" for call in proposed) else "one-step"
     answers = [call.answer for call in proposed if call.step in LAST_STEPS and call.fault is None]
-    return Asking(answer=form, proposals=max(map(_designs, answers), default=1))
+    return PromptOptions(answer=form, proposals=max(map(_designs, answers), default=1))
 
 
 def _designs(answer: str) -> int:

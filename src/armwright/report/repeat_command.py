@@ -5,6 +5,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from armwright.llm.model_options import ModelOptions
 from armwright.problem.objectives import OBJECTIVES
 from armwright.runs.config import FrontMethod, Method, RunConfig
 from armwright.spaces.design_space import builtin_spaces, load_space
@@ -12,13 +13,7 @@ from armwright.spaces.tolerance import TOLERANCE
 from armwright.tasks.task import builtin_names, load_task
 
 OWN_TASK, OWN_SPACE = "TASK.yaml", "SPACE.yaml"  # placeholders for the user's own files
-PROPOSER_OPTIONS = (
-    "model", "base_url", "prompt", "memory", "answer", "proposals", "temperature", "model_seed", "output",
-)  # fmt: skip
-DEFAULTS = {
-    "sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200, "prompt": "plus", "memory": "none",
-    "answer": "two-step", "proposals": 1, "output": "auto",
-}  # fmt: skip
+DEFAULTS = {"sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200}
 TASK_FIELDS = (  # fields that distinguish one task from another
     "target_specs", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step",
     "move_time", "workspace", "constraints", "objectives", "reference_point",
@@ -65,21 +60,22 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
     options += [text for n in range(n_designs) for text in ("--initial-design", f"DESIGN-{n + 1}.json")]
     options += ["--robust"] * (config.tolerance > 0.0)
-    options += ["--overlap"] * ("in_flight" in given)
     line = shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])
     return f"{line} && armwright refine RUN" if refined else line
 
 
 def _study_options(method: Method) -> dict[str, Any]:
     proposer: Mapping[str, Any] = method.proposer or {"name": "none"}
+    recorded: dict[str, Any] = {**proposer, "in_flight": method.in_flight}
+    usual = {name: field.default for name, field in ModelOptions.model_fields.items() if name != "origin"}
+    stated = {name: recorded[name] for name, value in usual.items() if recorded.get(name, value) != value}
     return {
         "proposer": proposer["name"],
-        **{key: proposer.get(key) for key in PROPOSER_OPTIONS},
+        **ModelOptions.model_construct(**stated).command_options(),
         "sampler": method.sampler,
         "n_init": method.n_init,
         "n_step": method.n_step,
         "n_total": method.n_total,
-        "in_flight": method.in_flight,
         "refine_every": method.refine_every,
     }
 

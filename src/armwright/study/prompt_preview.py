@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from armwright.exceptions import SettingsError
+from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import estimated_tokens, load_prompt
 from armwright.llm.recording import ReplayBackend
 from armwright.problem.problem import Problem
-from armwright.proposers.prompted import Asking, PromptedProposer
-from armwright.proposers.replay import recorded_asking
+from armwright.proposers.prompted import PromptedProposer
+from armwright.proposers.replay import recorded_options
 from armwright.runs.config import RunConfig
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
@@ -36,18 +37,17 @@ class Preview:
     note: str = ""
 
 
-def preview(problem: Problem, asking: Asking, *, n_init: int = 10, seed: int = 0) -> Preview:
+def preview(problem: Problem, options: PromptOptions, *, n_init: int = 10, seed: int = 0) -> Preview:
     """The first prompt of a new run."""
     history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
-    proposer = PromptedProposer(ReplayBackend((), Path()), asking, "llm")
-    return _preview(
-        proposer, problem, n_init, proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init))
-    )
+    proposer = PromptedProposer(ReplayBackend((), Path()), options, "llm")
+    text = proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init))
+    return _preview(proposer, problem, n_init, text)
 
 
 def preview_after(
     run: Path,
-    wishes: Mapping[str, Any],
+    options: PromptOptions | None = None,
     *,
     task: Task | None = None,
     space: DesignSpace | None = None,
@@ -55,21 +55,26 @@ def preview_after(
 ) -> Preview:
     """The prompt for the next proposal of a run, asked for as the run asks.
 
-    wishes: fields of Asking that shall be others.
-    task, space: where given, the run must be one of these.
-    number: the prompt for this trial instead, as it was then.
+    Args:
+        run: The run folder.
+        options: Options in place of those of the run, as far as they are set.
+        task: If given, the task that the run must have.
+        space: If given, the design space that the run must have.
+        number: Trial whose prompt is shown as it was then; None for the next one.
     """
     config, history = read_run(run)
     if task is not None and task.target_specs != config.task.target_specs:
         raise SettingsError(f"{run} is a run of another task: {config.task.name}")
     if space is not None and space != config.space:
         raise SettingsError(f"{run} is a run of another space: {config.space.name}")
-    own, asking = recorded_asking(config)
-    asking = replace(asking, **wishes)
-    prompt = load_prompt(asking.prompt) if own is None or "prompt" in wishes else own
+    own, recorded = recorded_options(config)
+    stated = {} if options is None else options.given
+    given = {name: value for name, value in stated.items() if name in PromptOptions.model_fields}
+    asked = recorded.model_copy(update=given)
+    prompt = load_prompt(asked.prompt) if own is None or "prompt" in given else own
     settings = config.study.proposer or {}
     proposer = PromptedProposer(
-        ReplayBackend((), run), asking, settings["name"] if "prompt" in settings else "llm", prompt=prompt
+        ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm", prompt=prompt
     )
     proposer.look(run)
     requests = ProposalRequests(proposer, config.seed)
@@ -80,7 +85,7 @@ def preview_after(
     schedule = request_schedule(requests, Blocks.of(config.study), lambda: history, config.study.in_flight)
     number, finished = schedule.upcoming(len(history))
     # What is to be otherwise than in the run is to be seen, even where the run's own answer waits for its second call.
-    if wishes:
+    if given:
         text = proposer.prompt_for(history, requests.seed(number), proposer.next_hints(number))
     else:
         text = proposer.question(history, requests.seed(number), number).prompt

@@ -24,13 +24,13 @@ from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.callback import ProposalCallback
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer, study_history
-from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposal
 from armwright.proposers.rules import RulesProposer
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import Design
 from armwright.tasks.task import Task, load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
+from tests.support.wire_formats import llm_proposer
 
 
 class Told(StudyProposer):
@@ -171,7 +171,8 @@ def objective(trial):
     x = trial.suggest_float("x", 0.0, 1.0)
     return x, 1.0 - x
 
-proposer = aw.StudyLlmProposer("test-model", "two ends of a line", url, origin="scripted", answer="one-step")
+options = aw.ModelOptions(model="test-model", base_url=url, origin="scripted", answer="one-step")
+proposer = aw.StudyLlmProposer(options, "two ends of a line")
 study.optimize(objective, n_trials=10, callbacks=[aw.ProposalCallback(proposer, every=5)])
 """
 
@@ -365,7 +366,7 @@ def test_a_task_without_a_reference_point_gets_one_from_the_first_trials() -> No
 
 
 def test_the_language_model_for_arms_works_in_a_plain_study(chat_server: ChatServer) -> None:
-    proposer = LlmProposer("test-model", chat_server.url, origin="scripted")
+    proposer = llm_proposer(chat_server.url, origin="scripted")
     study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 8, ProposalCallback(proposer, 4, problem=PROBLEM))
     assert [trial.user_attrs.get("proposal") for trial in study.trials] == [
         *(None, None, None, "scripted-0003", None, None, None, "scripted-0007")
@@ -397,7 +398,7 @@ def origins(study: optuna.Study) -> list[float]:
 @pytest.mark.parametrize("callbacks", [1, 2])
 def test_one_proposer_in_two_studies_thinks_anew_for_each(thinker: ChatServer, callbacks: int) -> None:
     """Both ask for trials 3 and 7; so would a study that is taken up again."""
-    llm = LlmProposer("test-model", thinker.url, max_calls=4)
+    llm = llm_proposer(thinker.url, max_calls=4)
     made = [ProposalCallback(llm, 4, problem=PROBLEM) for _ in range(callbacks)]
     studies = [tpe(seed, directions=["minimize"] * 2) for seed in range(2)]
     for n, study in enumerate(studies):
@@ -420,7 +421,7 @@ def test_designs_left_of_another_study_are_not_taken_for_this_one() -> None:
 
 
 def test_a_proposer_cannot_serve_two_studies_at_a_time(thinker: ChatServer) -> None:
-    llm = LlmProposer("test-model", thinker.url)
+    llm = llm_proposer(thinker.url)
 
     def meanwhile(request: Request) -> Answer:
         other = tpe(1, directions=["minimize"] * 2)
@@ -441,7 +442,7 @@ def test_the_calls_of_a_study_are_kept_and_what_was_paid_for_is_used(thinker: Ch
         study = optuna.create_study(
             storage=storage, study_name="my/arms", directions=["minimize"] * 2, load_if_exists=True
         )
-        llm = LlmProposer("test-model", thinker.url, proposals=2)
+        llm = llm_proposer(thinker.url, proposals=2)
         return arms(PROBLEM, study, n_trials, ProposalCallback(llm, 4, problem=PROBLEM, folder=tmp_path / "calls"))
 
     def pair(request: Request) -> Answer:

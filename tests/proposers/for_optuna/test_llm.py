@@ -11,8 +11,10 @@ import pytest
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.samplers import NSGAIISampler, TPESampler
 from optuna.trial import TrialState, create_trial
+from pydantic import ValidationError
 
 from armwright.exceptions import ModelError, ProposalError, SettingsError
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.proposers.for_optuna.callback import ProposalCallback
@@ -58,7 +60,9 @@ def answering(values: dict[str, Any] | None = None, **others: Any) -> Any:
 
 
 def proposer(server: ChatServer, **settings: Any) -> StudyLlmProposer:
-    return StudyLlmProposer("test-model", DESCRIPTION, server.url, origin="scripted", **settings)
+    kept = {name: settings.pop(name) for name in ("space", "transcript") if name in settings}
+    options = ModelOptions(model="test-model", base_url=server.url, origin="scripted", **settings)
+    return StudyLlmProposer(options, DESCRIPTION, **kept)
 
 
 def study_of(n_trials: int = 0, callback: ProposalCallback | None = None, **settings: Any) -> optuna.Study:
@@ -281,7 +285,7 @@ def test_a_given_space_of_another_kind_is_refused(chat_server: ChatServer) -> No
     "settings", [{"memory": "all"}, {"answer": "three-step"}, {"answer": "text"}, {"transcript": "no/where.jsonl"}]
 )
 def test_wrong_settings_are_refused(chat_server: ChatServer, settings: dict[str, str]) -> None:
-    with pytest.raises(SettingsError):
+    with pytest.raises((SettingsError, ValidationError), match=next(iter(settings))):
         proposer(chat_server, **settings)
 
 

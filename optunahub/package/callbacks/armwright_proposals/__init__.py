@@ -1,6 +1,7 @@
 """Proposals in any study: one trial in ten is a language model's, or one of built-in rules."""
 
 try:
+    from armwright import ModelOptions
     from armwright import ProposalCallback
     from armwright import StudyLlmProposer
     from armwright import StudyProposal
@@ -16,6 +17,7 @@ except ModuleNotFoundError as missing:
 
 
 __all__ = [
+    "ModelOptions",
     "ProposalCallback",
     "StudyLlmProposer",
     "StudyProposal",

@@ -9,59 +9,46 @@ import optuna
 
 from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm.backend import CHECK, Question, Reply
+from armwright.llm.budget import CallBudget
+from armwright.llm.model_options import ANSWERS, ModelOptions
 from armwright.llm.prompt import Form
 from armwright.llm.session import LlmSession
 from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
 from armwright.proposers.for_optuna.parameters import Parameter, Space, stated_space, study_parameters
 from armwright.proposers.for_optuna.prompt import StudyObjective, parameters_prompt, study_objectives, study_prompt
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
-from armwright.proposers.prompted import ANSWERS, Asking
 
 
 class StudyLlmProposer(LlmSession, StudyProposer):
     """Asks a language model for each proposal, from the study's trials and a description in words.
 
-    model: vendor and name, as of LlmProposer: `openai-chat:gpt-4o`, `anthropic:…`, `ollama:…`, …
-    description: what is searched and what is known of it; all that the names of the parameters do not say.
-    base_url: the address of any OpenAI-compatible server instead.
-    space: the parameters' distributions; None: those of the trials so far. What is given here goes before those.
-    memory: "none" (every call is new), or "own": its earlier proposals are shown with what came of them.
-    answer: "two-step" (free reasoning, then a second call into the schema) or "one-step".
-    transcript: a file that keeps every call; of several processes each needs its own.
-    temperature, seed: sent only if they are set.
-    output: how an answer is held to a schema: "tool", "native", "prompted"; "auto" chooses by the server.
-    max_calls, max_cost: after so many calls, or [USD], of the whole transcript it asks no more.
-    origin: "scripted" where a stand-in answers instead of a model: written with every call, and the trials' source.
+    Args:
+        options: Which model, how it is called, what it may spend; or a model's name. Of the prompt options, memory
+            and answer are used.
+        description: What is searched and what is known of it, beyond what the names of the parameters say.
+        space: The parameters' distributions; None for those of the trials so far, which these take precedence over.
+        transcript: A file that keeps every call; each process needs its own.
     """
 
     def __init__(
         self,
-        model: str,
+        options: ModelOptions | str,
         description: str,
-        base_url: str | None = None,
         *,
         space: Space | None = None,
-        memory: str = "none",
-        answer: str = "two-step",
         transcript: str | Path | None = None,
-        temperature: float | None = None,
-        seed: int | None = None,
-        output: str = "auto",
-        max_calls: int | None = None,
-        max_cost: float | None = None,
-        origin: str = "model",
     ) -> None:
         from armwright.llm.client import ModelClient
 
-        Asking(memory=memory, answer=answer)  # refuses names that do not exist
-        if answer == "text":
-            raise SettingsError('answer "text" is for people; a model needs "two-step" or "one-step"')
-        chat = ModelClient(model, base_url, output=output, temperature=temperature, seed=seed, origin=origin)
-        # A stand-in's trials must never be taken for a model's: they have a source of their own.
-        super().__init__(chat, "llm" if origin == "model" else origin, max_calls=max_calls, max_cost=max_cost)
+        options = ModelOptions.of(options)
+        if options.answer == "text":
+            raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
+        # The trials of a stand-in have a source of their own: they must not count as a model's.
+        name = "llm" if options.origin == "model" else options.origin
+        super().__init__(ModelClient(options), name, CallBudget(options.max_calls, options.max_cost))
         self.description = description
-        self.memory = memory
-        self._form: Form = ANSWERS[answer]
+        self.memory = options.memory
+        self._form: Form = ANSWERS[options.answer]
         self._space = dict(space or {})
         path = None if transcript is None else Path(transcript)
         if path is not None and not path.parent.is_dir():

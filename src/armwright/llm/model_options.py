@@ -1,0 +1,113 @@
+"""Options of a language model: which one answers, what it is asked, how it is called, what it may spend.
+
+The same model validates `--model-options`, the user's config.yaml, the methods of an experiment and the Python API.
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Any, Self
+
+from pydantic import BaseModel, Field, ValidationInfo, field_validator
+
+from armwright.exceptions import did_you_mean
+from armwright.llm.prompt import MEMORIES, Form
+
+ANSWERS: Mapping[str, Form] = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
+OUTPUTS = ("auto", "tool", "native", "prompted")
+ORIGINS = ("model", "scripted")
+ON_FAILURE = ("stop", "continue")
+MOST_PROPOSALS = 100  # per call
+MODEL_SECONDS = 120.0  # default timeout
+DIRECT = ("model", "prompt", "max_cost")  # fields with a command-line option of their own
+
+_CHOICES: Mapping[str, tuple[str, ...]] = {
+    "memory": MEMORIES,
+    "answer": tuple(ANSWERS),
+    "output": OUTPUTS,
+    "origin": ORIGINS,
+    "on_failure": ON_FAILURE,
+}
+
+
+class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """How designs are asked for.
+
+    Attributes:
+        prompt: "plus" (with instructions on how to analyse the parameters), "minus", or a template file.
+        memory: "none" (every call is new) or "own" (show the earlier proposals of the run).
+        answer: "two-step" (free reasoning, then a second call into the schema), "one-step", or "text" (manual answers).
+        proposals: Designs per call.
+    """
+
+    prompt: str = "plus"
+    memory: str = "none"
+    answer: str = "two-step"
+    proposals: int = Field(default=1, ge=1, le=MOST_PROPOSALS)
+
+    @field_validator(*_CHOICES, check_fields=False)
+    @classmethod
+    def _check_choice(cls, value: str, info: ValidationInfo) -> str:
+        allowed = _CHOICES[str(info.field_name)]
+        if value not in allowed:
+            raise ValueError(
+                f'unknown {info.field_name} "{value}".{did_you_mean(value, allowed)} One of: {", ".join(allowed)}'
+            )
+        return value
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The fields that were set, in the order of their declaration."""
+        return {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
+
+
+class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=False):
+    """Which language model answers, what it is asked, how it is called, what it may spend.
+
+    Attributes:
+        model: Vendor and name: `openai-chat:gpt-4o`, `anthropic:...`, `google:...`, `azure:...`, `openrouter:...`,
+            `ollama:...`, `vllm:...`; None for the configured one.
+        base_url: Address of an OpenAI-compatible server, in place of the vendor's.
+        temperature: Sent only if set.
+        seed: Sent only if set.
+        output: How an answer is held to a schema: "tool", "native" or "prompted"; "auto" chooses by the server.
+        timeout: Limit of one request, retries included [s].
+        in_flight: Calls in flight while black-box trials run; None to wait for each answer.
+        max_calls: Limit of requests in the whole run.
+        max_cost: Limit of the cost of the whole run [USD].
+        on_failure: If the model fails before the first trial: "stop", or "continue" without it.
+        origin: "scripted" if a stand-in answers instead of a model. It is recorded with every call.
+        replay_strict: With replay:RUN, treat a prompt that differs from the recorded one as an error.
+        wait: With manual:DIR, wait for each answer; if false, exit at the first open question.
+    """
+
+    model: str | None = None
+    base_url: str | None = None
+    temperature: float | None = Field(default=None, ge=0.0)
+    seed: int | None = None
+    output: str = "auto"
+    timeout: float = Field(default=MODEL_SECONDS, gt=0.0)
+    in_flight: int | None = Field(default=None, ge=1)
+    max_calls: int | None = Field(default=None, ge=1)
+    max_cost: float | None = Field(default=None, gt=0.0)
+    on_failure: str = "stop"
+    origin: str = "model"
+    replay_strict: bool = False
+    wait: bool = True
+
+    @classmethod
+    def of(cls, options: "ModelOptions | str | None") -> "ModelOptions":
+        """Return options as they are, or those of a model's name."""
+        if isinstance(options, ModelOptions):
+            return options
+        return cls() if options is None else cls(model=options)
+
+    def with_defaults(self, defaults: Self) -> Self:
+        """Return these options, with `defaults` for the fields that are not set here."""
+        return defaults.model_copy(update=self.given)
+
+    def command_options(self) -> dict[str, str]:
+        """Return the command-line options that state the fields that were set, by name."""
+        given = {name: value for name, value in self.given.items() if value is not None}
+        others = {name: value for name, value in given.items() if name not in DIRECT}
+        options = {name: str(value) for name, value in given.items() if name in DIRECT}
+        return options | ({"model_options": json.dumps(others)} if others else {})
