@@ -14,7 +14,7 @@ import armwright
 from armwright.experiments.baselines import BASELINES, baselines, baselines_of
 from armwright.files import to_csv
 from armwright.runs.best_known import best_known_hypervolume
-from armwright.tasks.task import builtin_tasks
+from armwright.tasks.catalogue import builtin_tasks
 
 PACKAGE = Path(armwright.__file__).parent
 PAGE = PACKAGE.parents[1] / "docs" / "suite.md"

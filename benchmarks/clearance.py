@@ -17,8 +17,8 @@ from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import paper_space
+from armwright.tasks.catalogue import load_task
 from armwright.tasks.obstacles import Box, Cylinder, Ground
-from armwright.tasks.task import load_task
 
 N, ROUNDS = 4000, 7
 OBSTACLES = (

@@ -33,7 +33,7 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.link_mass import MassPerMetre
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 TARGETS = load_task("target-1").target_positions
 PROBLEM = Problem(load_task("target-1"))

@@ -20,7 +20,7 @@ from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.best_known import known_front
 from armwright.search.front_search import FrontSearch
-from armwright.tasks.task import builtin_tasks
+from armwright.tasks.catalogue import builtin_tasks
 
 BUDGETS = (10_000, 20_000, 50_000, 100_000, 200_000)
 PEERS_BUDGET = 100_000  # evaluations

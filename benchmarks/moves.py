@@ -13,7 +13,7 @@ from one_core import on_one_core, print_rates, rates_in_turn, seconds
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 N, ROUNDS = 1000, 5
 TASK = load_task("target-1").model_copy(update={"moves": "in_order", "move_time": 1.5, "reference_point": None})

@@ -23,7 +23,7 @@ from armwright.search.samplers import sampler_factory
 from armwright.seeding import derived_seed
 from armwright.spaces.optuna_distributions import distributions
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 ROUNDS = 5

@@ -18,7 +18,7 @@ from armwright.problem.problem import Outcomes, Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.spaces.parameters import Design
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request
 
 LATENCY = 2.0  # [s] of a call

@@ -10,7 +10,8 @@ from one_core import on_one_core, print_rates, rates_in_turn
 
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 
 N, ROUNDS = 4000, 7
 REAL = Task.model_validate(

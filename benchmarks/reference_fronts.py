@@ -25,7 +25,7 @@ from armwright.runs.best_known import known_front
 from armwright.search.front_search import FrontSearch
 from armwright.search.survival import front, thinned
 from armwright.spaces.parameters import FloatParameter
-from armwright.tasks.task import builtin_tasks
+from armwright.tasks.catalogue import builtin_tasks
 
 SEEDS = range(3)
 EVALUATIONS = 250_000  # for each seed

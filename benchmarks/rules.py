@@ -21,7 +21,7 @@ from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import FloatParameter, ParameterValue
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task, random_task
+from armwright.tasks.catalogue import load_task, random_task
 
 METHODS = ("TPE", "Sobol", "rules")
 PAPER_TASKS = ("target-1", "target-2", "target-3")

@@ -34,7 +34,7 @@ from armwright.seeding import derived_seed
 from armwright.spaces.parameters import FloatParameter
 from armwright.study.front_run import find_front
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 TASK = "target-1"
 STUDIES = {"random": ("none", "random", 100_000), "tpe": ("none", "tpe", 2_000), "rules": ("rules", "random", 20_000)}

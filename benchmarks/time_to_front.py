@@ -18,7 +18,7 @@ from armwright.problem.problem import Problem
 from armwright.runs.best_known import known_front
 from armwright.study.front_run import Budget, FrontProgress, find_front
 from armwright.study.study import Progress, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 TASKS = ("target-1", "target-2", "target-3")
 SHARES = (0.90, 0.95, 0.99)

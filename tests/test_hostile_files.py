@@ -25,7 +25,8 @@ from armwright.robot.urdf_reader import read_urdf
 from armwright.runs.folder import read_config
 from armwright.runs.results import read_summary
 from armwright.spaces.design_space import load_space
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
 from armwright.yaml_documents import LARGEST_DOCUMENT
 from tests.fuzz.targets import a_run, looked_at

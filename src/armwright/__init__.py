@@ -49,7 +49,8 @@ if TYPE_CHECKING:
     from armwright.study.front_run import FrontRun, find_front
     from armwright.study.refine_run import refine_run
     from armwright.study.study import Run, optimize
-    from armwright.tasks.task import Task, builtin_tasks, load_task, random_task
+    from armwright.tasks.catalogue import builtin_tasks, load_task, random_task
+    from armwright.tasks.task import Task
 
 # Where each public name lives. Modules load when a name of theirs is first used, so that the command line
 # answers at once and nobody pays for what is not used.
@@ -91,7 +92,7 @@ _PLACES = {
     "UrdfArm": "robot.urdf_reader",
     "UsageError": "exceptions",
     "Workers": "study.cluster",
-    "builtin_tasks": "tasks.task",
+    "builtin_tasks": "tasks.catalogue",
     "compare_arms": "experiments.compare_arms",
     "compare_runs": "experiments.compare_runs",
     "draft": "llm.draft",
@@ -101,11 +102,11 @@ _PLACES = {
     "hypervolume": "pareto",
     "load_evaluator": "problem.evaluators",
     "load_space": "spaces.design_space",
-    "load_task": "tasks.task",
+    "load_task": "tasks.catalogue",
     "optimize": "study.study",
     "paper_space": "spaces.design_space",
     "refine_run": "study.refine_run",
-    "random_task": "tasks.task",
+    "random_task": "tasks.catalogue",
     "read_run": "runs.folder",
     "read_urdf": "robot.urdf_reader",
     "to_mjcf": "robot.mjcf",

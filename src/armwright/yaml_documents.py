@@ -8,7 +8,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from yaml.composer import Composer
 
-from armwright.exceptions import ArmwrightError, did_you_mean
+from armwright.exceptions import did_you_mean
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
@@ -17,7 +17,7 @@ RENAMED = {"jitter": "target_noise"}  # keys of files
 MOST_NODES = 400_000  # values in a document; of 10,000 targets that say all that a target can there are 240,000
 
 
-def read_document(path: Path, schema: type[Schema], error: type[ArmwrightError]) -> Schema:
+def read_document(path: Path, schema: type[Schema], error: type[Exception]) -> Schema:
     """The content of a YAML file as a value of `schema`; `error` in one line where it is not one."""
     try:
         with path.open("rb") as file:
@@ -32,7 +32,7 @@ def read_document(path: Path, schema: type[Schema], error: type[ArmwrightError])
     return parse_document(text, schema, error, str(path))
 
 
-def parse_document(text: str, schema: type[Schema], error: type[ArmwrightError], where: str) -> Schema:
+def parse_document(text: str, schema: type[Schema], error: type[Exception], where: str) -> Schema:
     """The YAML `text` as a value of `schema`; `where` names it in messages."""
     try:
         data = yaml.load(text, Loader=_DocumentLoader)
@@ -43,7 +43,7 @@ def parse_document(text: str, schema: type[Schema], error: type[ArmwrightError],
     return check_document(cast("dict[Any, Any]", data), schema, error, where)
 
 
-def check_document(data: dict[Any, Any], schema: type[Schema], error: type[ArmwrightError], where: str) -> Schema:
+def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:
     """`data` as a value of `schema`; `where` names it in messages."""
     for key in data:
         if key not in schema.model_fields:

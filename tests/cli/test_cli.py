@@ -20,7 +20,7 @@ from armwright.cli.show_results import show_result
 from armwright.llm import client as chat
 from armwright.problem.problem import Problem
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE, armwright, press_ctrl_c, refused
 from tests.support.wire_formats import model_options

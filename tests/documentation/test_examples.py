@@ -15,7 +15,7 @@ from armwright.cli.app import app
 from armwright.problem.problem import Problem
 from armwright.runs.optuna_export import export_study
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests import ROOT
 from tests.support.chat_server import Answer, ChatServer, Request
 

@@ -6,7 +6,7 @@ import pytest
 
 from armwright.experiments.baselines import baselines, baselines_of
 from armwright.runs.best_known import best_known_hypervolume
-from armwright.tasks.task import builtin_tasks
+from armwright.tasks.catalogue import builtin_tasks
 from tests import ROOT
 
 

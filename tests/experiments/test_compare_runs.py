@@ -27,7 +27,8 @@ from armwright.runs.best_known import known_front
 from armwright.runs.folder import read_run
 from armwright.study.front_run import find_front
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support.chat_server import ChatServer, wants_design
 from tests.support.wire_formats import llm_proposer
 

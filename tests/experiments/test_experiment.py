@@ -27,7 +27,7 @@ from armwright.experiments.plan import (
 )
 from armwright.experiments.runner import run_cell
 from armwright.llm.model_options import ModelOptions
-from armwright.tasks.task import builtin_tasks
+from armwright.tasks.catalogue import builtin_tasks
 from tests.support.chat_server import ChatServer
 
 SMALL: dict[str, Any] = {

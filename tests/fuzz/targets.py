@@ -27,7 +27,8 @@ from armwright.exceptions import ArmwrightError, RunFolderError
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace, load_space
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests import ROOT
 from tests.fuzz.mutation import changed
 from tests.support.wire_formats import llm_proposer

@@ -14,7 +14,7 @@ from armwright.kinematics import ik as solve
 from armwright.kinematics.ik import solve_postures
 from armwright.problem import problem
 from armwright.problem.problem import Problem
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 THREADS = """
 import sys, threading

@@ -16,7 +16,7 @@ from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.arms import general_arms, moving_arms
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
 from tests.support.moving_joints import moving, solve_postures, update_once

@@ -13,7 +13,7 @@ from armwright.exceptions import DesignError
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN
 
 PROBLEM = Problem(load_task("target-1"))

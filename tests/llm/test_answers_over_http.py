@@ -11,7 +11,7 @@ import pytest
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, wants_design
 from tests.support.wire_formats import OUTPUTS, proposer
 

@@ -19,7 +19,7 @@ from armwright.llm.session import LlmSession
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support import wire_formats as wires
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer

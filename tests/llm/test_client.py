@@ -12,7 +12,7 @@ from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer
 

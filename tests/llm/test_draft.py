@@ -180,7 +180,7 @@ REFUSED = {
     "far away": (ANSWER.replace("0.6, 0.0, 0.4", "6000, 0, 0.4"), "is more than 1000 m away"),
     "not finite": (ANSWER.replace("0.6, 0.0, 0.4", ".nan, 0, 0.4"), "targets[1][0]: Input should be a finite number"),
     "no name": (ANSWER.replace("name: wall\n", ""), "the task: name: Field required"),
-    "payloads": (ANSWER.replace("payload: 0.5", "payload: [0.5, 0.5]"), "payload has 2 values for 6 targets"),
+    "payloads": (ANSWER.replace("payload: 0.5", "payload: [0.5, 0.5]"), "payload: expected 1 or 6 values [kg], got 2"),
     "unknown objective": (ANSWER.replace("torque_utilisation", "torque_used"), 'unknown objective "torque_used"'),
     "reference point": (
         ANSWER.replace("payload:", "reference_point: [1.0, 1.0]\npayload:"),

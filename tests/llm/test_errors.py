@@ -16,7 +16,7 @@ from armwright.llm.backend import FINAL, CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import (
     GOOD_DESIGN,
     Answer,

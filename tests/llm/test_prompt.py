@@ -33,7 +33,8 @@ from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.parameters import exact
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support.fixed_problem import (
     ONE_JOINT,
     ONE_OBJECTIVE,

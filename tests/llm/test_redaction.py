@@ -16,7 +16,7 @@ import pytest
 from armwright.llm.redaction import redacted, without_keys
 from armwright.problem.problem import Problem
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support import wire_formats as wires
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, wants_design
 from tests.support.command_line import armwright

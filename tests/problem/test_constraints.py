@@ -45,7 +45,8 @@ from armwright.spaces.tolerance import perturbed
 from armwright.study.front_run import find_front
 from armwright.study.refine_run import refine_run
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.fixed_problem import FixedProblem, fixed_history

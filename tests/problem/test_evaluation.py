@@ -11,7 +11,7 @@ from armwright.problem.objectives import PAPER_OBJECTIVES, TORQUE_SCALE
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.spaces.design_space import DesignSpace
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
 

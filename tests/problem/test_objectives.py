@@ -31,7 +31,8 @@ from armwright.runs.results import verify_run
 from armwright.spaces.design_space import paper_space
 from armwright.study.front_run import find_front
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support.arms import general_arms
 
 SPREAD = Objective(

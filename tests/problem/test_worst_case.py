@@ -12,7 +12,8 @@ from armwright.problem.problem import Problem
 from armwright.runs.folder import read_run
 from armwright.runs.verification import verify
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 
 NAMES = ["position_error", "torque", "worst_error"]
 PLAIN = Task(name="plain", targets=((0.4, 0.1, 0.3), (0.2, -0.3, 0.5), (-0.1, 0.4, 0.2)), payload=(0.1, 0.2, 0.0))

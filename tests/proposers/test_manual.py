@@ -20,7 +20,7 @@ from armwright.proposers.manual import ManualProposer
 from armwright.proposers.replay import ReplayProposer
 from armwright.study.prompt_preview import preview_after
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN
 from tests.support.command_line import armwright
 from tests.support.wire_formats import model_options

@@ -17,7 +17,7 @@ from armwright.problem.problem import Problem
 from armwright.proposers.factory import choose_proposer
 from armwright.proposers.replay import ReplayProposer
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer
 

@@ -19,7 +19,8 @@ from armwright.runs.trial import FinishedTrial
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.link_mass import MassPerLink, MassPerMetre
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, load_task, random_task
+from armwright.tasks.catalogue import load_task, random_task
+from armwright.tasks.task import Task
 
 
 def task(*points: tuple[float, float, float], reference_point: tuple[float, float] | None = (5.0, 5.0)) -> Task:

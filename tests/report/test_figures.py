@@ -8,7 +8,8 @@ from armwright.exceptions import RunFolderError
 from armwright.problem.problem import Problem
 from armwright.report.figures import chosen_members, draw_credit, draw_hypervolume, draw_samples, write_figures
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import Task, load_task, random_task
+from armwright.tasks.catalogue import load_task, random_task
+from armwright.tasks.task import Task
 
 
 def short(out: Path, problem: Problem, n_total: int = 12) -> Run:

@@ -52,7 +52,7 @@ from armwright.runs.control import (
 from armwright.runs.history import History
 from armwright.study.prompt_preview import preview_after
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.command_line import armwright
 from tests.support.fixed_problem import FixedProblem, fixed_history

@@ -36,7 +36,8 @@ from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.optuna_distributions import distributions
 from armwright.study.front_run import find_front
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support.browser import Tab
 
 SPACE = DesignSpace.model_validate({"name": "some", "joints": [2, 4], "actuators": ["XL430-W250", "XM430-W350"]})

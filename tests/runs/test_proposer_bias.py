@@ -10,7 +10,7 @@ from armwright.runs.history import History
 from armwright.runs.proposer_bias import are_round, diagnose, front_share, repeated
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
-from armwright.tasks.task import load_task, random_task
+from armwright.tasks.catalogue import load_task, random_task
 
 EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 TARGET_2 = Problem(load_task("target-2"))  # symmetric about y = 0, x = 0.5 and its own z = 0.5

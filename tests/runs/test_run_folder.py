@@ -15,7 +15,7 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
 from armwright.runs.results import read_summary
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 

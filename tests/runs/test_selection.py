@@ -22,7 +22,7 @@ from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.runs.selection import Condition, numbers_of, pick, pick_from, read_condition, read_weights
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,8 @@ from armwright.runs.verification import START_SPREAD, STARTS, verify
 from armwright.spaces.parameters import Design
 from armwright.spaces.tolerance import perturbed
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support import reference_kinematics as reference
 
 PROBLEM = Problem(load_task("target-1"))

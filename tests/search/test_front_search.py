@@ -13,7 +13,7 @@ from armwright.search.survival import leaders, survivors
 from armwright.search.variation import RARE_SHARE, _parents
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 SPACE = paper_space()
 MIXED = (

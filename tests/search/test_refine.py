@@ -17,7 +17,7 @@ from armwright.search.cma_es import POPULATION, Refined, refine
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.study.refine_run import refine_run
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 BOX = tuple(FloatParameter(f"x_{i}", -1.0, 3.0, "m") for i in range(5))

@@ -19,7 +19,8 @@ from armwright.spaces.design_space import paper_space
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import Design
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support.extras import NEEDS_GP
 
 SPACE = paper_space()

@@ -13,7 +13,7 @@ from armwright.runs.folder import read_run
 from armwright.spaces.design_file import read_design
 from armwright.spaces.design_space import paper_space
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 GIVEN = PROBLEM.space.sample(2, 77)

@@ -20,7 +20,7 @@ from armwright.spaces.link_mass import MassOfTube, MassPerLink
 from armwright.spaces.parameters import Design, FloatParameter
 from armwright.study.front_run import find_front
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 GOOD = paper_space().sample(1, 0)[0].params
 

@@ -23,7 +23,7 @@ from armwright.search.samplers import BlackBox
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, builtin_spaces, load_space, paper_space
 from armwright.spaces.joint_modules import MODULES, MOUNTS
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 EVERYTHING: dict[str, Any] = {
     "name": "everything",

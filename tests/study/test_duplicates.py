@@ -3,7 +3,7 @@
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.study.study import optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 
 def test_a_repeated_design_is_evaluated_once_and_counted() -> None:

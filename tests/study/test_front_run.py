@@ -24,7 +24,8 @@ from armwright.search.front_search import FrontSearch
 from armwright.spaces.design_space import paper_space
 from armwright.study.front_run import Budget, FrontProgress, FrontRun, find_front
 from armwright.study.study import optimize
-from armwright.tasks.task import Task, builtin_tasks, load_task
+from armwright.tasks.catalogue import builtin_tasks, load_task
+from armwright.tasks.task import Task
 
 PROBLEM = Problem(load_task("target-1"))
 

@@ -15,7 +15,7 @@ from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.history import History
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer
 

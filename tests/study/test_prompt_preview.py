@@ -15,7 +15,7 @@ from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import armwright
 from tests.support.fixed_problem import SIX_AXIS

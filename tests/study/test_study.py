@@ -19,7 +19,8 @@ from armwright.runs.history import History
 from armwright.search.samplers import SamplerFactory
 from armwright.spaces.parameters import Design
 from armwright.study.study import Progress, Run, optimize
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support.extras import NEEDS_GP
 
 PROBLEM = Problem(load_task("target-1"))

@@ -24,8 +24,9 @@ from armwright.report.solids import clipped
 from armwright.runs.folder import read_run
 from armwright.runs.verification import verify
 from armwright.study.study import optimize
+from armwright.tasks.catalogue import load_task
 from armwright.tasks.obstacles import SHAPES, Box, Cylinder
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
 from armwright.yaml_documents import parse_document
 from tests.support.browser import Tab
@@ -66,19 +67,22 @@ def test_what_may_be_written() -> None:
 @pytest.mark.parametrize(
     ("records", "words"),
     [
-        ([{"kind": "bxo"}], 'obstacle 1: kind "bxo" is unknown. Did you mean "box"? Kinds: box, sphere, '),
+        ([{"kind": "bxo"}], 'obstacle 1: unknown kind "bxo". Did you mean "box"? Kinds: box, sphere, '),
         ([RECORDS[0], {"center": [0, 0, 0]}], "obstacle 2: kind is missing. Kinds: box, "),
-        ([{**RECORDS[1], "siez": 1}], 'a box has no "siez". Did you mean "size"? Keys: kind, name, center, size, yaw'),
-        ([{"kind": "sphere", "center": [0, 0, 0]}], "obstacles[0].sphere.radius: Field required"),
+        (
+            [{**RECORDS[1], "siez": 1}],
+            'obstacle 1: unknown key "siez". Allowed: kind, name, center, size, yaw, rpy. Did you mean "size"?',
+        ),
+        ([{"kind": "sphere", "center": [0, 0, 0]}], "obstacle 1: radius: Field required"),
         ([{**RECORDS[2], "radius": 0}], "radius: Input should be greater than 0 (got 0)"),
         ([{**RECORDS[2], "radius": 1001}], "radius: Input should be less than or equal to 1000"),
         ([{**RECORDS[2], "center": [0, 0, 1e4]}], "center[2]: Input should be less than or equal to 1000"),
         ([{**RECORDS[2], "center": [0, 0, float("nan")]}], "center[2]"),
-        ([{**RECORDS[1], "yaw": 1.0}], "yaw and rpy are both given"),
-        ([{**RECORDS[3], "axis": [0, 0, 0]}], "axis = (0, 0, 0) has no direction; give x, y, z or a vector"),
+        ([{**RECORDS[1], "yaw": 1.0}], "expected yaw or rpy, got both"),
+        ([{**RECORDS[3], "axis": [0, 0, 0]}], "axis = (0, 0, 0) has no direction; try x, y, z or a vector"),
         ([{**RECORDS[0], "name": "a\nb"}], "name"),
         ([{**RECORDS[0], "name": "{{ evil }}"}], "name"),
-        ([RECORDS[0]] * 101, "obstacles has 101 records; at most 100 are allowed"),
+        ([RECORDS[0]] * 101, "obstacles: expected at most 100 records, got 101"),
         ([3], "obstacles[0]"),
     ],
 )
@@ -90,7 +94,7 @@ def test_what_may_not_is_refused_in_one_line(records: list[object], words: str) 
 
 
 def test_a_mapping_is_no_list() -> None:
-    with pytest.raises(TaskError, match="obstacles is a list of records, such as"):
+    with pytest.raises(TaskError, match="obstacles: expected a list of records, such as"):
         parse_document("name: a\ntargets: [[0, 0, 1]]\nobstacles: {kind: ground}", Task, TaskError, "a.yaml")
 
 

@@ -6,8 +6,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from armwright.tasks.catalogue import builtin_names, load_task, random_task
 from armwright.tasks.symmetry import centre, distance_to_planes, is_mirrored, symmetry_planes
-from armwright.tasks.task import builtin_names, load_task, random_task
 
 EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 MILLIMETRES = st.integers(-1000, 1000).map(lambda mm: mm / 1000)

@@ -39,7 +39,7 @@ def task(text: str = RECORDS) -> Task:
     return parse_document(text, Task, TaskError, "insert.yaml")
 
 
-def test_records_become_positions_and_goals() -> None:
+def test_records_become_positions_and_arrays() -> None:
     one = task()
     assert one.targets == ((0.3, 0.0, 0.1), (0.3, 0.1, 0.4), (0.3, -0.2, 0.3), (0.2, -0.2, 0.3))
     assert one.target_positions.shape == (4, 3)
@@ -81,8 +81,11 @@ def test_a_record_without_more_is_the_point() -> None:
         ("{position: [0, 0, 1], axes: [0, 0, 1]}", 'target 2: unknown key "axes".*Did you mean "axis"'),
         ("{position: [0, 0, 1], axis: [0, 0, 0]}", "target 2: axis = .* is no direction"),
         ("{position: [0, 0, 1], axis: [0, 0, .nan]}", r"target 2: axis\[2\]"),
-        ("{position: [0, 0, 1], axis: [0, 0, 1], orientation: [0, 0, 1]}", "target 2: give axis or orientation"),
-        ("{position: [0, 0, 1], orientation: [0, 0, 90]}", r"target 2: orientation = .* in rad.*90° is 1.5708"),
+        (
+            "{position: [0, 0, 1], axis: [0, 0, 1], orientation: [0, 0, 1]}",
+            "target 2: expected axis or orientation, got both",
+        ),
+        ("{position: [0, 0, 1], orientation: [0, 0, 90]}", r"target 2: orientation: expected .* rad.*90° is 1.5708"),
         ("{position: [0, 0, 1], tolerance: 0}", "target 2: tolerance: .*greater than 0"),
         ("{position: [0, 0, 1], angle_tolerance: 0.1}", "target 2: angle_tolerance needs an axis"),
         ("{position: [0, 0, 1], weight: -1}", "target 2: weight"),

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import TaskError
+from armwright.tasks.catalogue import builtin_tasks, load_task, random_task
 from armwright.tasks.points_file import read_points
-from armwright.tasks.task import Task, builtin_tasks, load_task, random_task
+from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
 from armwright.yaml_documents import parse_document
 
@@ -138,7 +139,7 @@ def test_bad_csv_is_refused_by_line(tmp_path: Path, text: str, words: str) -> No
 
 
 def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TaskError, match='unit "inch" is not one of m, mm'):
+    with pytest.raises(TaskError, match='unit: expected m or mm, got "inch"'):
         read_points(tmp_path / "points.csv", "inch")
 
 

@@ -17,7 +17,8 @@ from armwright.problem.objectives import OBJECTIVES, UNCOVERED_FRACTION
 from armwright.problem.problem import Outcomes, Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.spaces.design_space import paper_space
-from armwright.tasks.task import Task, load_task, random_task
+from armwright.tasks.catalogue import load_task, random_task
+from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
 from armwright.yaml_documents import parse_document
 
@@ -158,16 +159,16 @@ def test_targets_that_are_left_out_are_the_corners() -> None:
 
 
 FAULTS = {
-    "{low: [0, 0, 0.5], high: [1, 1, 0.4]}": "low z = 0.5 m is above its high z = 0.4 m",
+    "{low: [0, 0, 0.5], high: [1, 1, 0.4]}": "workspace: expected low z <= high z, got 0.5 m and 0.4 m",
     "{low: [0, 0], high: [1, 1, 1]}": "workspace.*low",
     "{low: [0, 0, 0]}": "workspace.*high",
     "{low: [0, 0, 0], high: [1, 1, 1], points: 0}": "points",
     "{low: [0, 0, 0], high: [1, 1, 1], point: 9}": "point",
     "{low: [0, 0, 0], high: [1, 1, 2000]}": "high",
     "[[0, 0, 0], [1, 1, 1]]": "workspace",
-    "everything": r"workspace is \{low: \[x, y, z\], high",
+    "everything": r"workspace: expected \{low: \[x, y, z\], high",
     "[]": "targets",
-    "[{low: [0, 0, 0], high: [1, 1, 1], points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]": "than 10000",
+    "[{low: [0, 0, 0], high: [1, 1, 1], points: 6000}, {low: [0, 0, 0], high: [1, 1, 1], points: 6000}]": "10000",
 }
 
 
@@ -184,7 +185,7 @@ def test_workspaces_that_cannot_be_are_refused_in_one_line(written: str, targets
 
 
 def test_too_many_boxes_are_refused() -> None:
-    with pytest.raises(ValueError, match="workspace has 21 boxes; at most 20"):
+    with pytest.raises(ValueError, match="workspace: expected at most 20 boxes, got 21"):
         task(workspace=[CUBE] * 21)
 
 

@@ -18,7 +18,7 @@ from armwright.runs.config import versions
 from armwright.runs.folder import read_config
 from armwright.study.front_run import find_front
 from armwright.study.study import Run, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import ChatServer
 from tests.support.wire_formats import llm_proposer
 from tests.torture.lives import trials

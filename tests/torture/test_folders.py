@@ -17,7 +17,7 @@ from armwright.files import replace_folder
 from armwright.problem.problem import Problem
 from armwright.runs.folder import RunFolder, is_held
 from armwright.study.study import Progress, optimize
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 from tests.torture.lives import is_beginning, is_same_run, n_lines, trials
 from tests.torture.short import N_TRIALS, armwright, as_a_plain_user, command, one_line, run, study
 

@@ -356,7 +356,7 @@ def prompt_(
     from armwright.llm.prompt_values import VARIABLES
     from armwright.spaces.design_space import load_space
     from armwright.study.prompt_preview import preview, preview_after
-    from armwright.tasks.task import load_task
+    from armwright.tasks.catalogue import load_task
 
     if variables:
         print("\n".join(f"{name}: {words}" for name, words in VARIABLES.items()))
@@ -822,7 +822,7 @@ def tasks(
     from armwright.cli import console as view
     from armwright.experiments.baselines import baselines_of
     from armwright.runs.best_known import best_known_hypervolume
-    from armwright.tasks.task import builtin_tasks, load_task
+    from armwright.tasks.catalogue import builtin_tasks, load_task
 
     told = [load_task(name) for name in names] if names else list(builtin_tasks().values())
     known = {task.name: best_known_hypervolume(task) for task in told} if names or json_ else {}
@@ -917,8 +917,7 @@ def init(
         raise TaskError(f"{file}: a task file ends in .yaml, such as {file.stem}.yaml")
     if os.path.lexists(file):
         raise TaskError(f"{file} exists already; give another name, or delete it first")
-    targets = None if points is None else read_points(points, unit, offset)
-    text = task_template(file, targets)
+    text = task_template(file) if points is None else task_template(file, read_points(points, unit, offset))
     task = parse_document(text, Task, TaskError, str(file))
     try:
         file.write_text(text, encoding="utf-8")
@@ -958,7 +957,7 @@ def _problem(
     from armwright.problem.problem import Problem
     from armwright.spaces.design_space import load_space, paper_space
     from armwright.spaces.tolerance import TOLERANCE
-    from armwright.tasks.task import load_task
+    from armwright.tasks.catalogue import load_task
 
     loaded = load_task(task)
     measured = None if evaluator is None else load_evaluator(evaluator)

@@ -66,7 +66,7 @@ def try_model(options: ModelOptions | None = None) -> str:
 
 def _kernels() -> Finding:
     from armwright.problem.problem import Problem
-    from armwright.tasks.task import load_task
+    from armwright.tasks.catalogue import load_task
 
     problem = Problem(load_task("target-1"))
     try:

@@ -37,7 +37,8 @@ from armwright.robot.urdf_reader import UrdfArm, read_urdf
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import FrontMember, History
 from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 
 EXISTING_ARMS = "existing_arms.json"  # in a run folder: the arms of its last comparison
 MEASURES: tuple[Objective, ...] = (

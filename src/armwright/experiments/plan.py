@@ -18,7 +18,7 @@ from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import PROMPTS
 from armwright.llm.transcript import TRANSCRIPTS
 from armwright.proposers.factory import PROPOSERS, Choice, choose_proposer
-from armwright.tasks.task import builtin_names, load_task
+from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.yaml_documents import parse_document, read_document
 
 ALL_TASKS = "all"  # instead of a list: every built-in task

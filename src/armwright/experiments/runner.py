@@ -22,7 +22,7 @@ from armwright.spaces.tolerance import TOLERANCE
 from armwright.study.cluster import MOST_LOSSES, Cluster, Finished, Workers
 from armwright.study.front_run import find_front
 from armwright.study.study import optimize, study_config, study_method
-from armwright.tasks.task import load_task
+from armwright.tasks.catalogue import load_task
 
 LOOK_SECONDS = 1.0  # between two looks whether the cluster is still there
 

@@ -39,7 +39,8 @@ from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.runs.summary import ProposerSummary
 from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.tasks.task import Task, builtin_names
+from armwright.tasks.catalogue import builtin_names
+from armwright.tasks.task import Task
 from armwright.text import one_line
 from armwright.yaml_documents import parse_document
 

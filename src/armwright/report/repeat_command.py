@@ -10,7 +10,7 @@ from armwright.problem.objectives import OBJECTIVES
 from armwright.runs.config import FrontMethod, Method, RunConfig
 from armwright.spaces.design_space import builtin_spaces, load_space
 from armwright.spaces.tolerance import TOLERANCE
-from armwright.tasks.task import builtin_names, load_task
+from armwright.tasks.catalogue import builtin_names, load_task
 
 OWN_TASK, OWN_SPACE = "TASK.yaml", "SPACE.yaml"  # placeholders for the user's own files
 DEFAULTS = {"sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200}

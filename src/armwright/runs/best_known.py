@@ -17,7 +17,8 @@ from armwright.problem.objectives import PAPER_OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import Design, FloatParameter
-from armwright.tasks.task import Task, builtin_names, load_task
+from armwright.tasks.catalogue import builtin_names, load_task
+from armwright.tasks.task import Task
 
 BEYOND = 5e-4  # of the best known hypervolume: any other front fills the gaps of a finite one by less
 

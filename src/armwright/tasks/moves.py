@@ -1,4 +1,4 @@
-"""Straight moves between targets, as a task file has them, and where the tip should be along them."""
+"""Straight moves between targets, and positions and timing of the tip along them."""
 
 import math
 from collections.abc import Sequence
@@ -9,18 +9,21 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 
-MOVE_STEP = 0.02  # [m] from one sample of a line to the next, at most
-MOST_STEPS = 200  # of a move
+MOVE_STEP = 0.02  # [m] largest distance between two samples of a line
+MOST_STEPS = 200  # per move
 MOST_SAMPLES = 10_000  # of all moves
 LONGEST_TIME = 1e4  # [s] of a move
-FEWEST_PARTS = 32  # of a timed line: the torques of a shorter one are looked at between its samples, too
+FEWEST_PARTS = 32  # of a timed line; a line of fewer steps is also evaluated between its samples
 
 
 @dataclass(frozen=True)
 class Moves:
-    """Lines that the tip goes along, each from one target to another.
+    """Straight lines of the tip, each from one target to another.
 
-    pairs: the targets' places in the task's list, from 0.  step: [m].  times: of each move [s]; none where not timed.
+    Attributes:
+        pairs: Indices of the first and the last target of each move.
+        step: Largest distance between two samples [m].
+        times: Duration of each move [s]; empty if not timed.
     """
 
     pairs: tuple[tuple[int, int], ...] = ()
@@ -31,7 +34,7 @@ class Moves:
         return len(self.pairs)
 
     def steps(self, targets: Array) -> list[int]:
-        """Into how many equal steps each line is cut; targets: (T, 3) [m]."""
+        """Return the number of equal steps of each line; targets: (T, 3) [m]."""
         return [
             count_steps(float(np.linalg.norm(targets[end] - targets[start])), self.step) for start, end in self.pairs
         ]
@@ -42,12 +45,12 @@ NO_MOVES = Moves()
 
 @dataclass(frozen=True)
 class MoveSamples:
-    """The S samples of M lines, one line after the other, each with its start and its end."""
+    """The S samples of M lines, one line after the other, each including its ends."""
 
-    first: NDArray[np.intp]  # (M + 1,) where each line's samples begin, and last S
-    move: NDArray[np.intp]  # (S,) whose sample it is
-    share: Array  # (S,) of the line, from 0 to 1
-    points: Array  # (S, 3) where the tip should be [m]
+    first: NDArray[np.intp]  # (M + 1,) index of each line's first sample, and S
+    move: NDArray[np.intp]  # (S,) index of the line
+    share: Array  # (S,) fraction of the line, from 0 to 1
+    points: Array  # (S, 3) position of the tip [m]
 
     def __len__(self) -> int:
         return len(self.points)
@@ -55,27 +58,27 @@ class MoveSamples:
 
 @dataclass(frozen=True)
 class MoveTiming:
-    """F moments of M timed lines, one line after the other: their samples, and as many between as make 32 parts."""
+    """F instants of M timed lines, one line after the other: their samples, and more between them for short lines."""
 
-    first: NDArray[np.intp]  # (M + 1,) where each line's moments begin, and last F
-    sample: NDArray[np.intp]  # (F,) the last before
-    beyond: Array  # (F,) it, as a share of the step to the next
-    speed: Array  # (F,) of the share of the line [1/s]
-    acceleration: Array  # (F,) [1/s²]
+    first: NDArray[np.intp]  # (M + 1,) index of each line's first instant, and F
+    sample: NDArray[np.intp]  # (F,) index of the last sample before
+    beyond: Array  # (F,) fraction of the step from that sample to the next
+    speed: Array  # (F,) rate of the fraction of the line [1/s]
+    acceleration: Array  # (F,) its derivative [1/s²]
 
     def between(self, values: Array) -> Array:
-        """(N, F, D) on straight lines between those of samples (N, S, D)."""
+        """Return (N, F, D) values interpolated between those of samples (N, S, D)."""
         share, after = self.beyond[:, None], np.minimum(self.sample + 1, values.shape[1] - 1)
         return (1.0 - share) * values[:, self.sample] + share * values[:, after]
 
 
 def count_steps(length: float, step: float) -> int:
-    """Into how many equal steps a line is cut [m]: a hair above a whole number is that number."""
+    """Return the number of equal steps of a line [m]; a rounding error above a whole number is ignored."""
     return max(1, math.ceil(length / step - 1e-9))
 
 
 def sample_moves(moves: Moves, targets: Array) -> MoveSamples:
-    """Where the tip should be; targets: (T, 3) [m]."""
+    """Return the positions of the tip along moves; targets: (T, 3) [m]."""
     steps = moves.steps(targets)
     share: list[Array] = [np.arange(n + 1) / n for n in steps]
     ends = [(targets[start], targets[end]) for start, end in moves.pairs]
@@ -90,7 +93,7 @@ def sample_moves(moves: Moves, targets: Array) -> MoveSamples:
 
 
 def time_samples(moves: Moves, lines: MoveSamples) -> MoveTiming:
-    """When the tip is where, if each line is run from rest to rest by the fifth-order profile of `quintic_rates`."""
+    """Return the timing of moves from rest to rest with the quintic profile of `quintic_rates`."""
     sample: list[NDArray[np.intp]] = []
     beyond: list[Array] = []
     shares: list[Array] = []
@@ -114,9 +117,10 @@ def time_samples(moves: Moves, lines: MoveSamples) -> MoveTiming:
 
 
 def quintic_rates(share: Array) -> tuple[Array, Array]:
-    """ds/dt and d²s/dt² where s = 10 t³ - 15 t⁴ + 6 t⁵ comes to these shares, of a move of one second.
+    """Return ds/dt and d²s/dt² of s = 10 t³ - 15 t⁴ + 6 t⁵ at given values of s, for a move of one second.
 
-    Of all ways from rest to rest it is the one of the least mean square jerk; s grows with t, so t is found by halving.
+    This is the profile of minimum jerk from rest to rest (Flash and Hogan 1985). s grows with t, so t is found by
+    bisection.
     """
     low, high = np.zeros(share.shape), np.ones(share.shape)
     for _ in range(60):
@@ -128,19 +132,19 @@ def quintic_rates(share: Array) -> tuple[Array, Array]:
 
 
 def check_times(times: float | tuple[float, ...], moves: int) -> None:
-    """ValueError where moves cannot take these times [s]; one is for every move."""
+    """Raise ValueError if the times [s] do not fit the moves; a single one is for all moves."""
     if not moves:
-        raise ValueError("move_time is of moves, and there are none; give some: moves: in_order")
+        raise ValueError("move_time needs moves; try moves: in_order")
     if isinstance(times, tuple) and len(times) != moves:
-        raise ValueError(f"move_time has {len(times)} values for {moves} moves; give one or all")
+        raise ValueError(f"move_time: expected 1 or {moves} values [s], got {len(times)}")
     for time in times if isinstance(times, tuple) else (times,):
         if not 0.0 < time <= LONGEST_TIME:
-            raise ValueError(f"move_time = {time:g} s is outside 0 < move_time <= {LONGEST_TIME:g} s")
+            raise ValueError(f"move_time: expected above 0 and at most {LONGEST_TIME:g} s, got {time:g} s")
 
 
 def check_moves(pairs: Sequence[tuple[int, int]], targets: Sequence[tuple[float, float, float]], step: float) -> None:
-    """ValueError where a move is none, or too long for its steps; pairs: numbers of targets, counted from 1."""
-    in_all = 0
+    """Raise ValueError for invalid or overlong moves; pairs: numbers of targets, counted from 1."""
+    n_samples = 0
     for number, (start, end) in enumerate(pairs, start=1):
         for target in (start, end):
             if not 1 <= target <= len(targets):
@@ -149,23 +153,22 @@ def check_moves(pairs: Sequence[tuple[int, int]], targets: Sequence[tuple[float,
                     f"targets are counted from 1 to {len(targets)}"
                 )
         if (start, end) in pairs[: number - 1]:
-            raise ValueError(f"move {number} = [{start}, {end}] is there twice")
+            raise ValueError(f"move {number} = [{start}, {end}] is given twice")
         length = math.dist(targets[start - 1], targets[end - 1])
         if length == 0.0:
-            raise ValueError(f"move {number} = [{start}, {end}]: both are one point, which no line joins")
+            raise ValueError(f"move {number} = [{start}, {end}]: the targets are at the same position")
         if count_steps(length, step) > MOST_STEPS:
             raise ValueError(
                 f"move {number} = [{start}, {end}] is {length:.4g} m long, more than {MOST_STEPS} steps of {step:g} m; "
-                f"give move_step: {_rounded_up(length / MOST_STEPS):g}"
+                f"try move_step: {_rounded_up(length / MOST_STEPS):g}"
             )
-        in_all += count_steps(length, step) + 1
-        if in_all > MOST_SAMPLES:
+        n_samples += count_steps(length, step) + 1
+        if n_samples > MOST_SAMPLES:
             raise ValueError(
-                f"moves have more than {MOST_SAMPLES} samples together; give fewer of them, or a move_step above "
-                f"{step:g} m"
+                f"moves: expected at most {MOST_SAMPLES} samples in all; try fewer moves or move_step > {step:g} m"
             )
 
 
 def _rounded_up(length: float) -> float:
-    """To a millimetre."""
+    """Round a length up to a millimetre [m]."""
     return math.ceil(1e3 * length) / 1e3

@@ -19,7 +19,7 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
     Args:
         path: The CSV file.
         unit: The unit of its numbers, `m` or `mm`.
-        offset: What is added to every point [m].
+        offset: Vector added to every point [m].
 
     Returns:
         The points [m].
@@ -28,7 +28,7 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
         TaskError: If a line is not three finite numbers, or there is none.
     """
     if unit not in UNITS:
-        raise TaskError(f'unit "{unit}" is not one of {", ".join(UNITS)}')
+        raise TaskError(f'unit: expected {" or ".join(UNITS)}, got "{unit}"')
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except OSError as fault:
@@ -43,9 +43,9 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
         try:
             x, y, z = (float(cell) * UNITS[unit] for cell in row[:3])
         except ValueError as fault:
-            raise TaskError(f"{path}, line {number}: {row[:3]} is not three numbers x, y, z") from fault
+            raise TaskError(f"{path}, line {number}: expected three numbers x, y, z, got {row[:3]}") from fault
         if not all(math.isfinite(c) for c in (x, y, z)):
-            raise TaskError(f"{path}, line {number}: coordinates must be finite, not {row[:3]}")
+            raise TaskError(f"{path}, line {number}: expected finite coordinates, got {row[:3]}")
         points.append((_tidy(x + offset[0]), _tidy(y + offset[1]), _tidy(z + offset[2])))
     if not points:
         raise TaskError(f"{path} has no points: expected three numbers x, y, z per line")

@@ -1,4 +1,4 @@
-"""Targets of a task: points, and which way the tool points, how exactly, and how much each counts."""
+"""Targets of a task: positions, tool directions, tolerances and weights."""
 
 import math
 from collections.abc import Sequence
@@ -8,10 +8,9 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, GetJsonSchemaHandler, ValidationError, model_serializer, model_validator
+from pydantic import BaseModel, Field, GetJsonSchemaHandler, model_serializer, model_validator
 
 from armwright.arrays import Array
-from armwright.exceptions import did_you_mean
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
 
 Point = tuple[float, float, float]
@@ -26,7 +25,7 @@ AXIS, ORIENTATION = 2, 3  # number of angles that a target asks for; 0 for a poi
 
 @dataclass(frozen=True)
 class TargetArrays:
-    """How T targets are to be reached, beside their positions.
+    """Tool directions, tolerances and weights of T targets.
 
     Attributes:
         n_angular: (T,) number of angles that count: 0 for a point, AXIS if the tool's z counts, ORIENTATION if its x
@@ -60,15 +59,18 @@ class TargetArrays:
 
 
 class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """A point that the tip should reach [m], and how.
+    """A point that the tip should reach, and the tool's direction there.
 
-    axis: where the tool's own z should point to in the world, of any length; the tool may turn about it.
-    orientation: instead of it, roll, pitch and yaw of the tool's frame about the world's x, then y, then z [rad].
-    tolerance: from which on it counts as missed [m].  angle_tolerance: the same of its axis or orientation [rad].
-    weight: that multiplies its share of a sum of errors.
+    Attributes:
+        position: Position of the tip [m].
+        axis: World direction of the tool's z axis, of any length; the tool may rotate about it.
+        orientation: Instead of an axis, roll, pitch and yaw of the tool about the fixed x, then y, then z [rad].
+        tolerance: Distance from which on the target counts as unreached [m].
+        angle_tolerance: Angle likewise, for a target with an axis or an orientation [rad].
+        weight: Factor of its share of a sum of errors.
     """
 
-    position: Point  # where the tip should be [m]
+    position: Point
     axis: Point | None = None
     orientation: Point | None = None
     tolerance: float = Field(default=REACHED, gt=0.0, le=LARGEST_COORDINATE)
@@ -78,45 +80,43 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.axis is not None and self.orientation is not None:
-            raise ValueError("give axis or orientation, not both: an orientation says where every axis points to")
+            raise ValueError("expected axis or orientation, got both; an orientation states all axes")
         if self.axis is not None and not 1e-6 <= math.hypot(*self.axis) <= LARGEST_COORDINATE:
-            raise ValueError(
-                f"axis = {list(self.axis)} is no direction: such as [0, 0, -1] for a tool that points down"
-            )
+            raise ValueError(f"axis = {list(self.axis)} is no direction; try [0, 0, -1] for a tool that points down")
         if self.orientation is not None and max(map(abs, self.orientation)) > 2 * math.pi:
             raise ValueError(
-                f"orientation = {list(self.orientation)} is roll, pitch, yaw in rad, each within ±2π; 90° is 1.5708"
+                f"orientation: expected roll, pitch, yaw within ±2π rad, got {list(self.orientation)} (90° is 1.5708)"
             )
         if self.axis is None and self.orientation is None and "angle_tolerance" in self.model_fields_set:
-            raise ValueError("angle_tolerance needs an axis or an orientation, of which it is the tolerance")
+            raise ValueError("angle_tolerance needs an axis or an orientation")
         return self
 
     @model_serializer(mode="wrap")
     def _brief(self, handler: Any) -> Any:
-        """Without what is as usual."""
-        usual = {name: field.default for name, field in type(self).model_fields.items()}
-        return {name: value for name, value in handler(self).items() if value != usual[name]}
+        """Leave out values that are the defaults."""
+        defaults = {name: field.default for name, field in type(self).model_fields.items()}
+        return {name: value for name, value in handler(self).items() if value != defaults[name]}
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> Any:
-        """As if all were written: what `_brief` makes has no schema of its own."""
+        """Return the schema of the fields; `_brief` has no schema of its own."""
         return handler(_without_serializer(core_schema))
 
     @property
     def n_angular(self) -> int:
-        """Number of angles that it asks for."""
+        """Number of angles that count: 0, AXIS or ORIENTATION."""
         return AXIS if self.axis is not None else ORIENTATION if self.orientation is not None else 0
 
     @property
     def rotation(self) -> np.ndarray:
-        """(3, 3) the tool's axes as they should be; axes that do not count are arbitrary."""
+        """(3, 3) the tool's axes in the world as columns; axes that do not count are arbitrary."""
         if self.axis is not None:
             return rotation_to_axis(self.axis)
         return np.eye(3) if self.orientation is None else rotation_from_rpy(*self.orientation)
 
     @property
     def description(self) -> str:
-        """What it says beside its point, on one line."""
+        """Everything but the position, on one line; empty for a plain point."""
         parts = [] if self.axis is None else [f"axis {_vector(self.axis)}"]
         parts += [] if self.orientation is None else [f"orientation {_vector(self.orientation)} rad"]
         parts += [f"tolerance {1e3 * self.tolerance:g} mm"] * (self.tolerance != REACHED)
@@ -125,15 +125,15 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return ", ".join(parts)
 
 
-def describe_targets(entries: Sequence[Point | Target]) -> list[str]:
-    """What targets say beside their points, a line for all that say the same, counted from 1."""
+def describe_targets(specs: Sequence[Point | Target]) -> list[str]:
+    """Describe targets with more than a position, one line for equal ones; numbers count from 1."""
     numbers: dict[str, list[int]] = {}
-    for number, entry in enumerate(entries, start=1):
-        if isinstance(entry, Target):
-            numbers.setdefault(entry.description, []).append(number)
+    for number, target in enumerate(specs, start=1):
+        if isinstance(target, Target):
+            numbers.setdefault(target.description, []).append(number)
     return [
-        f"target{'s' if len(group) > 1 else ''} {', '.join(map(str, group))}: {words}"
-        for words, group in numbers.items()
+        f"target{'s' if len(group) > 1 else ''} {', '.join(map(str, group))}: {description}"
+        for description, group in numbers.items()
     ]
 
 
@@ -147,26 +147,6 @@ def _without_serializer(core_schema: Any) -> Any:
         for key, value in core_schema.items()
         if key != "serialization"
     }
-
-
-def read_target(value: Any, number: int) -> Target:
-    """A record of a task file as a target; ValueError says what is wrong with the target of that number."""
-    if isinstance(value, Target):
-        return value
-    for key in value:
-        if key not in Target.model_fields:
-            allowed = tuple(Target.model_fields)
-            raise ValueError(
-                f'target {number}: unknown key "{key}". Allowed: {", ".join(allowed)}.{did_you_mean(str(key), allowed)}'
-            )
-    try:
-        return Target.model_validate(value)
-    except ValidationError as fault:
-        first = fault.errors(include_url=False, include_context=False)[0]
-        at = "".join(f"[{part}]" if isinstance(part, int) else str(part) for part in first["loc"])
-        words = first["msg"].removeprefix("Value error, ")
-        got = "" if first["type"] in ("missing", "value_error") else f" (got {str(first['input'])[:80]})"
-        raise ValueError(f"target {number}: {at + ': ' if at else ''}{words}{got}") from fault
 
 
 @lru_cache

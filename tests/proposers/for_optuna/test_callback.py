@@ -28,7 +28,8 @@ from armwright.proposers.proposer import Proposal
 from armwright.proposers.rules import RulesProposer
 from armwright.spaces.optuna_distributions import distributions
 from armwright.spaces.parameters import Design
-from armwright.tasks.task import Task, load_task
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, wants_design
 from tests.support.wire_formats import llm_proposer
 
