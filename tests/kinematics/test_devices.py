@@ -11,6 +11,7 @@ import pytest
 from armwright.exceptions import FailureError, SettingsError
 from armwright.kinematics import devices
 from armwright.kinematics import ik as solve
+from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.ik import solve_postures
 from armwright.problem import problem
 from armwright.problem.problem import Problem
@@ -80,7 +81,7 @@ def test_auto_is_cuda_only_where_it_is_and_for_much_work(monkeypatch: pytest.Mon
 
 def test_devices_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(devices, "_has_cuda", lambda: False)
-    with pytest.raises(SettingsError, match=r'device = "cuda": no NVIDIA GPU with its driver is here; take .*"cpu"'):
+    with pytest.raises(SettingsError, match=r'device = "cuda": no NVIDIA GPU with its driver found; try .*"cpu"'):
         devices.resolve_device("cuda", many=True)
     with pytest.raises(SettingsError, match=r'device = "cud" is not one of auto, cpu, cuda. Did you mean "cuda"'):
         devices.resolve_device("cud", many=True)
@@ -101,14 +102,15 @@ def test_auto_is_settled_when_the_problem_is_made() -> None:
 COMPILE_FOR_CUDA = """
 import sys
 import warp as wp
-from armwright.kinematics.clearance_kernels import clearance_kernels_of
+from armwright.kinematics.clearance_kernels import clearance_kernels
 from armwright.kinematics.pose_kernels import pose_kernels
 from armwright.kinematics.position_kernels import position_kernels
 variants = [position_kernels("float32", 1, motions) for motions in ("revolute", "any")]
 variants.append(pose_kernels("float32", 1, "any"))
 solving = [k for v in variants for k in (v.solve_ik, v.keep_pose, v.static_torque) if k is not None]
-measuring = clearance_kernels_of("float32")
-kernels = {kernel.module.name: kernel for kernel in (*solving, measuring.place, measuring.part, measuring.clear)}
+measuring = clearance_kernels("float32")
+measuring = [measuring.link_axes, measuring.self_clearance, measuring.obstacle_clearance]
+kernels = {kernel.module.name: kernel for kernel in (*solving, *measuring)}
 print(len(kernels), file=open(sys.argv[1] + "/count", "w"))
 for kernel in kernels.values():
     print(*wp.compile_aot_module(kernel.module, arch=90, module_dir=sys.argv[1], use_ptx=True))
@@ -137,7 +139,7 @@ def test_chunk_is_halved_until_the_gpu_has_memory_for_it() -> None:
             raise RuntimeError("Failed to allocate 123 bytes on device 'cuda:0'")
         solved.append(range(rows.start, rows.stop))
 
-    solve._one_after_another(solving, 107, 100)
+    in_chunks(solving, 107, 100, "cuda")
     assert [number for rows in solved for number in rows] == list(range(107))
     assert max(len(rows) for rows in solved) == 25
 
@@ -145,13 +147,13 @@ def test_chunk_is_halved_until_the_gpu_has_memory_for_it() -> None:
         raise RuntimeError("CUDA error 2: out of memory")
 
     with pytest.raises(FailureError, match="one arm at all its targets does not fit"):
-        solve._one_after_another(never, 107, 100)
+        in_chunks(never, 107, 100, "cuda")
 
     def broken(rows: slice) -> None:
         raise RuntimeError("CUDA error 700: an illegal memory access")
 
     with pytest.raises(RuntimeError, match="illegal"):
-        solve._one_after_another(broken, 107, 100)
+        in_chunks(broken, 107, 100, "cuda")
 
 
 def test_chunks_do_not_change_the_bits(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -161,7 +161,7 @@ def test_targets_of_all_kinds_side_by_side(dof: int) -> None:
     start = chains.lower + inside * (chains.upper - chains.lower)
     wide = np.zeros((200, 6, arrays.dof))
     wide[..., moving] = start
-    ours = solve_postures(arrays, points, 8, start=wide, target_arrays=asked, precision="float64")
+    ours = solve_postures(arrays, points, 8, initial_q=wide, target_arrays=asked, precision="float64")
     q, distance, angle = reference_poses.solve(chains, points, asked, *tools(arms), 8, start)
     agree = np.abs(ours.q[..., moving] - q).max(axis=-1) < 1e-6
     assert agree.mean() > 0.995

@@ -380,10 +380,10 @@ def test_start_at_zero_is_the_straight_one_and_any_start_is_kept_if_best() -> No
     """Of the start and all results the nearest is kept, so from the kept posture nothing gets worse."""
     arms, targets = stack_arms(general_arms(200, 4, 17)), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     straight = solve_postures(arms, targets)
-    same_bits(straight, solve_postures(arms, targets, start=0.0), np.s_[:])
-    unmoved = solve_postures(arms, targets, updates=0, start=straight.q)
+    same_bits(straight, solve_postures(arms, targets, initial_q=0.0), np.s_[:])
+    unmoved = solve_postures(arms, targets, updates=0, initial_q=straight.q)
     same_bits(straight, unmoved, np.s_[:])
-    again = solve_postures(arms, targets, start=straight.q)
+    again = solve_postures(arms, targets, initial_q=straight.q)
     assert np.all(error_of(again, targets) <= error_of(straight, targets) + 1e-6)
     assert error_of(again, targets).mean() < error_of(straight, targets).mean()
 
@@ -392,18 +392,18 @@ def test_starts_broadcast_and_are_moved_into_the_limits() -> None:
     arms, targets = stack_arms(general_arms(50, 3, 18)), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     own = moving(arms)
     low, high = (np.broadcast_to(limits[:, None, own], (50, 2, 3)) for limits in (arms.lower, arms.upper))
-    assert np.array_equal(solve_postures(arms, targets, 0, start=-10.0).q, low)
-    assert np.array_equal(solve_postures(arms, targets, 0, start=[10.0, -10.0, 0.25]).q[..., 0], high[..., 0])
+    assert np.array_equal(solve_postures(arms, targets, 0, initial_q=-10.0).q, low)
+    assert np.array_equal(solve_postures(arms, targets, 0, initial_q=[10.0, -10.0, 0.25]).q[..., 0], high[..., 0])
     angles = np.random.default_rng(18).uniform(-0.2, 0.2, (50, 2, 3))
     for start in (angles, angles[:, :1], angles[:1], angles[0, 0]):
-        q = solve_postures(arms, targets, 0, start=start).q
+        q = solve_postures(arms, targets, 0, initial_q=start).q
         assert np.array_equal(q, np.broadcast_to(start, q.shape).astype(np.float32))
 
 
 def test_start_in_float64() -> None:
     arms, targets = general_arms(50, 3, 19), np.array([[0.4, 0.1, 0.3]])
     start = np.random.default_rng(19).uniform(-0.2, 0.2, (50, 1, 3))
-    kept = solve_postures(stack_arms(arms, "float64"), targets, 0, start=start, precision="float64")
+    kept = solve_postures(stack_arms(arms, "float64"), targets, 0, initial_q=start, precision="float64")
     assert np.array_equal(kept.q, start)
 
 
@@ -497,9 +497,9 @@ def test_refused_settings_are_named() -> None:
     with pytest.raises(SettingsError, match=r'precision = "float46" is not one of float32, float64. Did you mean'):
         solve_postures(arms, targets, precision="float46")  # type: ignore[arg-type]
     with pytest.raises(ArmError, match=r"shape \(2, 2, 4\) do not broadcast to \(2, 3, 4\)"):
-        solve_postures(arms, targets, start=np.zeros((2, 2, 4)))
-    with pytest.raises(ArmError, match="not a finite number"):
-        solve_postures(arms, targets, start=np.nan)
+        solve_postures(arms, targets, initial_q=np.zeros((2, 2, 4)))
+    with pytest.raises(ArmError, match="expected finite angles"):
+        solve_postures(arms, targets, initial_q=np.nan)
     with pytest.raises(ArmError, match="stacked in float64"):
         solve_postures(stack_arms(paper_arms(2, 4, 20), "float64"), targets)
     same_arms = solve_postures(arms, targets, precision="float64")

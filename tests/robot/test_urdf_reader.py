@@ -57,7 +57,7 @@ def seen_by_pinocchio(path: Path, read: UrdfArm, q: np.ndarray, payload: float) 
 def seen_by_kernels(arm: Arm, q: np.ndarray, payload: float) -> tuple[np.ndarray, np.ndarray]:
     loads = np.full(len(q), payload)
     arrays = stack_arms([arm], "float64")
-    postures = solve_postures(arrays, np.zeros((len(q), 3)), 0, start=q[None], payload=loads, precision="float64")
+    postures = solve_postures(arrays, np.zeros((len(q), 3)), 0, initial_q=q[None], payload=loads, precision="float64")
     return postures.reached[0], postures.torque[0]
 
 

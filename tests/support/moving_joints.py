@@ -22,13 +22,15 @@ def of_all(values: np.ndarray, arrays: ArmArrays) -> np.ndarray:
     return every
 
 
-def solve_postures(arrays: ArmArrays, targets: np.ndarray, *args: Any, start: Any = None, **options: Any) -> Postures:
+def solve_postures(
+    arrays: ArmArrays, targets: np.ndarray, *args: Any, initial_q: Any = None, **options: Any
+) -> Postures:
     own = moving(arrays)
-    if start is not None:
-        start = np.asarray(start, dtype=np.float64)
-        if start.ndim and start.shape[-1] == len(own):
-            start = of_all(start, arrays)
-    found = solve.solve_postures(arrays, targets, *args, start=start, **options)
+    if initial_q is not None:
+        initial_q = np.asarray(initial_q, dtype=np.float64)
+        if initial_q.ndim and initial_q.shape[-1] == len(own):
+            initial_q = of_all(initial_q, arrays)
+    found = solve.solve_postures(arrays, targets, *args, initial_q=initial_q, **options)
     assert not np.delete(found.q, own, axis=-1).any()
     assert not np.delete(found.torque, own, axis=-1).any()
     q, torque = (np.ascontiguousarray(values[..., own]) for values in (found.q, found.torque))

@@ -153,7 +153,7 @@ def test_moves_begin_in_the_kept_posture_and_go_on_from_sample_to_sample() -> No
         assert np.array_equal(paths.reached[:, first], evaluation.reached[:, start])
         assert np.array_equal(paths.joint_torques[:, first], evaluation.joint_torques[:, start])
         for k in range(first + 1, beyond):
-            by_hand = solve_postures(arms, paths.samples.points[[k]], UPDATES_OF_STEP, start=q)
+            by_hand = solve_postures(arms, paths.samples.points[[k]], UPDATES_OF_STEP, initial_q=q)
             assert np.array_equal(paths.q[:, k], by_hand.q[:, 0])
             q = by_hand.q
     assert targets[0] == pytest.approx(paths.samples.points[0])

@@ -112,7 +112,7 @@ class ArmArrays:
     n_joints: Ints  # (N,) number of an arm's joints, at most D
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
     length: Array  # (N,) of all links [m]
-    base_mass: Array  # (N,) mass that stands with the base [kg]
+    base_mass: Array  # (N,) mass fixed to the base [kg]
     bodies: Bodies  # for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
 
@@ -146,7 +146,7 @@ class ArmArrays:
 
     @property
     def ranges_include_zero(self) -> bool:
-        """True if every joint can stand at 0."""
+        """True if every joint can be at 0."""
         return bool(np.all(self.lower <= 0.0) and np.all(self.upper >= 0.0))
 
 

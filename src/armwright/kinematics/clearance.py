@@ -1,4 +1,4 @@
-"""How far posed arms are from themselves and from obstacles: numpy in, numpy out."""
+"""Clearance of posed arms from themselves and from obstacles: numpy in, numpy out."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -7,69 +7,75 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
+from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.devices import Device, load_clearance
-from armwright.kinematics.ik import in_threads
 from armwright.tasks.obstacles import SHAPES, Obstacle
 
-LARGEST_CHUNK = 2**14  # postures at a time, whose links fit into a core's cache; on a GPU, so many times GPU_CHUNKS
-SMALLEST_CHUNK = 256  # postures; below it a thread costs more than it brings
-GPU_CHUNKS = 64
+LARGEST_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
+SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than they save
 
 
 def clearances(
-    arms: ArmArrays, q: NDArray[np.float64], obstacles: Sequence[Obstacle] = (), device: Device = "cpu"
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far N arms in T postures are from themselves, and from obstacles: (N, T) each [m].
+    arms: ArmArrays, q: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu"
+) -> tuple[Array, Array]:
+    """Compute the self-clearance and the obstacle clearance of arms in postures.
 
-    That is the smallest distance of two links that are not neighbours, and of a link from an obstacle; below 0 where
-    one is in the other, infinite where there is nothing to hit.
-    The tool does not count: it is there to touch. q: (N, T, D) joint angles [rad], or ways [m].
+    These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. They are
+    negative for overlaps, and infinite if there is nothing to hit. The tool does not count: it is made to touch.
+
+    Args:
+        arms: N arms of up to D joints.
+        q: (N, T, D) joint angles [rad] or displacements [m].
+        obstacles: The obstacles.
+        device: The device to compute on.
+
+    Returns:
+        (N, T) self-clearance and (N, T) obstacle clearance [m].
     """
     wp, kernels = load_clearance(arms.precision, device)
     n, t, _ = q.shape
-    found = np.full((2, n, t), np.inf)
+    distances = np.full((2, n, t), np.inf)
     solids = _on_device(tuple(obstacles), arms.precision, device) if obstacles else None
 
-    def measure(rows: slice) -> None:
-        found[:, rows] = _measured(arms[rows], q[rows], solids, wp, kernels, device)
+    def measure(chunk: slice) -> None:
+        distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, wp, kernels, device)
 
-    if device == "cuda":
-        size = max(1, GPU_CHUNKS * LARGEST_CHUNK // t)
-        for first in range(0, n, size):
-            measure(slice(first, first + size))
-    else:
-        in_threads(measure, n, max(1, min(LARGEST_CHUNK // t, max(-(-n // 8), SMALLEST_CHUNK // t))))
-    return found[0], found[1]
+    size = LARGEST_CHUNK[device] // t
+    if device == "cpu":
+        size = min(size, max(-(-n // 8), SMALLEST_CHUNK // t))
+    in_chunks(measure, n, max(1, size), device)
+    return distances[0], distances[1]
 
 
-def _measured(
-    arms: ArmArrays, q: NDArray[np.float64], solids: list[Any] | None, wp: Any, kernels: Any, device: Device
+def _distances(
+    arms: ArmArrays, q: Array, solids: list[Any] | None, wp: Any, kernels: Any, device: Device
 ) -> NDArray[np.floating[Any]]:
-    """(2, n, T) [m]."""
+    """Return the (2, N, T) clearances of a chunk of arms [m]."""
 
-    def given(values: NDArray[Any], dtype: Any) -> Any:
+    def on_device(values: NDArray[Any], dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, copy=False)
 
     real, vector, dim = kernels.real, kernels.Vector3, q.shape[:2]
     starts, ends = (wp.empty(q.shape, dtype=vector, device=device) for _ in range(2))
     offset = arms.offset.copy()
     offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.astype(arms.precision)
-    motion = given(arms.motion, wp.int32)
-    posed = [given(arms.base, vector), motion, given(offset, vector)]
-    posed.append(given(q.astype(arms.precision), real))
-    wp.launch(kernels.place, dim, inputs=[*posed, starts, ends], device=device)
-    apart, clear = (given(np.full(dim, np.inf, dtype=arms.precision), real) for _ in range(2))
-    links = [starts, ends, given(arms.radius, real)]
-    wp.launch(kernels.part, dim, inputs=[motion, *links, apart], device=device)
+    motion = on_device(arms.motion, wp.int32)
+    posed = [on_device(arms.base, vector), motion, on_device(offset, vector)]
+    posed.append(on_device(q.astype(arms.precision), real))
+    wp.launch(kernels.link_axes, dim, inputs=[*posed, starts, ends], device=device)
+    self_clearance, obstacle_clearance = (on_device(np.full(dim, np.inf, dtype=arms.precision), real) for _ in range(2))
+    links = [starts, ends, on_device(arms.radius, real)]
+    wp.launch(kernels.self_clearance, dim, inputs=[motion, *links, self_clearance], device=device)
     if solids is not None:
-        wp.launch(kernels.clear, dim, inputs=[*links, *solids, clear], device=device)
-    return np.stack([apart.numpy(), clear.numpy()])
+        wp.launch(kernels.obstacle_clearance, dim, inputs=[*links, *solids, obstacle_clearance], device=device)
+    return np.stack([self_clearance.numpy(), obstacle_clearance.numpy()])
 
 
 @cache
 def _on_device(obstacles: tuple[Obstacle, ...], precision: Precision, device: Device) -> list[Any]:
-    """Shape, centre, rotation into its frame and half sides of each, as the kernel takes them."""
+    """Return shape, centre, rotation into its frame and half sides of each obstacle, as the kernel takes them."""
     wp, kernels = load_clearance(precision, device)
     solids = [obstacle.solid for obstacle in obstacles]
     columns: list[tuple[Any, Any, Any]] = [

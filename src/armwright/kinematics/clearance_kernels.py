@@ -1,22 +1,20 @@
-"""The kernels of clearance: how far the links of posed arms are from each other and from obstacles, in Warp.
+"""Warp kernels of clearance: distances of the links of posed arms from each other and from obstacles.
 
 A link is a capsule: all points within its radius of its axis, a segment. A thread takes one arm at one target, and
-branches: what a link is far from is passed over by a bound. docs/method.md §13 says what is measured.
+branches: a bound excludes distant obstacles. docs/method.md §13 defines the distances.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import warp as wp
 
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Precision
+from armwright.kinematics.lane_math import kernel
 from armwright.tasks.obstacles import SHAPES
-
-_OPTIONS = {"cpu_compiler_flags": "-march=native -O3"}
-_kernel = partial(wp.kernel, enable_backward=False, module="unique", module_options=_OPTIONS)
 
 HALVINGS = 20  # of a link, in the search for its point nearest to an obstacle: to 1e-6 of its length
 BOX, SPHERE, CYLINDER, GROUND = map(SHAPES.index, ("box", "sphere", "cylinder", "ground"))
@@ -24,41 +22,41 @@ BOX, SPHERE, CYLINDER, GROUND = map(SHAPES.index, ("box", "sphere", "cylinder", 
 
 @dataclass(frozen=True)
 class ClearanceKernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is kept on disk."""
+    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
 
     real: Any
     Vector3: Any
     Matrix3: Any
-    place: Any  # where the links are
-    part: Any  # how far from each other
-    clear: Any  # how far from obstacles
+    link_axes: Any
+    self_clearance: Any
+    obstacle_clearance: Any
 
 
 @cache
-def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
-    """The kernels in this precision. Of N arms with D links at T targets, and of O obstacles."""
+def clearance_kernels(precision: Precision) -> ClearanceKernels:
+    """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
     real, Vector3, Matrix3 = {
         "float32": (wp.float32, wp.vec3f, wp.mat33f),
         "float64": (wp.float64, wp.vec3d, wp.mat33d),
     }[precision]
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     tiny = real(1e-30)
-    parallel = real(1e-12)  # square of the sine of an angle that float32 does not tell from 0
+    parallel = real(1e-12)  # square of the sine of an angle that is 0 in float32
 
     @wp.func
-    def slid(motion: int, p: Vector3, way: real, x: Vector3, y: Vector3, z: Vector3):
-        """A joint's place: a sliding one has gone its way along its axis."""
+    def translate(motion: int, p: Vector3, displacement: real, x: Vector3, y: Vector3, z: Vector3):
+        """Return the position of a joint: a prismatic joint is displaced along its axis."""
         if motion == wp.static(PRISMATIC):
-            return p + way * x
+            return p + displacement * x
         if motion == wp.static(PRISMATIC + 1):
-            return p + way * y
+            return p + displacement * y
         if motion == wp.static(PRISMATIC + 2):
-            return p + way * z
+            return p + displacement * z
         return p
 
     @wp.func
-    def turned(motion: int, x: Vector3, y: Vector3, z: Vector3, s: real, c: real):
-        """The frame's axes x, y, z in the world, as a joint with the angle of this sine and cosine turns them."""
+    def rotate(motion: int, x: Vector3, y: Vector3, z: Vector3, s: real, c: real):
+        """Return the axes x, y, z of the frame after a joint whose angle has this sine and cosine."""
         if motion == 0:
             return x, c * y + s * z, c * z - s * y
         if motion == 1:
@@ -67,8 +65,8 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
             return c * x + s * y, c * y - s * x, z
         return x, y, z
 
-    @_kernel
-    def place(
+    @kernel
+    def link_axes(
         base: wp.array(dtype=Vector3),
         motion: wp.array2d(dtype=int),
         offset: wp.array2d(dtype=Vector3),
@@ -76,7 +74,7 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
         starts: wp.array3d(dtype=Vector3),
         ends: wp.array3d(dtype=Vector3),
     ):
-        """Forward kinematics: where each link's axis starts and ends.
+        """Compute start and end of the axis of each link by forward kinematics.
 
         base: (N,) [m].  motion: (N, D).  offset: (N, D) [m].  q: (N, T, D) [rad] or [m].  starts, ends: (N, T, D) [m].
         """
@@ -85,8 +83,8 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
         p = base[arm]
         for j in range(motion.shape[1]):
             value = q[arm, target, j]
-            p = slid(motion[arm, j], p, value, x, y, z)
-            x, y, z = turned(motion[arm, j], x, y, z, wp.sin(value), wp.cos(value))
+            p = translate(motion[arm, j], p, value, x, y, z)
+            x, y, z = rotate(motion[arm, j], x, y, z, wp.sin(value), wp.cos(value))
             starts[arm, target, j] = p
             along = offset[arm, j]
             p = p + along[0] * x + along[1] * y + along[2] * z
@@ -94,16 +92,16 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
 
     @wp.func
     def to_segment(p: Vector3, a: Vector3, u: Vector3):
-        """The square of a point's distance from the segment from a to a + u."""
+        """Return the squared distance of a point from the segment from a to a + u."""
         t = wp.clamp(wp.dot(p - a, u) / wp.max(wp.dot(u, u), tiny), zero, one)
         return wp.length_sq(p - a - t * u)
 
     @wp.func
     def between_segments(a: Vector3, u: Vector3, b: Vector3, v: Vector3):
-        """The distance of the segment from a to a + u from the one from b to b + v.
+        """Return the distance between the segments from a to a + u and from b to b + v.
 
-        The nearest points are where one of them ends, or where the line across both meets them. By the cross product
-        the latter is well determined for segments that are nearly parallel, too.
+        The nearest points are an end of a segment or the feet of the common perpendicular. The cross product
+        determines the feet well even if the segments are nearly parallel.
         """
         square = wp.min(
             wp.min(to_segment(a, b, v), to_segment(a + u, b, v)),
@@ -118,19 +116,18 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
             square = wp.min(square, wp.length_sq(w + t * v - s * u))
         return wp.sqrt(square)
 
-    @_kernel
-    def part(
+    @kernel
+    def self_clearance(
         motion: wp.array2d(dtype=int),
         starts: wp.array3d(dtype=Vector3),
         ends: wp.array3d(dtype=Vector3),
         radius: wp.array2d(dtype=real),
         clearance: wp.array2d(dtype=real),
     ):
-        """The smallest distance of two links of an arm that are not neighbours; a link of radius 0 is not there.
+        """Compute the smallest distance between links of an arm that are neither neighbours nor rigidly connected.
 
-        Nor do links count that are rigidly connected.
-        motion: (N, D).  starts, ends: (N, T, D) [m].  radius: (N, D) [m].  clearance: (N, T) [m], which only becomes
-        smaller.
+        motion: (N, D).  starts, ends: (N, T, D) [m].  radius: (N, D) [m], 0 for links to ignore.  clearance: (N, T)
+        [m], lowered to the distance.
         """
         arm, target = wp.tid()
         nearest = clearance[arm, target]
@@ -138,32 +135,34 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
             r = radius[arm, i]
             a = starts[arm, target, i]
             u = ends[arm, target, i] - a
-            long = wp.length(u)
+            length = wp.length(u)
             links_between = int(0)  # noqa: RUF046, UP018 (Warp's way to declare what changes in a loop)
-            joints = int(0)  # noqa: RUF046, UP018
+            n_joints = int(0)  # noqa: RUF046, UP018
             between = real(0.0)  # [m] along the arm, from the end of link i to the start of link j
             for j in range(i + 1, radius.shape[1]):
                 b = starts[arm, target, j]
-                between += wp.length(b - ends[arm, target, j - 1])  # the way of a sliding joint
+                between += wp.length(b - ends[arm, target, j - 1])  # displacement of a prismatic joint
                 if motion[arm, j] < wp.static(FIXED):
-                    joints += 1
+                    n_joints += 1
                 v = ends[arm, target, j] - b
-                other_long = wp.length(v)
+                other_length = wp.length(v)
                 radii = r + radius[arm, j]
                 if r > zero and radius[arm, j] > zero:
-                    # Parts of the arm that are nearer to each other along it cannot be apart: they do not count.
-                    spared = half * wp.max(two * radii - between, zero)
-                    if links_between > 0 and joints > 0 and spared <= wp.min(long, other_long):
-                        u_counted = u * (one - spared / wp.max(long, tiny))
-                        v_spared = v * (spared / wp.max(other_long, tiny))
-                        nearest = wp.min(nearest, between_segments(a, u_counted, b + v_spared, v - v_spared) - radii)
+                    # Parts of the arm that are this near along it cannot be farther apart, so they are excluded.
+                    excluded = half * wp.max(two * radii - between, zero)
+                    if links_between > 0 and n_joints > 0 and excluded <= wp.min(length, other_length):
+                        u_counted = u * (one - excluded / wp.max(length, tiny))
+                        v_excluded = v * (excluded / wp.max(other_length, tiny))
+                        nearest = wp.min(
+                            nearest, between_segments(a, u_counted, b + v_excluded, v - v_excluded) - radii
+                        )
                     links_between += 1
-                between += other_long
+                between += other_length
         clearance[arm, target] = nearest
 
     @wp.func
     def signed_distance(shape: int, p: Vector3, size: Vector3):
-        """From an obstacle's surface, in the obstacle's own frame; within it, minus the depth."""
+        """Return the distance from an obstacle's surface, in the obstacle's frame; inside, minus the depth."""
         if shape == wp.static(GROUND):
             return p[2]
         if shape == wp.static(SPHERE):
@@ -179,7 +178,7 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
 
     @wp.func
     def rises(shape: int, p: Vector3, v: Vector3, size: Vector3):
-        """A number above 0 where the signed distance rises from p along v, below 0 where it falls."""
+        """Return a number above 0 if the signed distance rises from p along v, below 0 if it falls."""
         if shape == wp.static(GROUND):
             return v[2]
         if shape == wp.static(SPHERE):
@@ -202,7 +201,7 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
 
     @wp.func
     def along_segment(shape: int, p: Vector3, v: Vector3, size: Vector3):
-        """The least signed distance on the segment from p to p + v: it is convex there, so bisection finds it."""
+        """Return the least signed distance on the segment from p to p + v by bisection: it is convex there."""
         if rises(shape, p, v, size) >= zero:
             return signed_distance(shape, p, size)
         if rises(shape, p + v, v, size) <= zero:
@@ -216,8 +215,8 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
                 high = middle
         return signed_distance(shape, p + half * (low + high) * v, size)
 
-    @_kernel
-    def clear(
+    @kernel
+    def obstacle_clearance(
         starts: wp.array3d(dtype=Vector3),
         ends: wp.array3d(dtype=Vector3),
         radius: wp.array2d(dtype=real),
@@ -227,10 +226,10 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
         size: wp.array(dtype=Vector3),
         clearance: wp.array2d(dtype=real),
     ):
-        """The smallest distance of a link of an arm from an obstacle; a link of radius 0 is not there.
+        """Compute the smallest distance of a link of an arm from an obstacle.
 
-        starts, ends: (N, T, D) [m].  radius: (N, D) [m].  shape, centre, into (a rotation into the obstacle's frame),
-        size (its halves): (O,).  clearance: (N, T) [m], which only becomes smaller.
+        starts, ends: (N, T, D) [m].  radius: (N, D) [m], 0 for links to ignore.  shape, centre, into (rotation into
+        the obstacle's frame), size (half sides or radii): (O,).  clearance: (N, T) [m], lowered to the distance.
         """
         arm, target = wp.tid()
         nearest = clearance[arm, target]
@@ -239,7 +238,7 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
             if r > zero:
                 a = starts[arm, target, j]
                 along = ends[arm, target, j] - a
-                foot = real(0.0)  # the share of the first link where the arm is mounted
+                foot = real(0.0)  # share of the first link that is its foot, where the arm is mounted
                 if j == 0:
                     foot = two * r / wp.max(wp.length(along), tiny)
                 if foot < one:
@@ -248,14 +247,14 @@ def clearance_kernels_of(precision: Precision) -> ClearanceKernels:
                         v = into[o] * along
                         p = base + foot * v
                         v = (one - foot) * v
-                        # No point of the link is nearer than this, as the distance changes by no more than one moves.
+                        # No point of the link is nearer than this: distance changes by no more than the path length.
                         bound = signed_distance(shape[o], p + half * v, size[o]) - half * wp.length(v)
                         if bound - r < nearest:
-                            apart = along_segment(shape[o], p, v, size[o]) - r
-                            stands = j == 0 and signed_distance(shape[o], base, size[o]) <= r
-                            # Of what the arm stands on, the first link is not far: only in it.
-                            if not stands or apart < zero:
-                                nearest = wp.min(nearest, apart)
+                            distance = along_segment(shape[o], p, v, size[o]) - r
+                            mounted = j == 0 and signed_distance(shape[o], base, size[o]) <= r
+                            # The first link is always close to what the arm is mounted on: only overlaps count.
+                            if not mounted or distance < zero:
+                                nearest = wp.min(nearest, distance)
         clearance[arm, target] = nearest
 
-    return ClearanceKernels(real, Vector3, Matrix3, place, part, clear)
+    return ClearanceKernels(real, Vector3, Matrix3, link_axes, self_clearance, obstacle_clearance)

@@ -1,4 +1,4 @@
-"""Where the kernels run: the device that a name stands for, and Warp with one variant loaded on it."""
+"""Devices that the kernels run on, and Warp with the kernels loaded on them."""
 
 import os
 import threading
@@ -14,9 +14,9 @@ Device = Literal["cpu", "cuda"]
 
 
 def resolve_device(name: str, many: bool) -> Device:
-    """The device that "cpu", "cuda" or "auto" stands for; "auto" is CUDA where it is there and the work is `many`.
+    """Return the device for "cpu", "cuda" or "auto", which is CUDA if there is a GPU and `many` designs.
 
-    A GPU and a CPU give different bits, so a run asks once and keeps to the answer.
+    A GPU and a CPU give different bits, so a run resolves its device once.
     """
     if name == "auto":
         return "cuda" if many and _has_cuda() else "cpu"
@@ -24,33 +24,33 @@ def resolve_device(name: str, many: bool) -> Device:
         allowed = ("auto", *get_args(Device))
         raise SettingsError(f'device = "{name}" is not one of {", ".join(allowed)}.{did_you_mean(name, allowed)}')
     if name == "cuda" and not _has_cuda():
-        raise SettingsError('device = "cuda": no NVIDIA GPU with its driver is here; take device = "cpu" or "auto"')
+        raise SettingsError('device = "cuda": no NVIDIA GPU with its driver found; try device = "cpu" or "auto"')
     return cast("Device", name)
 
 
 def usable_device(device: Device) -> Device:
-    """The device, or the CPU where it is not here: a run of another machine can still be read, drawn and verified."""
+    """Return the device, or the CPU if it is missing: runs of another machine can be read, drawn and verified."""
     return "cpu" if device == "cuda" and not _has_cuda() else device
 
 
 def cores() -> int:
-    """The processor cores that this process may use; no more than OMP_NUM_THREADS, where that is set."""
-    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    wished = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
-    return min(there, int(wished)) if wished.isdecimal() and int(wished) > 0 else there
+    """Return the number of processor cores that this process may use, at most OMP_NUM_THREADS if that is set."""
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    limit = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+    return min(available, int(limit)) if limit.isdecimal() and int(limit) > 0 else available
 
 
 _loading = threading.Lock()
 
 
 def load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> tuple[Any, Any]:
-    """Warp and one variant of the kernels, compiled and loaded on a device, so that threads only launch."""
+    """Return Warp and one variant of the kernels, compiled and loaded on a device, so that threads only launch."""
     with _loading:
         return _warp(), _load(precision, lanes, motions, kind, device)
 
 
 def load_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
-    """Warp and one variant of the kernels of clearance, likewise."""
+    """Return Warp and one variant of the clearance kernels."""
     with _loading:
         return _warp(), _load_clearance(precision, device)
 
@@ -65,14 +65,14 @@ def _warp() -> Any:
     import warp as wp
 
     wp.config.log_level = wp.LOG_ERROR
-    with _said_where_it_is_kept(), _silent_stderr():
+    with _report_cache_errors(), _silent_stderr():
         wp.init()
     return wp
 
 
 @cache
 def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> Any:
-    with _said_where_it_is_kept():
+    with _report_cache_errors():
         from armwright.kinematics.pose_kernels import pose_kernels
         from armwright.kinematics.position_kernels import position_kernels
 
@@ -86,35 +86,31 @@ def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, 
 
 @cache
 def _load_clearance(precision: Precision, device: Device) -> Any:
-    with _said_where_it_is_kept():
-        from armwright.kinematics.clearance_kernels import clearance_kernels_of
+    with _report_cache_errors():
+        from armwright.kinematics.clearance_kernels import clearance_kernels
 
-        kernels = clearance_kernels_of(precision)
-        for kernel in (kernels.place, kernels.part, kernels.clear):
+        kernels = clearance_kernels(precision)
+        for kernel in (kernels.link_axes, kernels.self_clearance, kernels.obstacle_clearance):
             kernel.module.load(device)
     return kernels
 
 
 @contextmanager
-def _said_where_it_is_kept() -> Generator[None]:
+def _report_cache_errors() -> Generator[None]:
     try:
         yield
-    except OSError as fault:
-        where = "" if fault.filename is None else f": {fault.filename}"
+    except OSError as error:
+        path = "" if error.filename is None else f": {error.filename}"
         raise FailureError(
-            f"the compiled kernels cannot be kept: {fault.strerror or fault}{where}; "
-            "set WARP_CACHE_PATH to a folder that can be written"
-        ) from fault
+            f"cannot write compiled kernels: {error.strerror or error}{path}; set WARP_CACHE_PATH to a writable folder"
+        ) from error
 
 
 @contextmanager
 def _silent_stderr() -> Generator[None]:
-    """Drops what is written to the process's stderr meanwhile.
-
-    Without an NVIDIA driver Warp's native code says so there, past every setting of its own.
-    """
+    """Drop what the process writes to stderr: Warp reports a missing NVIDIA driver there, whatever its log level."""
     try:
-        kept = os.dup(2)
+        stderr = os.dup(2)
     except OSError:  # stderr is closed: nothing to silence
         yield
         return
@@ -123,6 +119,6 @@ def _silent_stderr() -> Generator[None]:
         os.dup2(sink, 2)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        os.dup2(stderr, 2)
+        os.close(stderr)
         os.close(sink)

@@ -47,13 +47,13 @@ def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
 
 
 def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:
-    """(J + 1, 3) positions of the joints and, last, of the tip [m]; q: (J,) [rad] or [m]."""
+    """Return the (J + 1, 3) positions of the joints and, last, of the tip [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
     return np.vstack([frames.place[0, 0], frames.tip[0]])
 
 
 def link_lines(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
-    """(2, 3) each: start and end of the links, last of the tool [m]; q: (J,) [rad] or [m]."""
+    """Return start and end (2, 3) of each link and, last, of the tool [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
     starts = frames.place[0, 0]  # (J, 3)
     offsets = np.array([link.offset for link in arm.links])
@@ -62,7 +62,7 @@ def link_lines(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
 
 
 def rails(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
-    """(2, 3) each: start and end of the rails of prismatic joints [m]; q: (J,) [rad] or [m]."""
+    """Return start and end (2, 3) of the rail of each prismatic joint [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
     joints = zip(arm.joints, q, frames.place[0, 0], frames.axis[0, 0], strict=True)
     return [

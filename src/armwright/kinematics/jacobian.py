@@ -9,18 +9,18 @@ from armwright.kinematics.forward import Frames, forward_kinematics
 
 
 def jacobians(arms: ArmArrays, q: Array) -> Array:
-    """(N, K, 3, D) derivative of the tip's position by the joints [m/rad] or [m/m]; q: (N, K, D)."""
+    """Return the (N, K, 3, D) derivative of the tip position by the joints [m/rad] or [m/m]; q: (N, K, D)."""
     return jacobian_of(arms, forward_kinematics(arms, q))
 
 
 def jacobian_of(arms: ArmArrays, frames: Frames) -> Array:
-    """(N, K, 3, D) derivative of the tip's position by the joints, from known frames."""
+    """Return the (N, K, 3, D) derivative of the tip position by the joints, from known frames."""
     turning = np.cross(frames.axis, frames.tip[:, :, None] - frames.place)
     return np.where(_translates(arms), frames.axis, turning).swapaxes(-1, -2)
 
 
 def jacobian_rate(arms: ArmArrays, frames: Frames, velocity: Array) -> Array:
-    """(N, K, 3, D) rate of the Jacobian while the joints move at `velocity` (N, K, D)."""
+    """Return the (N, K, 3, D) rate of the Jacobian while the joints move at `velocity` (N, K, D)."""
     translates = _translates(arms)
     along = frames.axis * velocity[..., None]
     turning = np.cumsum(np.where(translates, 0.0, along), axis=2)  # (N, K, D, 3) angular velocity of each link
@@ -37,5 +37,5 @@ def jacobian_rate(arms: ArmArrays, frames: Frames, velocity: Array) -> Array:
 
 
 def _translates(arms: ArmArrays) -> NDArray[np.bool_]:
-    """(N, 1, D, 1) True for joints that do not rotate; the axes of fixed ones are 0."""
+    """Return (N, 1, D, 1) True for joints that do not rotate; the axes of fixed joints are 0."""
     return (arms.motion >= PRISMATIC)[:, None, :, None]

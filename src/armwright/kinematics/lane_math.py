@@ -1,4 +1,4 @@
-"""Functions that all kernels of inverse kinematics are made of, in Warp.
+"""Warp functions that all kernels of inverse kinematics share.
 
 `lane_math` makes variants: in single or double precision, and with some lanes or one. A lane is one target of an arm.
 What differs between lanes is arithmetic, never a branch: a condition is a mask of zeros and ones. The joints of an arm
@@ -136,7 +136,7 @@ def lane_math(precision: Precision, lanes: int, motions: Motions) -> LaneMath:
 
     @wp.func
     def rotate_any(motion: int, x: Lane, y: Lane, z: Lane, s: Lane, c: Lane):
-        """Likewise for prismatic and fixed joints, too; the axis of a fixed joint is arbitrary."""
+        """Return the same for all joints; the axis of a fixed joint is arbitrary."""
         if motion < PRISMATIC:
             return rotate_revolute(motion, x, y, z, s, c)
         if motion == PRISMATIC:
@@ -171,7 +171,7 @@ def lane_math(precision: Precision, lanes: int, motions: Motions) -> LaneMath:
 
     @wp.func
     def margin_revolute(motion: int):
-        """Return the distance from a limit within which the limit gradient H grows no more."""
+        """Return the distance from a limit within which the limit gradient H is constant."""
         return angle_margin
 
     @wp.func

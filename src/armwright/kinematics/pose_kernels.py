@@ -1,8 +1,8 @@
-"""The kernels for targets that say which way the tool points, too: of an axis, or of its whole orientation.
+"""Warp kernels for targets with an axis or an orientation of the tool.
 
-A thread's targets may be of all kinds side by side. The system has six rows: three of the position, then the angles
-still to be turned about the tool's own x, y and z. A row that a target does not ask for is zero in J and one on the
-diagonal, so it neither moves a joint nor changes a determinant. All else is as in position_kernels.py.
+The targets of a thread may be of all kinds. The system has six rows: three for the position, then the remaining
+rotation about the tool's own x, y and z. A row that a target does not need is zero in J and one on the diagonal, so it
+neither moves a joint nor changes a determinant. The rest is as in position_kernels.py, with the same sources.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -28,8 +28,8 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
     dot, angular, error_rotation = pose.dot, pose.angular, pose.error_rotation
     factor_6x6, solve_6x6 = pose.factor_6x6, pose.solve_6x6
 
-    zero, one, largest = real(0.0), real(1.0), real(1e30)
-    longest_step = real(0.1)  # [m] of the error that one update tries to close
+    zero, one, infinity = real(0.0), real(1.0), real(1e30)
+    max_step = real(0.1)  # [m] of the error that one update tries to close
 
     @kernel
     def solve_ik(
@@ -45,16 +45,16 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
         """Inverse kinematics of an arm at a group of targets.
 
         tool_axis, tool_side: (N,) the tool's z and x in the last local frame, unit vectors at right angles.
-        targets: (G, 16): the point [m], the payload [kg], which is not read, the x, y and z that the tool should have,
-        1 where its z counts, 1 where its x does, too, and what a radian off counts as [m].
-        q_last, h_last, q_kept: as of the kernel for points; kept are the angles with the least of
-        distance² + (angle off, counted in m)².
+        targets: (G, 16): the point [m], the payload [kg], which is not read, the x, y and z of the tool at the target,
+        1 if its z counts, 1 if its x counts too, and the metres that a radian of angle error counts as.
+        q_last, h_last, q_kept: as in the kernel for points; kept are the angles with the least
+        distance² + (angle error in metres)².
         """
         arm, group = wp.tid()
         base = arms.base[arm]
         axis, side = tool_axis[arm], tool_side[arm]
-        asks, whole, trade = targets[group, 13], targets[group, 14], targets[group, 15]
-        no_xy, no_z = Wide(Lane(one) - asks), Wide(Lane(one) - whole)
+        has_axis, has_frame, metres_per_radian = targets[group, 13], targets[group, 14], targets[group, 15]
+        no_xy, no_z = Wide(Lane(one) - has_axis), Wide(Lane(one) - has_frame)
         q, kept = Joints(), Joints()
         limit_n, limit_d = Joints(), Joints()  # H of the update before, n / d: fractions compare without division
         ux, uy, uz = Joints(), Joints(), Joints()  # joint axes, then the position's columns of J
@@ -65,7 +65,7 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
             kept[j] = q[j]
             limit_n[j] = h_last[arm, group, j]
             limit_d[j] = Lane(one)
-        nearest = Lane(largest)
+        nearest = Lane(infinity)
         for _ in range(updates):
             # Forward kinematics. xx, xy, xz: the local x axis in the world, and so on.
             xx, xy, xz = Lane(one), Lane(zero), Lane(zero)
@@ -83,7 +83,7 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
                 uz[j] = az
                 vz[j] = oz
 
-            sx, sy, sz, tx, ty, tz, fx, fy, fz, angle, turn_x, turn_y, turn_z = error_rotation(
+            sx, sy, sz, tx, ty, tz, fx, fy, fz, angle, rotation_x, rotation_y, rotation_z = error_rotation(
                 axis, side, group, targets, xx, xy, xz, yx, yy, yz, zx, zy, zz
             )
 
@@ -92,7 +92,7 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
             ey = targets[group, 1] - py
             ez = targets[group, 2] - pz
             square = norm_squared(ex, ey, ez)
-            off = wp.cw_mul(trade, angle)
+            off = wp.cw_mul(metres_per_radian, angle)
             far = square + wp.cw_mul(off, off)
             nearer = Lane(one) - at_least(far, nearest)
             nearest = wp.min(nearest, far)
@@ -101,13 +101,13 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
 
             # dx, shortened; J Jᵀ as a.., J W Jᵀ as b..; the pull y is taken out of dx, because
             # J# dx + (I - J# J) y = y + J# (dx - J y).
-            shorten = wp.cw_div(Lane(longest_step), wp.max(roots(square), Lane(longest_step)))
+            shorten = wp.cw_div(Lane(max_step), wp.max(roots(square), Lane(max_step)))
             d1 = wp.cw_mul(ex, shorten)
             d2 = wp.cw_mul(ey, shorten)
             d3 = wp.cw_mul(ez, shorten)
-            d4 = wp.cw_mul(asks, turn_x)
-            d5 = wp.cw_mul(asks, turn_y)
-            d6 = wp.cw_mul(whole, turn_z)
+            d4 = wp.cw_mul(has_axis, rotation_x)
+            d5 = wp.cw_mul(has_axis, rotation_y)
+            d6 = wp.cw_mul(has_frame, rotation_z)
             a11 = Wide()
             a21, a22 = Wide(), Wide()
             a31, a32, a33 = Wide(), Wide(), Wide()
@@ -133,9 +133,9 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
                 jx = column(motion, ax, ay, az, ry, rz)
                 jy = column(motion, ay, az, ax, rz, rx)
                 jz = column(motion, az, ax, ay, rx, ry)
-                gx = wp.cw_mul(asks, angular(motion, dot(sx, sy, sz, ax, ay, az)))
-                gy = wp.cw_mul(asks, angular(motion, dot(tx, ty, tz, ax, ay, az)))
-                gz = wp.cw_mul(whole, angular(motion, dot(fx, fy, fz, ax, ay, az)))
+                gx = wp.cw_mul(has_axis, angular(motion, dot(sx, sy, sz, ax, ay, az)))
+                gy = wp.cw_mul(has_axis, angular(motion, dot(tx, ty, tz, ax, ay, az)))
+                gz = wp.cw_mul(has_frame, angular(motion, dot(fx, fy, fz, ax, ay, az)))
                 d1 -= wp.cw_mul(jx, y)
                 d2 -= wp.cw_mul(jy, y)
                 d3 -= wp.cw_mul(jz, y)
@@ -237,7 +237,7 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
             q_kept[arm, group, j] = kept[j]
 
     @wp.func
-    def off_target(
+    def pose_error(
         arms: Arms,
         axis: Vector3,
         side: Vector3,
@@ -246,7 +246,7 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
         targets: wp.array2d(dtype=Lane),
         q: wp.array3d(dtype=Lane),
     ):
-        """Return distance² + (angle off, counted in m)² at angles q (N, G, D), and that angle [rad]."""
+        """Return distance² + (angle error in metres)² at angles q (N, G, D), and the angle error [rad]."""
         base = arms.base[arm]
         xx, xy, xz = Lane(one), Lane(zero), Lane(zero)
         yx, yy, yz = Lane(zero), Lane(one), Lane(zero)
@@ -272,19 +272,19 @@ def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
         targets: wp.array2d(dtype=Lane),
         q_last: wp.array3d(dtype=Lane),
         q_kept: wp.array3d(dtype=Lane),
-        turned_off: wp.array3d(dtype=Lane),
+        angle_error: wp.array3d(dtype=Lane),
     ):
-        """Keeps the last posture where it is nearer, and says by which angle the tool is off.
+        """Keep the last posture if it is nearer, and return the angle error of the tool.
 
-        turned_off: (N, G, 1) [rad]; 0 for a point.
+        angle_error: (N, G, 1) [rad]; 0 for a point.
         """
         arm, group = wp.tid()
         axis, side = tool_axis[arm], tool_side[arm]
-        last, last_angle = off_target(arms, axis, side, arm, group, targets, q_last)
-        kept, kept_angle = off_target(arms, axis, side, arm, group, targets, q_kept)
-        farther = at_least(last, kept)
-        turned_off[arm, group, 0] = select(farther, kept_angle, last_angle)
+        last, last_angle = pose_error(arms, axis, side, arm, group, targets, q_last)
+        kept, kept_angle = pose_error(arms, axis, side, arm, group, targets, q_kept)
+        is_kept = at_least(last, kept)
+        angle_error[arm, group, 0] = select(is_kept, kept_angle, last_angle)
         for j in range(arms.dof):
-            q_kept[arm, group, j] = select(farther, q_kept[arm, group, j], q_last[arm, group, j])
+            q_kept[arm, group, j] = select(is_kept, q_kept[arm, group, j], q_last[arm, group, j])
 
     return replace(position_kernels(precision, lanes, motions), solve_ik=solve_ik, keep_pose=keep_pose)

@@ -1,4 +1,4 @@
-"""Functions for targets with an axis or an orientation: rotations between frames and the 6 x 6 system, in Warp."""
+"""Warp functions for targets with an axis or an orientation: rotations between frames and the 6 x 6 system."""
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
@@ -26,20 +26,20 @@ class PoseMath:
 
 @cache
 def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
-    """Return the variant of the functions, beside that of `lane_math`."""
+    """Return the functions for a precision, a number of lanes and joint motions, as in `lane_math`."""
     base = lane_math(precision, lanes, motions)
     real, Vector3, Lane, Wide = base.real, base.Vector3, base.Lane, base.Wide
     roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
-    longest_turn = real(0.5)  # [rad] of the error that one update tries to close
+    max_rotation = real(0.5)  # [rad] of the error that one update tries to close
     least_length, nothing = real(1e-30), real(1e-12)
     quarter = real(math.pi / 2)
     ones, least = Wide(wp.float64(1.0)), Wide(wp.float64(1e-18))
 
     @wp.func
     def library_arctangent(y: Lane, x: Lane):
-        """The angle of (x, y), both at least 0 and not both 0, to the last bits."""
+        """Return the angle of (x, y), both at least 0 and not both 0, to the last bits."""
         angle = Lane()
         for i in range(lanes):
             angle[i] = wp.atan2(y[i], x[i])
@@ -47,7 +47,7 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
 
     @wp.func
     def polynomial_arctangent(y: Lane, x: Lane):
-        """The same to 2e-7: a polynomial in t² for atan(t) / t, 0 <= t <= 1, that interpolates at Chebyshev's nodes."""
+        """Return that angle to 2e-7: a polynomial in t² interpolates atan(t) / t at Chebyshev's nodes of [0, 1]."""
         t = wp.cw_div(wp.min(y, x), wp.max(y, x))
         u = wp.cw_mul(t, t)
         a = 2.766283501e-03 * u - Lane(1.573124912e-02)
@@ -78,7 +78,7 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
 
     @wp.func
     def along(a: Vector3, x: Lane, y: Lane, z: Lane):
-        """One world component of a vector that is fixed in a frame with these components of its axes."""
+        """Return a world component of a vector that is fixed in a frame with these components of its axes."""
         return a[0] * x + a[1] * y + a[2] * z
 
     @wp.func
@@ -96,16 +96,16 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         zx: Lane,
         zy: Lane,
         zz: Lane,
-        asks: Lane,
-        whole: Lane,
+        has_axis: Lane,
+        has_frame: Lane,
     ):
-        """How far the tool is turned from a target [rad], and the way there about its own x, y, z, shortened.
+        """Return the angle between tool and target [rad], and the shortened rotation vector about the tool's x, y, z.
 
-        xx to zz: the target's axes x, y, z seen from the tool, component by component (xy: of the target's y along the
-        tool's x). asks: 1 where a target asks for an angle, whole: 1 where for its whole orientation, not an axis.
+        xx to zz: the target's axes x, y, z in the frame of the tool, by component (xy: of the target's y along the
+        tool's x). has_axis: 1 for targets with an axis or orientation, has_frame: 1 for those with an orientation.
 
-        By way of a quaternion, which needs no division where the way is half a turn. Of such a turn the way is not
-        determined: for an axis it is about the tool's own y.
+        A quaternion needs no division at half a turn. The axis of half a turn is arbitrary: to reach an axis, the
+        rotation is about the tool's own y.
         """
         # 4 q qᵀ of the rotation with these entries: the row with the largest diagonal is q, times a number above 0.
         w, x, y, z = Lane(one) + xx + yy + zz, zy - yz, xz - zx, yx - xy
@@ -129,17 +129,17 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         )  # fmt: skip
         side = two * at_least(w, Lane(zero)) - Lane(one)  # q and -q are one rotation: the one by half a turn at most
 
-        # The shortest turn from the tool's z to the target's.
-        w = select(whole, wp.cw_mul(side, w), wp.max(Lane(one) + zz, Lane(zero)))
-        x = select(whole, wp.cw_mul(side, x), -yz)
-        y = select(whole, wp.cw_mul(side, y), xz)
-        z = wp.cw_mul(whole, wp.cw_mul(side, z))
+        # The shortest rotation from the tool's z to the target's.
+        w = select(has_frame, wp.cw_mul(side, w), wp.max(Lane(one) + zz, Lane(zero)))
+        x = select(has_frame, wp.cw_mul(side, x), -yz)
+        y = select(has_frame, wp.cw_mul(side, y), xz)
+        z = wp.cw_mul(has_frame, wp.cw_mul(side, z))
         opposite = at_least(Lane(nothing), w + wp.abs(x) + wp.abs(y) + wp.abs(z))
         y += opposite
 
         length = roots(norm_squared(x, y, z))
-        angle = wp.cw_mul(asks, two * arctangent(length, w))
-        share = wp.cw_div(wp.min(angle, Lane(longest_turn)), wp.max(length, Lane(least_length)))
+        angle = wp.cw_mul(has_axis, two * arctangent(length, w))
+        share = wp.cw_div(wp.min(angle, Lane(max_rotation)), wp.max(length, Lane(least_length)))
         return angle, wp.cw_mul(share, x), wp.cw_mul(share, y), wp.cw_mul(share, z)
 
     @wp.func
@@ -147,9 +147,9 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         axis: Vector3, side: Vector3, group: int, targets: wp.array2d(dtype=Lane),
         xx: Lane, xy: Lane, xz: Lane, yx: Lane, yy: Lane, yz: Lane, zx: Lane, zy: Lane, zz: Lane,
     ):  # fmt: skip
-        """Return the tool's own axes in the world, how far they are off a target [rad], and the rotation to it.
+        """Return the axes of the tool in the world, its angle error [rad], and the rotation to the target.
 
-        xx to zz: the last local frame, as of `advance`.
+        xx to zz: the last local frame, as in `advance`.
         """
         third = wp.cross(axis, side)
         sx, sy, sz = along(side, xx, yx, zx), along(side, xy, yy, zy), along(side, xz, yz, zz)
@@ -179,7 +179,7 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         a51: Wide, a52: Wide, a53: Wide, a54: Wide, a55: Wide,
         a61: Wide, a62: Wide, a63: Wide, a64: Wide, a65: Wide, a66: Wide,
     ):  # fmt: skip
-        """A symmetric 6 x 6 matrix, by its lower triangle, as L D Lᵀ: L below its diagonal, then D."""
+        """Factor a symmetric 6 x 6 matrix, given by its lower triangle, as L D Lᵀ: L below its diagonal, then D."""
         d1 = wp.max(a11, least)
         i1 = wp.cw_div(ones, d1)
         l21 = wp.cw_mul(a21, i1)
@@ -260,7 +260,7 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         d1: Wide, d2: Wide, d3: Wide, d4: Wide, d5: Wide, d6: Wide,
         x1: Wide, x2: Wide, x3: Wide, x4: Wide, x5: Wide, x6: Wide,
     ):  # fmt: skip
-        """The solution of that system."""
+        """Solve the factored system."""
         x2 -= wp.cw_mul(l21, x1)
         x3 -= wp.cw_mul(l31, x1)
         x3 -= wp.cw_mul(l32, x2)

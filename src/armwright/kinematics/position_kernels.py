@@ -1,12 +1,30 @@
-"""The kernels for targets that are points: inverse kinematics and static torque, in Warp.
+"""Warp kernels for targets that are points: inverse kinematics and static torque.
 
-Each thread solves one arm for as many targets as there are lanes, one in each lane of a vector, so that a CPU's vector
-instructions do the work of eight; a GPU has its own threads for that, and takes one lane.
+Each thread solves one arm for as many targets as there are lanes, one in each lane of a vector, so the vector
+instructions of a CPU solve eight targets at a time. A GPU has its own threads for that and uses one lane.
 
-The equations are those of docs/method.md; the inverse kinematics is the solver of Chan & Dubey (1995) and
-Sugiura et al. (2007). Angles, positions and torques are of the variant's precision. The 3 x 3 system is float64 in
-every variant: its matrix squares the condition of the Jacobian, and weights near the joint limits (down to 2.5e-4 at
-±2.4 rad) make it worse still.
+docs/method.md §2 states the equations. Their sources, by symbol:
+
+    e, clip     shortened error, joint limits                         jskeus and scikit-robot
+    J           position Jacobian, column u x r of a revolute joint   Whitney 1969
+    m           manipulability sqrt(det J Jᵀ)                         Yoshikawa 1985
+    k           damping near singularities                            Nakamura & Hanafusa 1986
+    H           gradient of the joint-limit criterion                 Chan & Dubey 1995, after Zghal et al. 1990
+    w           weights 1 / (1 + H) of joints that near a limit       Chan & Dubey 1995
+    J#          damped weighted least-norm inverse                    Chan & Dubey 1995
+    y           null-space pull to mid-range                          Liégeois 1977, as in Sugiura et al. 2007
+
+T. F. Chan, R. V. Dubey: A weighted least-norm solution based scheme for avoiding joint limits for redundant joint
+manipulators, IEEE Trans. Robotics and Automation 11(2), 286-292, 1995. A. Liégeois: Automatic supervisory control of
+the configuration and behavior of multibody mechanisms, IEEE Trans. SMC 7(12), 1977. Y. Nakamura, H. Hanafusa: Inverse
+kinematic solutions with singularity robustness for robot manipulator control, ASME J. DSMC 108(3), 1986. H. Sugiura et
+al.: Real-time self collision avoidance for humanoids by means of nullspace criteria and task intervals, Humanoids 2007.
+D. E. Whitney: Resolved motion rate control of manipulators and human prostheses, IEEE Trans. MMS 10(2), 1969.
+T. Yoshikawa: Manipulability of robotic mechanisms, Int. J. Robotics Research 4(2), 1985. H. Zghal, R. V. Dubey,
+J. A. Euler: Efficient gradient projection optimization for manipulators with multiple degrees of redundancy, ICRA 1990.
+
+Angles, positions and torques have the precision of the variant. The 3 x 3 system is float64 in every variant: its
+matrix squares the condition of the Jacobian, and weights near the joint limits (down to 2.5e-4 at ±2.4 rad) add to it.
 """
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
@@ -24,30 +42,30 @@ from armwright.robot.arm import GRAVITY
 
 @dataclass(frozen=True)
 class Kernels:
-    """One variant of the kernels. Each compiles when it is first loaded, and is kept on disk."""
+    """One variant of the kernels. Each compiles when it is first loaded, and is cached on disk."""
 
-    Lane: Any  # the vector of a number for each lane
+    Lane: Any  # a vector of one number per lane
     Arms: Any  # `ArmArrays` on the device, a Warp struct
-    solve_ik: Any  # the inverse kinematics
-    static_torque: Any  # the posture kept, its tip and its torque
-    keep_pose: Any = None  # before `static_torque`, for pose targets: the posture kept, its angle off
+    solve_ik: Any
+    static_torque: Any  # best posture, its tip and its torque
+    keep_pose: Any = None  # for pose targets, before `static_torque`: best posture, its angle error
 
 
 @cache
 def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
-    """Return the kernels that solve `lanes` targets a thread in this precision, for arms whose joints move so.
+    """Return the kernels that solve `lanes` targets per thread in this precision, for arms with these joint motions.
 
-    One long function on purpose: what Warp compiles takes its types and constants from the function around it.
-    T targets stand in G groups: target g x lanes + i in lane i of group g, and the last one fills up its group.
+    One long function on purpose: code that Warp compiles takes its types and constants from the enclosing function.
+    T targets form G groups: target g x lanes + i is in lane i of group g; the last target fills its group.
     """
     base = lane_math(precision, lanes, motions)
     real, Lane, Wide, Joints, Arms = base.real, base.Lane, base.Wide, base.Joints, base.Arms
     roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
     advance, column, limit, damping = base.advance, base.column, base.limit, base.damping
 
-    zero, one, gravity, largest = real(0.0), real(1.0), real(GRAVITY), real(1e30)
+    zero, one, gravity, infinity = real(0.0), real(1.0), real(GRAVITY), real(1e30)
     one_wide = wp.float64(1.0)
-    longest_step = real(0.1)  # [m] of the error that one update tries to close
+    max_step = real(0.1)  # [m] of the error that one update tries to close
 
     @wp.func
     def determinant(xx: Wide, xy: Wide, xz: Wide, yy: Wide, yz: Wide, zz: Wide):
@@ -85,11 +103,11 @@ def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kern
         """Inverse kinematics of an arm at a group of targets.
 
         targets: (G, 4) [m], last the payload [kg], which is not read.
-        q_last: (N, G, D), the start's angles, then those after the last update [rad].
+        q_last: (N, G, D), the initial angles, then those after the last update [rad].
         h_last: (N, G, D), the limit gradients H before the first, then of the last update.
         q_kept: (N, G, D), the angles nearest to the target of all but the last.
 
-        One long function on purpose: the arrays over joints live in its registers and stack, and handing them to
+        One long function on purpose: the arrays over joints live in its registers and stack; passing them to
         functions copies them, which made a prototype three times slower.
         """
         arm, group = wp.tid()
@@ -104,7 +122,7 @@ def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kern
             kept[j] = q[j]
             limit_n[j] = h_last[arm, group, j]
             limit_d[j] = Lane(one)
-        nearest = Lane(largest)
+        nearest = Lane(infinity)
         for _ in range(updates):
             # Forward kinematics. xx, xy, xz: the local x axis in the world, and so on.
             xx, xy, xz = Lane(one), Lane(zero), Lane(zero)
@@ -134,7 +152,7 @@ def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kern
 
             # dx, shortened; J Jᵀ as a.., J W Jᵀ as b..; the pull y is taken out of dx, because
             # J# dx + (I - J# J) y = y + J# (dx - J y).
-            shorten = wp.cw_div(Lane(longest_step), wp.max(roots(square), Lane(longest_step)))
+            shorten = wp.cw_div(Lane(max_step), wp.max(roots(square), Lane(max_step)))
             dx = wp.cw_mul(ex, shorten)
             dy = wp.cw_mul(ey, shorten)
             dz = wp.cw_mul(ez, shorten)
@@ -224,7 +242,7 @@ def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kern
         reached: wp.array3d(dtype=Lane),
         torque: wp.array3d(dtype=Lane),
     ):
-        """Keeps the last posture where it is nearer, and says where the tip is and what holds it against gravity.
+        """Keep the last posture if it is nearer, and compute its tip position and its torque against gravity.
 
         targets: (G, 4) [m], last the payload at the tip [kg].  q_last, q_kept: (N, G, D) [rad] or [m].
         reached: (N, G, 3) [m].
@@ -234,10 +252,10 @@ def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kern
         tx, ty, tz = targets[group, 0], targets[group, 1], targets[group, 2]
         lx, ly, lz = tip(arms, arm, group, q_last)
         kx, ky, kz = tip(arms, arm, group, q_kept)
-        farther = at_least(norm_squared(tx - lx, ty - ly, tz - lz), norm_squared(tx - kx, ty - ky, tz - kz))
-        reached[arm, group, 0] = select(farther, kx, lx)
-        reached[arm, group, 1] = select(farther, ky, ly)
-        reached[arm, group, 2] = select(farther, kz, lz)
+        is_kept = at_least(norm_squared(tx - lx, ty - ly, tz - lz), norm_squared(tx - kx, ty - ky, tz - kz))
+        reached[arm, group, 0] = select(is_kept, kx, lx)
+        reached[arm, group, 1] = select(is_kept, ky, ly)
+        reached[arm, group, 2] = select(is_kept, kz, lz)
 
         base = arms.base[arm]
         ux, uy, uz = Joints(), Joints(), Joints()  # joint axes
@@ -248,7 +266,7 @@ def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kern
         zx, zy, zz = Lane(zero), Lane(zero), Lane(one)
         px, py, pz = Lane(base[0]), Lane(base[1]), Lane(base[2])
         for j in range(arms.dof):
-            q = select(farther, q_kept[arm, group, j], q_last[arm, group, j])
+            q = select(is_kept, q_kept[arm, group, j], q_last[arm, group, j])
             q_kept[arm, group, j] = q
             xx, xy, xz, yx, yy, yz, zx, zy, zz, ax, ay, az, ox, oy, _oz, px, py, pz = advance(
                 arms.motion[arm, j], arms.offset[arm, j], q, xx, xy, xz, yx, yy, yz, zx, zy, zz, px, py, pz

@@ -12,7 +12,7 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.devices import Device
-from armwright.kinematics.dynamics import Drives, driven
+from armwright.kinematics.dynamics import Drives, drives_along
 from armwright.kinematics.ik import Postures, solve_postures
 from armwright.kinematics.jacobian import jacobians
 from armwright.kinematics.paths import Paths, follow
@@ -82,7 +82,7 @@ class Evaluation:
                 "dynamic_torque, dynamic_utilisation and speed_utilisation need the duration of the task's moves: "
                 "move_time: 1.5 [s], or one for each move"
             )
-        return driven(self.arms, paths)
+        return drives_along(self.arms, paths)
 
     def worst_drives(self, measure: Callable[[Array, Array], Array]) -> Array:
         """(N, T) a measure of what actuators do, the largest along the moves that end at a target; 0 where none does.
@@ -238,7 +238,7 @@ def _postures(
     return solve_postures(
         arrays,
         targets,
-        start=start,
+        initial_q=start,
         payload=loads,
         target_arrays=target_arrays,
         precision=arrays.precision,

@@ -1,0 +1,51 @@
+"""Chunks of arms: by threads on the CPU, one after another on a GPU."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+from armwright.exceptions import FailureError
+from armwright.kinematics.devices import Device, cores
+
+
+def in_chunks(solve: Callable[[slice], None], n: int, size: int, device: Device) -> None:
+    """Solve n arms in chunks of `size`."""
+    if device == "cuda":
+        _one_after_another(solve, n, size)
+        return
+    chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
+    if len(chunks) == 1:
+        solve(chunks[0])
+    else:
+        for running in [_pool().submit(solve, chunk) for chunk in chunks]:
+            running.result()
+
+
+def _one_after_another(solve: Callable[[slice], None], n: int, size: int) -> None:
+    """Halve the chunks until they fit into the memory of the GPU."""
+    first = 0
+    while first < n:
+        size = min(size, n - first)
+        try:
+            solve(slice(first, first + size))
+        except RuntimeError as error:
+            if "out of memory" not in str(error) and "Failed to allocate" not in str(error):
+                raise
+            if size == 1:
+                raise FailureError(
+                    "one arm at all its targets does not fit into the GPU's memory; "
+                    'free some of it, solve fewer targets at a time, or use device = "cpu"'
+                ) from error
+            size //= 2
+        else:
+            first += size
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(cores(), thread_name_prefix="armwright-kernels")
+
+
+if hasattr(os, "register_at_fork"):  # a forked child has the pool's object, but not its threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
