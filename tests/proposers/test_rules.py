@@ -12,7 +12,7 @@ from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal
 from armwright.proposers.rule_geometry import affordable_length, needed_length, shoulder, stretched_torque
-from armwright.proposers.rule_structures import OPENING, divided, fitted, worded
+from armwright.proposers.rule_structures import OPENING, adapted_joints, divided, fitted
 from armwright.proposers.rules import EXPECTED, RULES, RulesProposer, members_inside
 from armwright.runs.history import RANDOM, History
 from armwright.runs.trial import FinishedTrial
@@ -174,8 +174,8 @@ def test_the_affordable_length_spends_the_budget(mass: Any) -> None:
 def test_structures_fit_any_number_of_joints(n: int) -> None:
     assert len(divided(OPENING[0].links, n)) == n
     assert sum(divided(OPENING[0].links, n)) == pytest.approx(sum(OPENING[0].links))
-    assert set(worded(OPENING[0].joints, DesignSpace(joints=n, joint_types=("Y",)))) == {"Y"}
-    assert len(worded(OPENING[0].joints, paper_space(n))) == n
+    assert set(adapted_joints(OPENING[0].joints, DesignSpace(joints=n, joint_types=("Y",)))) == {"Y"}
+    assert len(adapted_joints(OPENING[0].joints, paper_space(n))) == n
 
 
 def test_the_first_proposal_beats_the_median_random_design() -> None:

@@ -1,4 +1,4 @@
-"""Arm structures that a designer would try first, and how one is fitted to a task and a space."""
+"""Arm structures that a designer would try first, and their fit to a task and a space."""
 
 from dataclasses import dataclass
 
@@ -10,20 +10,24 @@ from armwright.proposers.rule_geometry import affordable_length, needed_length, 
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 
-LONGEST = 10.0  # [m] times the farthest target; stands for "torque sets no bound"
-SLACK = 0.03  # [m] beyond the needed length
-OTHER_WAY = str.maketrans("RP", "PR")
+LONGEST = 10.0  # times the needed length; a bound in place of the torque budget
+SLACK = 0.03  # length [m] beyond the needed length
+SWAPPED_AXES = str.maketrans("RP", "PR")
 
 
 @dataclass(frozen=True)
 class Structure:
-    """A kind of arm, without its size and place.
+    """A type of arm without its size and position.
 
-    joints: written for targets that spread more along x than along y; R and P change places otherwise.
-    links, offset: link lengths, and the base's place seen from the shoulder's, in reaches. A base below lets
-        the arm, which starts standing up, bring its middle to the targets; a sideways offset of a few
-        hundredths keeps targets off the line of the straight start, where they cannot be approached.
-    share: the reach, in lengths that the torque's budget affords.
+    Attributes:
+        name: for the reason of a proposal.
+        joints: for targets that spread more along x than along y; R and P are exchanged otherwise.
+        links: link lengths, relative to the reach.
+        offset: base relative to the shoulder, in reaches. A base below lets the arm, which starts upright, bring its
+            middle to the targets; a small sideways offset keeps targets off the line of the straight arm, along which
+            they cannot be approached.
+        share: reach, relative to the length that the torque budget allows.
+        why: for the reason of a proposal.
     """
 
     name: str
@@ -74,54 +78,57 @@ OPENING = (
 
 
 def fitted(structure: Structure, problem: Problem, torque: float) -> Design:
-    """The structure sized and placed for the problem's targets, within its space.
+    """Size and place a structure for the problem's targets, within its space.
 
-    torque: the α-scaled budget; inf where there is none.
+    Args:
+        structure: type of arm.
+        problem: gives targets and space.
+        torque: α-scaled budget; inf for none.
     """
     space, points = problem.space, problem.task.target_positions
     reach = sized(structure.share, problem, torque)
     joints, offset = structure.joints, np.array(structure.offset)
     if across(points):
-        joints, offset = joints.translate(OTHER_WAY), offset[[1, 0, 2]]
+        joints, offset = joints.translate(SWAPPED_AXES), offset[[1, 0, 2]]
     origin = shoulder(points, reach) + reach * offset
-    return space.clipped(origin, worded(joints, space), reach * np.array(divided(structure.links, space.max_joints)))
+    return space.clipped(
+        origin, adapted_joints(joints, space), reach * np.array(divided(structure.links, space.max_joints))
+    )
 
 
 def sized(share: float, problem: Problem, torque: float) -> float:
-    """The reach [m]: this share of what the torque affords, but little more than what the targets need."""
+    """Return a share of the reach [m] that the torque allows, limited to little more than the targets need."""
     points = problem.task.target_positions
-    need = needed_length(points)
-    afforded = share * affordable_length(problem.space, len(points), torque, LONGEST * (need + SLACK))
-    return min(afforded, (0.6 + 0.5 * share) * need + SLACK)
+    needed = needed_length(points)
+    affordable = share * affordable_length(problem.space, len(points), torque, LONGEST * (needed + SLACK))
+    return min(affordable, (0.6 + 0.5 * share) * needed + SLACK)
 
 
 def across(points: Array) -> bool:
-    """Whether the targets spread more along y than along x.
+    """Return whether the targets spread more along y than along x.
 
-    The first joint then should turn about y: its axis lies along the spread, and gravity on the arm stretched
-    along its own axis has no torque about it.
+    If so, the first joint should turn about y: gravity on an arm stretched along that axis has no torque about it.
     """
     spread = points.std(axis=0)
     return bool(spread[0] < spread[1])
 
 
-def worded(joints: str, space: DesignSpace) -> str:
-    """The joint word for this space: cut or continued to its number of joints, of the types that it allows."""
-    word = joints
-    while len(word) < space.max_joints:
-        word += word[-2:].translate(OTHER_WAY)
-    return "".join(_allowed(kind, space) for kind in word[: space.max_joints])
+def adapted_joints(joints: str, space: DesignSpace) -> str:
+    """Adapt joint types to a space: shorten or continue them to its number of joints, of the allowed types."""
+    while len(joints) < space.max_joints:
+        joints += joints[-2:].translate(SWAPPED_AXES)
+    return "".join(_allowed(kind, space) for kind in joints[: space.max_joints])
 
 
 def _allowed(kind: str, space: DesignSpace) -> str:
-    for choice in (kind, kind.translate(OTHER_WAY)):
+    for choice in (kind, kind.translate(SWAPPED_AXES)):
         if choice in space.joint_types:
             return choice
     return space.joint_types[-1]
 
 
 def divided(links: tuple[float, ...], n: int) -> list[float]:
-    """The same total in `n` links: the last ones joined, or the longest halved."""
+    """Divide the total length into `n` links by joining the last or halving the longest."""
     parts = list(links)
     while len(parts) > n:
         parts[-2:] = [parts[-2] + parts[-1]]

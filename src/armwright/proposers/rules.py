@@ -1,8 +1,8 @@
-"""The rules proposer: a designer's knowledge without a model.
+"""Rules that propose arms, without a model.
 
-First the structures that a designer would try, sized and placed by geometry alone; then the feedback of
-finished trials: the widest gap of the front is filled, a joint that hardly moves gets another axis, the
-link that weighs most on the joints is shortened.
+They begin with the structures that a designer would try, sized and placed by geometry. Then they use the finished
+trials: they fill wide gaps of the front, change the axis of joints that hardly move, and shorten the links that load
+the joints most.
 """
 
 import itertools
@@ -19,21 +19,25 @@ from armwright.proposers.rule_structures import OPENING, fitted
 from armwright.runs.history import FrontMember, History
 from armwright.spaces.parameters import Design
 
-PULL = 0.1  # [m] of base motion if all targets were missed in one direction
-REACHED = 0.005  # [m]; a nearer target pulls no more
-BENT = 0.35  # [rad] mean angle from which a joint counts as bent
-TRIM = 0.8  # of a link's length
+PULL = 0.1  # base displacement [m] if all targets are missed in one direction
+REACHED = 0.005  # error [m] below which a target no longer pulls the base
+BENT = 0.35  # mean angle [rad] above which a joint is bent
+TRIM = 0.8  # scale of a trimmed link
 LEAST_SCALE, MOST_SCALE = 0.4, 1.6
-# What a rule is taken to bring before it has been tried, as a share of the hypervolume.
+# Prior gain of each rule, as a share of the hypervolume.
 EXPECTED = {"fill": 0.01, "trim": 0.002, "swap": 0.002}
 
 
 @dataclass(frozen=True)
 class Gap:
-    """A step of the front: the area that a perfect design between its two sides would add.
+    """A step of the front between two neighbours.
 
-    low, high: the members on its sides, of less position error and of less torque; None at the box's edge.
-    more, less: the torque of the sides, α-scaled.
+    Attributes:
+        area: hypervolume that an ideal design in the gap would add.
+        low: neighbour with the smaller position error; None at the edge of the reference box.
+        high: neighbour with the smaller torque; None at the edge of the reference box.
+        more: α-scaled torque of `low`.
+        less: α-scaled torque of `high`.
     """
 
     area: float
@@ -43,7 +47,8 @@ class Gap:
     less: float
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
+        """The neighbours, as text."""
         if self.low is None:
             return "the front's end of least position error"
         if self.high is None:
@@ -52,37 +57,37 @@ class Gap:
 
 
 class RulesProposer(Proposer):
-    """Designs by rules of geometry, mechanics and feedback; it needs no network and no key."""
+    """Proposes designs by rules of geometry, mechanics and feedback; needs no network and no key."""
 
     name = "rules"
 
     def propose(self, history: History, seed: int, number: int) -> Proposal:
-        """The next structure of the opening, then what the rule that has brought most says."""
+        """Propose the next structure of the opening, then apply the rule with the largest mean gain."""
         rng = np.random.default_rng(seed)
         earlier = sum(trial.source == self.name for trial in history.proposed)
         inside = members_inside(history)
         if earlier < len(OPENING) or not inside:
             rule, (design, reason) = "open", open_with(history, earlier, rng)
         else:
-            rule = most_promising(history, self.name)
+            rule = best_rule(history, self.name)
             design, reason = RULES[rule](history, inside, rng)
         return Proposal(distinct(design, history, rng), proposal_id(self.name, number, rule), reason)
 
 
 def bounds(history: History) -> tuple[float, ...]:
-    """The reference point; unbounded as long as there is none."""
+    """Return the reference point; infinite if there is none."""
     return history.reference_point or (np.inf,) * len(history.problem.objectives)
 
 
 def members_inside(history: History) -> list[FrontMember]:
-    """The front's designs within the reference box, by rising position error; none as long as there is no box."""
+    """Return the front members inside the reference box, sorted by position error; none without a box."""
     if history.reference_point is None:
         return []
     return [member for member in history.front if np.all(np.array(member.values) < bounds(history))]
 
 
-def most_promising(history: History, name: str) -> str:
-    """The rule whose proposals, one imagined among them, have added most hypervolume on average."""
+def best_rule(history: History, name: str) -> str:
+    """Return the rule with the largest mean hypervolume gain, its prior gain included."""
     volume = history.hypervolumes
     gain = np.diff(volume, prepend=0.0)
     added = {rule: [expected * float(volume[-1])] for rule, expected in EXPECTED.items()}
@@ -91,59 +96,56 @@ def most_promising(history: History, name: str) -> str:
         if trial.source == name and rule in added:
             added[rule].append(float(gain[trial.number]))
     if len(history.problem.space.joint_types) == 1:
-        del added["swap"]  # there is no other axis
+        del added["swap"]  # no other axis
     if history.problem.objectives != PAPER_OBJECTIVES:
         del added["fill"]  # it reads the front as position error against torque
     return max(added, key=lambda rule: float(np.mean(added[rule])))
 
 
 def open_with(history: History, earlier: int, rng: np.random.Generator) -> tuple[Design, str]:
-    """A structure of the opening; from the second round on, of another size."""
+    """Return a structure of the opening; from the second round on, in a random size."""
     structure = OPENING[earlier % len(OPENING)]
     torque = dict(zip(history.problem.objectives, bounds(history), strict=True)).get(TORQUE, np.inf)
     if earlier >= len(OPENING):
         torque *= rng.uniform(0.1, 1.0) ** 2
     design = fitted(structure, history.problem, torque)
-    return design, f"{structure.name}: {structure.why}; {described(design)}"
+    return design, f"{structure.name}: {structure.why}; {describe(design)}"
 
 
 def fill(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
-    """A design for the middle of a wide gap of the front.
+    """Return a design for the middle of a wide gap of the front.
 
-    Two sides of one structure are interpolated. Else one side is scaled: torque grows with the square of the
-    length. Its base goes towards the targets that it misses.
+    Neighbours with equal joints are interpolated. Otherwise one neighbour is scaled, since torque grows with the square
+    of the length, and its base is moved towards the targets that it misses.
     """
     gap = wide_gap(inside, bounds(history), rng)
     share = float(rng.uniform(*MIDDLE))
     low, high = gap.low, gap.high
     if low is not None and high is not None and low.design.joints == high.design.joints:
         design = between(low.design, high.design, share, history)
-        return design, f"fills {gap.words}: between the two; {described(design)}"
+        return design, f"fills {gap.description}: between the two; {describe(design)}"
     sides = [side for side in (low, high) if side is not None]
     side = sides[int(rng.integers(len(sides)))]
     torque = share * gap.more + (1.0 - share) * gap.less
     scale = float(np.clip(np.sqrt(torque / max(side.values[1], 1e-9)), LEAST_SCALE, MOST_SCALE))
     design = scaled(history, side, scale)
-    return design, f"fills {gap.words}: trial {side.number} at {scale:.2f} of its size; {described(design)}"
+    return design, f"fills {gap.description}: trial {side.number} at {scale:.2f} of its size; {describe(design)}"
 
 
 def trim(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
-    """A design of the front whose link that weighs most on the joints is shortened.
-
-    A link counts by its length times the torque of the joints up to it.
-    """
+    """Shorten the link of a front member that loads the joints most: length times torque of the joints before it."""
     member = inside[int(rng.integers(len(inside)))]
     carried = by_module(history, member, np.abs(history.evaluation([member.number]).motor_torques[0]).mean(axis=0))
     links = np.array(member.design.links)
     j = int(np.argmax(links * np.cumsum(carried)))
     links[j] *= TRIM
     space = history.problem.space
-    design = space.clipped(towards_missed(history, member), member.design.joints, links, member.design)
-    return design, f"trims link {j + 1} of trial {member.number}, which weighs most on its joints; {described(design)}"
+    design = space.clipped(pulled_origin(history, member), member.design.joints, links, member.design)
+    return design, f"trims link {j + 1} of trial {member.number}, which weighs most on its joints; {describe(design)}"
 
 
 def swap(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
-    """A design of the front whose least used joint gets another axis: Y where it can, as yaw costs no torque."""
+    """Change the axis of the least used joint of a front member, often to Y, which carries no gravity torque."""
     member = inside[int(rng.integers(len(inside)))]
     angles = history.evaluation([member.number]).q[0]  # (T, D) [rad]
     j = int(np.argmin(by_module(history, member, np.ptp(angles, axis=0))))
@@ -151,9 +153,9 @@ def swap(history: History, inside: list[FrontMember], rng: np.random.Generator) 
     others = [kind for kind in types if kind != joints[j]] or [joints[j]]
     other = "Y" if "Y" in others and rng.random() < 0.5 else others[int(rng.integers(len(others)))]
     design = history.problem.space.clipped(
-        towards_missed(history, member), joints[:j] + other + joints[j + 1 :], member.design.links, member.design
+        pulled_origin(history, member), joints[:j] + other + joints[j + 1 :], member.design.links, member.design
     )
-    return design, f"turns joint {j + 1} of trial {member.number}, the least used, into {other}; {described(design)}"
+    return design, f"turns joint {j + 1} of trial {member.number}, the least used, into {other}; {describe(design)}"
 
 
 Rule = Callable[[History, list[FrontMember], np.random.Generator], tuple[Design, str]]
@@ -161,7 +163,7 @@ RULES: dict[str, Rule] = {"fill": fill, "trim": trim, "swap": swap}
 
 
 def wide_gap(inside: list[FrontMember], reference_point: tuple[float, ...], rng: np.random.Generator) -> Gap:
-    """Draw a step of the front by its area; the steps at the edges of the reference box are included."""
+    """Draw a step of the front by its area, including the steps at the edges of the reference box."""
     sides: list[FrontMember | None] = [None, *inside, None]
     corners = [(0.0, reference_point[1]), *((m.values[0], m.values[1]) for m in inside), (reference_point[0], 0.0)]
     gaps: list[Gap] = []
@@ -172,7 +174,7 @@ def wide_gap(inside: list[FrontMember], reference_point: tuple[float, ...], rng:
 
 
 def between(a: Design, b: Design, share: float, history: History) -> Design:
-    """From `b` (share 0) to `a` (1), two designs of one structure."""
+    """Interpolate from `b` (share 0) to `a` (1), two designs with equal joints."""
     origin, links = (
         share * np.array(u) + (1.0 - share) * np.array(v) for u, v in ((a.origin, b.origin), (a.links, b.links))
     )
@@ -180,24 +182,26 @@ def between(a: Design, b: Design, share: float, history: History) -> Design:
 
 
 def scaled(history: History, member: FrontMember, scale: float) -> Design:
-    """The member with all links scaled about its shoulder, its base moved towards what it misses."""
+    """Return the member with its links scaled about the shoulder and its base moved towards missed targets."""
     angles = by_module(history, member, np.abs(history.evaluation([member.number]).q[0]).mean(axis=0))
-    height = standing(member.design, angles)
-    origin = towards_missed(history, member) + np.array([0.0, 0.0, (1.0 - scale) * height])
+    height = upright_height(member.design, angles)
+    origin = pulled_origin(history, member) + np.array([0.0, 0.0, (1.0 - scale) * height])
     links = scale * np.array(member.design.links)
     return history.problem.space.clipped(origin, member.design.joints, links, member.design)
 
 
 def by_module(history: History, member: FrontMember, values: Array) -> Array:
-    """(M,) the largest of the values (J,) of each module's joints."""
-    places = np.array(member.design.module_of_joint)
-    return np.array([values[: len(places)][places == place].max() for place in range(len(member.design.joints))])
+    """Return the maximum (M,) of the joint values (J,) over the joints of each module."""
+    modules = np.array(member.design.module_of_joint)
+    return np.array([values[: len(modules)][modules == m].max() for m in range(len(member.design.joints))])
 
 
-def standing(design: Design, angles: Array) -> float:
-    """The height [m] of the links that stay upright at all targets, up to the first bent R or P joint.
+def upright_height(design: Design, angles: Array) -> float:
+    """Return the height [m] of the links that stay upright, up to the first bent R or P joint.
 
-    angles: (M,) mean absolute ones [rad].
+    Args:
+        design: the arm.
+        angles: (M,) mean absolute joint angles [rad].
     """
     height = 0.0
     for kind, bend, link in zip(design.joints, angles, design.links, strict=True):
@@ -207,8 +211,8 @@ def standing(design: Design, angles: Array) -> float:
     return height
 
 
-def towards_missed(history: History, member: FrontMember) -> Array:
-    """(3,) the base moved along the mean direction to the missed targets: down the slope of the summed error [m]."""
+def pulled_origin(history: History, member: FrontMember) -> Array:
+    """Return the base (3,) [m], moved along the mean direction to missed targets: a step of gradient descent."""
     evaluation = history.evaluation([member.number])
     miss = evaluation.targets - evaluation.reached[0]  # (T, 3)
     error = evaluation.position_error[0][:, None]  # (T, 1)
@@ -227,7 +231,7 @@ def distinct(design: Design, history: History, rng: np.random.Generator) -> Desi
     return change_until_new(design, history.has_tried, changed)
 
 
-def described(design: Design) -> str:
-    """Joints, total length and base, for a reason's end."""
+def describe(design: Design) -> str:
+    """Describe joints, total length and base."""
     x, y, z = design.origin
     return f"{design.joints}, {sum(design.links):.2f} m long, base at ({x:.2f}, {y:.2f}, {z:.2f}) m"

@@ -261,7 +261,7 @@ def test_what_is_outside_the_space_never_enters_the_study(others: dict[str, Any]
     assert len(study.trials) == 10
     assert [line for line in log if words in line] == log
     assert len(log) == 2
-    assert log[0].endswith("the study goes on without this proposal")
+    assert log[0].endswith("the study continues without this proposal")
 
 
 def test_values_reach_optuna_in_its_own_types() -> None:
@@ -278,7 +278,7 @@ def test_a_fault_leaves_the_study_going(log: list[str]) -> None:
     study.optimize(objective, n_trials=20, callbacks=[callback])
     assert callback.faults == {"timeout": 1, "answer": 1}
     assert [trial.number for trial in proposals(study)] == [14, 19]
-    assert log == [f"{words}; the study goes on without this proposal" for words in ("too slow", "what?")]
+    assert log == [f"{words}; the study continues without this proposal" for words in ("too slow", "what?")]
 
 
 def test_a_fault_that_asking_again_does_not_mend_is_said_once(log: list[str]) -> None:
@@ -287,7 +287,7 @@ def test_a_fault_that_asking_again_does_not_mend_is_said_once(log: list[str]) ->
     study = tpe()
     study.optimize(objective, n_trials=20, callbacks=[callback])
     assert (proposer.asked, callback.faults, proposals(study)) == (1, {"key": 4}, [])
-    assert log == ["wrong key; no more proposals are asked for"]
+    assert log == ["wrong key; no more proposals are requested"]
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
@@ -498,9 +498,9 @@ def test_a_study_of_other_directions_or_designs_is_refused() -> None:
         ({"proposer": RulesProposer()}, "proposes arms: give the problem"),
         ({"proposer": Told(), "problem": PROBLEM}, "for any study: leave out problem"),
         ({"proposer": Told}, r"is a class; give an instance of it: Told\(\)"),
-        ({"proposer": Told(), "every": 0}, "every = 0: a whole number"),
-        ({"proposer": Told(), "every": 2.5}, "every = 2.5: a whole number"),
-        ({"proposer": Told(), "first": 0}, "first = 0: a whole number"),
+        ({"proposer": Told(), "every": 0}, "every = 0: expected a whole number"),
+        ({"proposer": Told(), "every": 2.5}, "every = 2.5: expected a whole number"),
+        ({"proposer": Told(), "first": 0}, "first = 0: expected a whole number"),
         ({"proposer": Told(), "on_model_failure": "ignore"}, 'on_model_failure "ignore" is not one of'),
     ],
 )

@@ -1,4 +1,4 @@
-"""Proposals in somebody's own `study.optimize`: a callback that asks once a block and enqueues the answer."""
+"""A callback for `study.optimize` that asks a proposer once per block of trials and enqueues the proposal."""
 
 import operator
 import threading
@@ -21,29 +21,31 @@ from armwright.seeding import PROPOSING, derived_seed
 
 ON_MODEL_FAILURE = ("continue", "stop")
 
-# Below Optuna's own logger: its verbosity and its handlers hold here, too. Not `warnings`, which would end a study
-# that runs with warnings as errors, and would show a second fault of the same words to nobody.
+# A child of Optuna's logger, for its verbosity and handlers. `warnings` would end a study that runs with warnings as
+# errors, and would hide repeated messages.
 _logger = optuna.logging.get_logger("optuna.armwright")
 
 
 class ProposalCallback:
-    """`study.optimize(..., callbacks=[ProposalCallback(proposer, every=10)])`: one trial in `every` is a proposal.
+    """Makes one trial in `every` a proposal: `study.optimize(..., callbacks=[ProposalCallback(proposer, every=10)])`.
 
-    proposer: what proposes for any study (StudyLlmProposer, or your own StudyProposer); with `problem`, one of
-        armwright's that proposes arms (RulesProposer, LlmProposer).
-    every: a proposal comes in each block of so many trials.
-    first: how many trials come before the first proposal; every - 1 if not given, so that blocks end with one.
-    problem: the armwright problem whose design space the study searches.
-    folder: with problem, where the proposer keeps every call, in a folder for each study; of several processes each
-        needs its own. (StudyLlmProposer has `transcript`.)
-    seed: of the proposer's own draws.
-    on_model_failure: "continue" goes on without proposals, whatever becomes of the model; "stop" raises ModelError
-        from `study.optimize` if a proposal fails before there was any.
+    The callback asks after trial first - 1 and every `every` trials from there, in any final state. Trial numbers
+    decide, so that there is one proposal per block with n_jobs and with several processes on one storage.
 
-    Trial numbers decide who asks, so that there is one proposal a block with n_jobs and with several processes on one
-    storage: the callback asks after trial first - 1 and every `every` trials from there, however these ended.
+    Args:
+        proposer: a StudyProposer such as StudyLlmProposer; with `problem`, a proposer of arms such as RulesProposer.
+        every: trials per block.
+        first: trials before the first proposal; by default every - 1, so that each block ends with a proposal.
+        problem: the armwright problem whose design space the study searches.
+        folder: with `problem`, parent of the records of all calls; each process needs its own. StudyLlmProposer has
+            `transcript` instead.
+        seed: of the proposer's random draws.
+        on_model_failure: "continue" goes on without proposals; "stop" raises ModelError from `study.optimize` if a
+            proposal fails before the first has succeeded.
 
-    proposed: how many proposals were enqueued.  faults: what became of the others, by kind.
+    Attributes:
+        proposed: number of enqueued proposals.
+        faults: number of failed proposals by kind.
     """
 
     def __init__(
@@ -66,13 +68,13 @@ class ProposalCallback:
         self.on_model_failure = on_model_failure
         self.proposed = 0
         self.faults: Counter[str] = Counter()
-        self._given_up: str | None = None  # the kind of the fault that asking again does not mend
+        self._given_up: str | None = None  # kind of the final error, after which no proposals are requested
         self._lock = threading.Lock()
 
     def __call__(self, study: optuna.Study, trial: FrozenTrial) -> None:
-        """Optuna calls this after each finished trial, in the thread that ran it."""
-        since = trial.number - (self.first - 1)
-        if since < 0 or since % self.every:
+        """Ask for a proposal if one is due; Optuna calls this after each trial, in the trial's thread."""
+        offset = trial.number - (self.first - 1)
+        if offset < 0 or offset % self.every:
             return
         if self._given_up is not None:
             with self._lock:
@@ -82,54 +84,54 @@ class ProposalCallback:
         try:
             proposal = self.proposer.propose(study, derived_seed(self.seed, PROPOSING, number), number)
             params = checked_params(proposal.params, self.proposer.space(study), observed_space(study))
-        except ProposalError as fault:
-            self._fail(study, fault)
-        except DesignError as refusal:
-            self._fail(study, ProposalError("design", f"{self.proposer.name}: {refusal}"))
+        except ProposalError as error:
+            self._fail(study, error)
+        except DesignError as error:
+            self._fail(study, ProposalError("design", f"{self.proposer.name}: {error}"))
         else:
             enqueue(study, params, _attributes(self.proposer.name, proposal))
             with self._lock:
                 self.proposed += 1
 
-    def _fail(self, study: optuna.Study, fault: ProposalError) -> None:
+    def _fail(self, study: optuna.Study, error: ProposalError) -> None:
         with self._lock:
-            self.faults[fault.kind] += 1
-            told = self._given_up is not None  # by another thread, meanwhile
-            if fault.final:
-                self._given_up = fault.kind
+            self.faults[error.kind] += 1
+            reported = self._given_up is not None  # by another thread in the meantime
+            if error.final:
+                self._given_up = error.kind
         if self.on_model_failure == "stop" and not _has_proposals(study):
-            raise ModelError(str(fault)) from fault
-        if not told:
-            end = "no more proposals are asked for" if fault.final else "the study goes on without this proposal"
-            _logger.warning(f"{fault}; {end}")
+            raise ModelError(str(error)) from error
+        if not reported:
+            outcome = "no more proposals are requested" if error.final else "the study continues without this proposal"
+            _logger.warning(f"{error}; {outcome}")
 
 
 def enqueue(study: optuna.Study, params: Mapping[str, Any], attributes: Mapping[str, Any]) -> None:
-    """The next free worker evaluates these parameters.
+    """Enqueue parameters for the next free worker.
 
-    Genetic samplers pass over trials that have no generation, and give one only to trials whose values they draw. So
-    the trial gets its generation before any worker can take it and finish it: in a copy of the study that holds just
-    what generations are counted from.
+    Genetic samplers ignore trials without a generation, and assign one only to trials whose values they draw. So the
+    trial gets its generation before any worker can take it: in a copy of the study with the complete trials, from which
+    generations are counted.
     """
-    enlist = getattr(study.sampler, "get_trial_generation", None)
-    if enlist is None:
+    assign_generation = getattr(study.sampler, "get_trial_generation", None)
+    if assign_generation is None:
         study.enqueue_trial(dict(params), user_attrs=dict(attributes))
         return
     copy = quiet_study(InMemoryStorage(), study.directions)
     for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,)):
         copy.add_trial(create_trial(values=trial.values, system_attrs=trial.system_attrs))
     copy.enqueue_trial(dict(params), user_attrs=dict(attributes))
-    enlist(copy, copy.get_trials(deepcopy=False)[-1])
+    assign_generation(copy, copy.get_trials(deepcopy=False)[-1])
     study.add_trial(copy.get_trials()[-1])
 
 
 def _has_proposals(study: optuna.Study) -> bool:
-    """Whether this or another process has enqueued one."""
+    """Return whether this or another process has enqueued a proposal."""
     return any("proposal" in trial.user_attrs for trial in study.get_trials(deepcopy=False))
 
 
 def _attributes(source: str, proposal: StudyProposal) -> dict[str, Any]:
-    """What is kept with the trial: storages keep it as JSON."""
+    """Return the user attributes of the trial, which storages keep as JSON."""
     attributes: dict[str, Any] = {"source": source, "proposal": proposal.id, "reason": proposal.reason}
     if proposal.expected is not None:
         attributes["expected"] = list(proposal.expected)
@@ -157,9 +159,9 @@ def _study_proposer(
 
 def _whole(name: str, value: Any) -> int:
     try:
-        number = operator.index(value)  # numpy's whole numbers, too
+        number = operator.index(value)  # numpy integers too
     except TypeError:
         number = 0
     if isinstance(value, bool) or number < 1:
-        raise SettingsError(f"{name} = {value!r}: a whole number from 1 on is needed")
+        raise SettingsError(f"{name} = {value!r}: expected a whole number of at least 1")
     return number

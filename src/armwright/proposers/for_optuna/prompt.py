@@ -65,12 +65,11 @@ def study_prompt(
     complete = [trial for trial in trials if trial.state == TrialState.COMPLETE]
     objectives = study_objectives(study)
     best = best_trials(complete, study.directions)
-    best_numbers = {trial.number for trial in best}
-    rng = np.random.default_rng(seed)
-    # The best trials of a single objective are ranked and few; a front is not, so a sample of it is shown.
-    best_drawn = best if len(objectives) == 1 else draw_in_order(best, N_PARETO, rng)
-    others_drawn = draw_in_order([trial for trial in complete if trial.number not in best_numbers], N_RANDOM, rng)
     own = [trial for trial in complete if memory == "own" and _is_proposal(trial, source)]
+    best_records, other_records, own_records = (
+        [_record(trial, parameters, objectives, {t.number for t in best}) for trial in group]
+        for group in (*_sample(complete, best, seed, ranked=len(objectives) == 1), own)
+    )
     under_way = [_params(_given(trial), parameters) for trial in trials if _is_proposal_under_way(trial)]
     common = {
         "description": description.strip(),
@@ -85,10 +84,6 @@ def study_prompt(
         "expected": memory == "own",
         "form": form,
     }
-    best_records, other_records, own_records = (
-        [_record(trial, parameters, objectives, best_numbers) for trial in group]
-        for group in (best_drawn, others_drawn, own)
-    )
     most_shown, most_proposed = N_PARETO + N_RANDOM, MOST_PROPOSED
     while True:
         others = other_records[: most_shown // 2]
@@ -101,6 +96,16 @@ def study_prompt(
         if estimated_tokens(text) <= MOST_TOKENS or (most_shown, most_proposed) == (1, FEWEST_PROPOSED):
             return text
         most_shown, most_proposed = max(1, most_shown - 1), max(FEWEST_PROPOSED, 3 * most_proposed // 4)
+
+
+def _sample(
+    complete: Sequence[FrozenTrial], best: Sequence[FrozenTrial], seed: int, *, ranked: bool
+) -> tuple[Sequence[FrozenTrial], Sequence[FrozenTrial]]:
+    """Draw some of the best trials, or take all if they are ranked, and draw some of the others."""
+    rng = np.random.default_rng(seed)
+    numbers = {trial.number for trial in best}
+    others = [trial for trial in complete if trial.number not in numbers]
+    return best if ranked else draw_in_order(best, N_PARETO, rng), draw_in_order(others, N_RANDOM, rng)
 
 
 def parameters_prompt(

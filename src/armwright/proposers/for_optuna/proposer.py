@@ -1,4 +1,4 @@
-"""What proposes for any Optuna study, and armwright's own proposers in that place."""
+"""The interface of proposers for Optuna studies, and an adapter for proposers of arms."""
 
 import re
 import threading
@@ -22,16 +22,18 @@ from armwright.runs.history import BBO, History
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.optuna_distributions import distributions
 
-N_REFERENCE = 10  # the first complete trials, which bound the hypervolume of a task that does not
+N_REFERENCE = 10  # first complete trials, which give the reference point if the task has none
 
 
 @dataclass(frozen=True)
 class StudyProposal:
-    """Parameters to evaluate next; what they leave out the study's sampler draws.
+    """Parameters to evaluate next; the study's sampler draws those that are missing.
 
-    id: of this proposal alone, within the study.
-    reason: in one line.
-    expected: the values that the proposer expects, where it says so.
+    Attributes:
+        params: values by parameter name.
+        id: unique within the study.
+        reason: one line.
+        expected: the values that the proposer expects, if any.
     """
 
     params: Mapping[str, Any]
@@ -41,32 +43,41 @@ class StudyProposal:
 
 
 class StudyProposer(Protocol):
-    """Proposes trials for an Optuna study; inherit from it and write `propose`.
+    """Proposes trials for an Optuna study; subclass it and implement `propose`.
 
-    name: the `source` of its trials.
+    Attributes:
+        name: the `source` of its trials.
     """
 
     name: str
 
     def space(self, study: optuna.Study) -> Space:
-        """The distributions that its parameters must lie in: those of the trials so far, if it knows no better."""
+        """Return the distributions of the parameters; by default those of the trials so far."""
         return observed_space(study)
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
-        """The next trial; ProposalError where there is none.
+        """Propose the next trial. Several threads may call this at a time.
 
-        number: that of the trial that is asked for, or thereabouts; ids are made from it. Several threads may ask at
-        a time.
+        Args:
+            study: the study so far.
+            seed: of all random draws.
+            number: approximate number of the next trial, for the id.
+
+        Raises:
+            ProposalError: There is no proposal.
         """
         ...
 
 
 class ArmProposer(StudyProposer):
-    """A proposer of arms, for somebody's own Optuna study over an armwright design space.
+    """Lets a proposer of arms propose for an Optuna study over an armwright design space.
 
-    folder: where the proposer keeps what was said, in a folder for each study; None: nowhere.
+    A proposer may serve several studies, one after the other; each has its own record and budget.
 
-    One proposer may serve one study after the other: each begins anew, with an account of its own.
+    Args:
+        proposer: proposes the arms.
+        problem: gives the design space and the objectives.
+        folder: parent of the record folders, one per study; None to keep no records.
     """
 
     def __init__(self, proposer: Proposer, problem: Problem, folder: str | Path | None = None) -> None:
@@ -74,17 +85,17 @@ class ArmProposer(StudyProposer):
         self.proposer = proposer
         self.problem = problem
         self.folder = None if folder is None else Path(folder)
-        self._study: optuna.Study | None = None  # that the proposer was opened for
-        self._ready: deque[Proposal] = deque()  # of a call that gave several designs
+        self._study: optuna.Study | None = None  # for which the proposer was opened
+        self._ready: deque[Proposal] = deque()  # designs left from a call that returned several
         self._asking = 0
         self._lock = threading.Lock()
 
     def space(self, study: optuna.Study) -> Space:
-        """The design space's."""
+        """Return the distributions of the design space."""
         return distributions(self.problem.space)
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
-        """What the proposer says to the study's complete trials."""
+        """Ask the proposer for a design, from the study's complete trials."""
         history = study_history(study, self.problem)
         with self._opened(study, history):
             try:
@@ -98,9 +109,9 @@ class ArmProposer(StudyProposer):
 
     @contextmanager
     def _opened(self, study: optuna.Study, history: History) -> Generator[None]:
-        """While the proposer serves this study, and no other.
+        """Reserve the proposer for this study; opens it if it served another one.
 
-        What was said in another study, or in an earlier one of the same name, is not taken for this one's.
+        Records of another study, or of an earlier one with the same name, are not reused.
         """
         with _opening:
             holder = _holders.get(id(self.proposer))
@@ -121,8 +132,8 @@ class ArmProposer(StudyProposer):
         if folder is not None:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
-            except OSError as fault:
-                raise RunFolderError(f"cannot write {folder}: {fault.strerror or fault}") from fault
+            except OSError as error:
+                raise RunFolderError(f"cannot write {folder}: {error.strerror or error}") from error
         self.proposer.open(folder)
         self._study = study
         used = {trial.user_attrs.get("proposal") for trial in study.get_trials(deepcopy=False)}
@@ -130,21 +141,22 @@ class ArmProposer(StudyProposer):
 
 
 _opening = threading.Lock()
-# Who serves whom: by the id of each proposer the one that opened it last, as two callbacks may hold one proposer.
+# The adapter that opened a proposer last, by the proposer's id: two callbacks may share a proposer.
 _holders: WeakValueDictionary[int, ArmProposer] = WeakValueDictionary()
 
 
 def _folder_name(study: optuna.Study) -> str:
-    """The study's name and when it began: a study that was deleted and made again is another one."""
+    """Return the study's name and start time, which differs after a study was deleted and created again."""
     name = re.sub(r"[^A-Za-z0-9._-]+", "_", study.study_name)[:60]
-    began = next((trial.datetime_start for trial in study.get_trials(deepcopy=False) if trial.datetime_start), None)
-    return name if began is None else f"{name}-{began:%Y%m%d-%H%M%S-%f}"
+    started = next((trial.datetime_start for trial in study.get_trials(deepcopy=False) if trial.datetime_start), None)
+    return name if started is None else f"{name}-{started:%Y%m%d-%H%M%S-%f}"
 
 
 def study_history(study: optuna.Study, problem: Problem) -> History:
-    """The complete trials of a study over `problem`, numbered without gaps.
+    """Return the complete trials of a study over `problem`, numbered without gaps.
 
-    SettingsError where its trials are none of the problem's.
+    Raises:
+        SettingsError: The objectives or trials are not those of the problem.
     """
     if study.directions != [StudyDirection.MINIMIZE] * len(problem.objectives):
         names = ", ".join(objective.name for objective in problem.objectives)
@@ -153,14 +165,14 @@ def study_history(study: optuna.Study, problem: Problem) -> History:
             f"a study over an armwright problem minimises {len(problem.objectives)} objectives: {names}"
         )
     trials: list[FinishedTrial] = []
-    refusal: DesignError | None = None
+    error: DesignError | None = None
     for trial in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,)):
         try:
             trials.append(_finished(len(trials), trial, problem))
-        except DesignError as fault:  # a trial of another space teaches nothing
-            refusal = fault
-    if refusal is not None and not trials:
-        raise SettingsError(f"the study's trials are not of the design space {problem.space.name}: {refusal}")
+        except DesignError as invalid:  # trials of another space are skipped
+            error = invalid
+    if error is not None and not trials:
+        raise SettingsError(f"the study's trials are not of the design space {problem.space.name}: {error}")
     reference_point = problem.reference_point
     if reference_point is None and trials:
         reference_point = History(problem, trials, min(N_REFERENCE, len(trials))).found_reference_point()
@@ -168,21 +180,21 @@ def study_history(study: optuna.Study, problem: Problem) -> History:
 
 
 def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTrial:
-    noted = trial.user_attrs
-    expected = noted.get("expected")
+    attributes = trial.user_attrs
+    expected = attributes.get("expected")
     missing = [constraint.words for constraint in problem.constraints if constraint.words not in trial.constraints]
     if missing:
         raise SettingsError(
-            f'trial {trial.number} of the study does not say how far it breaks "{missing[0]}": '
-            f'trial.set_constraint("{missing[0]}", ...) with its value in problem.evaluate([design]).violations'
+            f'trial {trial.number} of the study has no constraint "{missing[0]}": '
+            f'call trial.set_constraint("{missing[0]}", ...) with its value in problem.evaluate([design]).violations'
         )
     return FinishedTrial(
         number,
-        str(noted.get("source", BBO)),
+        str(attributes.get("source", BBO)),
         problem.space.design(trial.params),
         tuple(trial.values),
-        proposal=noted.get("proposal"),
-        reason=str(noted.get("reason", "")),
+        proposal=attributes.get("proposal"),
+        reason=str(attributes.get("reason", "")),
         expected=None if expected is None else tuple(expected),
         violations=tuple(trial.constraints[constraint.words] for constraint in problem.constraints),
     )
