@@ -131,7 +131,8 @@ def run(tmp_path: Path) -> Path:
     [
         (("verification",), 3), (("verification", "robust_numbers"), None), (("verification", "robust_numbers"), {}),
         (("hypervolume",), {}), (("hypervolume", "history"), [[1], 2]), (("hypervolume", "final"), "x"),
-        (("credit",), []), (("credit", "bbo"), None), (("proposer", "failures"), 1), (("diagnostics",), "x"),
+        (("attribution",), []), (("attribution", "bbo"), None), (("proposer", "failures"), 1),
+        (("proposer_bias",), "x"),
         (("seconds",), {}), (("best_known",), {"share": 1}), (("front_size",), 10**400), (("n_trials",), -1),
     ],
     ids=str,

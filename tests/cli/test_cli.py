@@ -93,7 +93,7 @@ def test_missing_results_of_a_finished_run_are_made_again(in_folder: Path) -> No
     armwright("optimize", "target-1", *DRAWN, "--out", "run")
     run = in_folder / "run"
     before = {path.relative_to(run) for path in run.rglob("*")}
-    for name in ("hypervolume", "samples", "credit", "front", "arms"):
+    for name in ("hypervolume", "samples", "attribution", "front", "arms"):
         assert {Path("figures", f"{name}.png"), Path("figures", f"{name}.pdf")} <= before
     shutil.rmtree(run / "figures")
     shutil.rmtree(run / "designs")

@@ -235,8 +235,8 @@ def test_the_tables_hold_the_same_numbers(comparison: Comparison, tmp_path: Path
 def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) -> None:
     names = {path.stem for path in write_comparison_figures(tmp_path, comparison, samples=["BBO/rules (12 trials)"])}
     assert names >= {
-        "targets", "area", "hypervolume-methods", "time-to", "attainment-target-1", "attainment-random-4", "credit",
-        "samples-target-1", "solution-1-target-1", "solution-2-target-1",
+        "targets", "area", "hypervolume-methods", "time-to", "attainment-target-1", "attainment-random-4",
+        "attribution", "samples-target-1", "solution-1-target-1", "solution-2-target-1",
     }  # fmt: skip
     for name in names:
         assert (tmp_path / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")

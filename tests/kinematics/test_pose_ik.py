@@ -201,9 +201,9 @@ def test_what_an_arm_can_do_is_found(rows: int) -> None:
     q = np.random.default_rng(2).uniform(-2.0, 2.0, (1, 40, 6))
     asked = replace(target_arrays([rows] * 40, restarts=20), rotation=reference_poses.tool(chains, q, *tools([arm]))[0])
     found = evaluate([arm], reference.tip(chains, q)[0], target_arrays=asked)
-    assert (~found.missed).mean() > 0.95
+    assert (~found.unreached).mean() > 0.95
     assert (
-        ~evaluate([arm], reference.tip(chains, q)[0], target_arrays=replace(asked, restarts=0)).missed
+        ~evaluate([arm], reference.tip(chains, q)[0], target_arrays=replace(asked, restarts=0)).unreached
     ).mean() < 0.95
 
 
@@ -389,7 +389,7 @@ def test_whole_solves_agree_with_scikit_robot(dof: int, rows: int) -> None:
     distance, angle = theirs[..., 0], theirs[..., 1]
     reached = (distance < asked.tolerance) & (angle < asked.angle_tolerance)
     assert 0.05 < reached.mean() < 0.95, "the comparison would show nothing"
-    assert abs((~ours.missed).mean() - reached.mean()) < 0.03
+    assert abs((~ours.unreached).mean() - reached.mean()) < 0.03
     near = np.abs(ours.position_error - distance) < 0.01 * distance + 1e-3
     near &= np.abs(ours.angle_error - angle) < 0.01 * angle + np.radians(1.0)
     assert near.mean() >= 0.9

@@ -30,7 +30,7 @@ from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.proposer import study_history
 from armwright.proposers.replay import ReplayProposer
 from armwright.report.figures import write_figures
-from armwright.runs.attribution import credit_by_source
+from armwright.runs.attribution import attribution_by_source
 from armwright.runs.best_known import known_front
 from armwright.runs.folder import read_run
 from armwright.runs.history import History, found_reference_point
@@ -188,9 +188,7 @@ def test_the_front_is_optunas_and_the_hypervolume_moocores(values: np.ndarray, d
     feasible = values[np.all(broken <= 0.0, axis=1)]
     whole = float(moocore.hypervolume(feasible, ref=[10.0, 10.0])) if len(feasible) else 0.0
     assert history.hypervolume[-1] == pytest.approx(whole)
-    assert sum(credit.hypervolume_gained or 0.0 for credit in credit_by_source(history).values()) == pytest.approx(
-        whole
-    )
+    assert sum(one.hypervolume_gained or 0.0 for one in attribution_by_source(history).values()) == pytest.approx(whole)
 
 
 @EXAMPLES
@@ -260,7 +258,7 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
     record = run.summary["feasibility"]
     assert record["infeasible"] == int((~feasible).sum())
     assert record["nearest"] is None
-    assert list(record["broken_by"].values()) == (broken > 0.0).sum(axis=0).tolist()
+    assert list(record["violated_by"].values()) == (broken > 0.0).sum(axis=0).tolist()
     assert known_front(problem) is None
     assert run.summary["best_known"] is None
     # on disk

@@ -104,7 +104,7 @@ def test_a_run_completes_resumes_and_counts_right(tmp_path: Path, problem: Probl
     assert run.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(inside, ref=point))
     if len(point) == 1:
         assert run.summary["hypervolume"]["final"] == pytest.approx(point[0] - values.min())
-    gained = [credit["hypervolume_gained"] for credit in run.summary["credit"].values()]
+    gained = [one["hypervolume_gained"] for one in run.summary["attribution"].values()]
     assert sum(gained) == pytest.approx(run.summary["hypervolume"]["final"])
 
 
@@ -119,7 +119,7 @@ def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, probl
     assert [member.values for member in history.front] == [member.values for member in run.front]
     assert history.hypervolume == pytest.approx(run.hypervolume)
     drawn = {path.stem for path in write_figures(tmp_path / "run")}
-    assert {"hypervolume", "credit", "arms"} <= drawn
+    assert {"hypervolume", "attribution", "arms"} <= drawn
     assert ("front" in drawn) == (len(names) > 1)
     titles = [title for title, _ in chosen_members(history)]
     assert all("position error" in title or "spread" in title or "nee" in title for title in titles)

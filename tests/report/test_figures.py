@@ -6,7 +6,7 @@ import pytest
 
 from armwright.exceptions import RunFolderError
 from armwright.problem.problem import Problem
-from armwright.report.figures import chosen_members, draw_credit, draw_hypervolume, draw_samples, write_figures
+from armwright.report.figures import chosen_members, draw_attribution, draw_hypervolume, draw_samples, write_figures
 from armwright.study.study import Progress, Run, optimize
 from armwright.tasks.catalogue import load_task, random_task
 from armwright.tasks.task import Task
@@ -20,7 +20,9 @@ def short(out: Path, problem: Problem, n_total: int = 12) -> Run:
 def test_every_figure_as_png_and_pdf(tmp_path: Path) -> None:
     short(tmp_path, Problem(load_task("target-2")))
     written = write_figures(tmp_path)
-    assert {"hypervolume.png", "samples.png", "front.png", "arms.png", "credit.png"} <= {path.name for path in written}
+    assert {"hypervolume.png", "samples.png", "front.png", "arms.png", "attribution.png"} <= {
+        path.name for path in written
+    }
     for path in written:
         assert path.read_bytes().startswith(b"\x89PNG")
         assert path.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
@@ -71,7 +73,7 @@ def test_the_curve_begins_with_the_random_trials_and_ends_at_the_final_value(tmp
 
 def test_the_stacks_end_at_the_final_hypervolume_and_the_size_of_the_front(tmp_path: Path) -> None:
     run = short(tmp_path, Problem(load_task("target-1")))
-    volume, members = draw_credit(run.history).axes
+    volume, members = draw_attribution(run.history).axes
     assert volume.lines[-1].get_ydata()[-1] == pytest.approx(run.hypervolume[-1])
     assert members.lines[-1].get_ydata()[-1] == len(run.front)
     assert [text.get_text() for text in volume.figure.legends[0].texts] == ["black box", "rules", "random"]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from armwright.pareto import front_indices, hypervolume
 from armwright.problem.problem import Problem
-from armwright.runs.attribution import credit_by_source, front_by_source, gained_by_source, hypervolume_gains
+from armwright.runs.attribution import attribution_by_source, front_by_source, gained_by_source, hypervolume_gains
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
 from armwright.tasks.task import Task
@@ -36,11 +36,11 @@ def history(trials: list[tuple[str, tuple[int, int]]], problem: Problem = BOUNDE
 @given(TRIALS)
 def test_what_the_sources_brought_adds_up_to_the_run(trials: list[tuple[str, tuple[int, int]]]) -> None:
     past = history(trials)
-    credit = credit_by_source(past)
-    assert list(credit) == list(dict.fromkeys(trial.source for trial in past))
-    assert sum(c.trials for c in credit.values()) == len(past)
-    assert sum(c.front for c in credit.values()) == len(past.front)
-    gained = [c.hypervolume_gained for c in credit.values()]
+    attribution = attribution_by_source(past)
+    assert list(attribution) == list(dict.fromkeys(trial.source for trial in past))
+    assert sum(c.trials for c in attribution.values()) == len(past)
+    assert sum(c.front for c in attribution.values()) == len(past.front)
+    gained = [c.hypervolume_gained for c in attribution.values()]
     assert sum(g or 0.0 for g in gained) == pytest.approx(hypervolume(past.values, (5.0, 5.0)))
     assert all(g is not None and g >= 0.0 for g in gained)
 
@@ -49,14 +49,14 @@ def test_what_the_sources_brought_adds_up_to_the_run(trials: list[tuple[str, tup
 @given(TRIALS)
 def test_the_curves_add_up_at_every_iteration_and_end_at_the_credit(trials: list[tuple[str, tuple[int, int]]]) -> None:
     past = history(trials)
-    credit, gained, members = credit_by_source(past), gained_by_source(past), front_by_source(past)
+    attribution, gained, members = attribution_by_source(past), gained_by_source(past), front_by_source(past)
     assert gained is not None
     counted = max(0, len(past) - N_INIT)
-    for source, brought in credit.items():
+    for source, brought in attribution.items():
         assert len(gained[source]) == len(members[source]) == counted + 1
         assert gained[source][-1] == pytest.approx(brought.hypervolume_gained)
         assert members[source][-1] == brought.front
-    if credit:
+    if attribution:
         assert np.sum(list(gained.values()), axis=0)[1:] == pytest.approx(past.hypervolume)
         sizes = [len(front_indices(past.values[: N_INIT + i])) for i in range(1, counted + 1)]
         assert np.sum(list(members.values()), axis=0)[1:].tolist() == sizes
@@ -68,18 +68,18 @@ def test_a_trial_gains_what_it_adds_when_it_enters() -> None:
     gains = hypervolume_gains(past)
     assert gains is not None
     assert gains.tolist() == [1.0, 0.0, 8.0, 7.0, 4.0, 0.0]
-    assert credit_by_source(past)["rules"].hypervolume_gained == 7.0
-    assert credit_by_source(past)["rules"].front == 0
+    assert attribution_by_source(past)["rules"].hypervolume_gained == 7.0
+    assert attribution_by_source(past)["rules"].front == 0
 
 
 def test_without_a_reference_point_there_is_no_hypervolume_to_share() -> None:
     past = history([("", (4, 4)), ("", (8, 0))], OPEN)
     assert hypervolume_gains(past) is None
     assert gained_by_source(past) is None
-    assert credit_by_source(past)["random"].hypervolume_gained is None
+    assert attribution_by_source(past)["random"].hypervolume_gained is None
     assert front_by_source(past)["random"].tolist() == [2]
 
 
 def test_no_trials_no_credit() -> None:
-    assert credit_by_source(history([])) == {}
+    assert attribution_by_source(history([])) == {}
     assert front_by_source(history([], OPEN)) == {}

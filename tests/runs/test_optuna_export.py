@@ -302,8 +302,8 @@ def test_a_search_for_the_whole_front_is_exported(tmp_path: Path) -> None:
     found = find_front(Problem(load_task("target-1")), budget=1000, out=tmp_path / "front")
     with opened(export_study(tmp_path / "front").database) as study:
         assert sorted(trial.values for trial in study.best_trials) == sorted(list(m.values) for m in found.front)
-        assert {trial.user_attrs["source"] for trial in study.trials} == {"front"}
-        assert study.user_attrs["method"]["search"] == "front"
+        assert {trial.user_attrs["source"] for trial in study.trials} == {"front_search"}
+        assert study.user_attrs["method"]["search"] == "front_search"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")

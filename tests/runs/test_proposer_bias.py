@@ -1,4 +1,4 @@
-"""Habits of designs: round lengths, bases on symmetry planes, repeats, the front's share."""
+"""SourceBias of designs: round lengths, bases on symmetry planes, repeats, the front's share."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
-from armwright.runs.proposer_bias import are_round, diagnose, front_share, repeated
+from armwright.runs.proposer_bias import are_round, front_share, proposer_bias, repeated
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
 from armwright.tasks.catalogue import load_task, random_task
@@ -52,7 +52,7 @@ def test_the_proposers_habits_stand_beside_the_black_boxs() -> None:
             ("bbo", design(origin=(0.3, 0.0, 0.2))),  # a repeat of the proposer's
         ]
     )
-    found = diagnose(past, "rules")
+    found = proposer_bias(past, "rules")
     assert found.symmetry_planes == 3
     assert found.proposer is not None
     assert found.black_box is not None
@@ -65,7 +65,7 @@ def test_the_proposers_habits_stand_beside_the_black_boxs() -> None:
 
 
 def test_where_the_targets_have_no_symmetry_no_base_can_be_on_it() -> None:
-    found = diagnose(history([("rules", design())], WITHOUT_SYMMETRY), "rules")
+    found = proposer_bias(history([("rules", design())], WITHOUT_SYMMETRY), "rules")
     assert found.symmetry_planes == 0
     assert found.proposer is not None
     assert found.proposer.base_on_symmetry_plane is None
@@ -74,7 +74,7 @@ def test_where_the_targets_have_no_symmetry_no_base_can_be_on_it() -> None:
 
 def test_uniform_designs_have_no_habits() -> None:
     drawn = TARGET_2.space.sample(300, 0)
-    found = diagnose(history([("bbo", d) for d in drawn]), "rules")
+    found = proposer_bias(history([("bbo", d) for d in drawn]), "rules")
     assert found.proposer is None
     assert found.front_share is None
     assert found.black_box is not None

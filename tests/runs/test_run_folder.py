@@ -86,9 +86,9 @@ def test_summary(run: Run) -> None:
         "evaluations",
         "duplicates",
         "refine",
-        "credit",
+        "attribution",
         "proposer",
-        "diagnostics",
+        "proposer_bias",
         "seconds",
         "versions",
     ]
@@ -97,18 +97,20 @@ def test_summary(run: Run) -> None:
     assert len(summary["hypervolume"]["history"]) == 8
     assert summary["proposer"]["name"] == "rules"
     assert summary["front_size"] == len(run.front)
-    assert list(summary["credit"]) == ["random", "rules", "bbo"]
-    assert all(list(brought) == ["trials", "front", "hypervolume_gained"] for brought in summary["credit"].values())
-    gained = [brought["hypervolume_gained"] for brought in summary["credit"].values()]
+    assert list(summary["attribution"]) == ["random", "rules", "bbo"]
+    assert all(
+        list(brought) == ["trials", "front", "hypervolume_gained"] for brought in summary["attribution"].values()
+    )
+    gained = [brought["hypervolume_gained"] for brought in summary["attribution"].values()]
     assert sum(gained) == pytest.approx(summary["hypervolume"]["final"])
-    assert list(summary["diagnostics"]) == ["symmetry_planes", "proposer", "black_box", "front_share"]
-    assert summary["diagnostics"]["proposer"]["designs"] == 2
+    assert list(summary["proposer_bias"]) == ["symmetry_planes", "proposer", "black_box", "front_share"]
+    assert summary["proposer_bias"]["proposer"]["designs"] == 2
 
 
 def test_without_a_proposer_there_is_nothing_to_diagnose() -> None:
     summary = optimize(PROBLEM, proposer="none", n_init=2, n_total=2).summary
-    assert summary["diagnostics"] is None
-    assert list(summary["credit"]) == ["random", "bbo"]
+    assert summary["proposer_bias"] is None
+    assert list(summary["attribution"]) == ["random", "bbo"]
 
 
 def test_designs_of_the_front(run: Run) -> None:

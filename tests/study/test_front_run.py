@@ -17,7 +17,7 @@ from armwright.problem.objectives import POSITION_ERROR, TORQUE
 from armwright.problem.problem import Problem
 from armwright.proposers.rules import RulesProposer
 from armwright.report.figures import write_figures
-from armwright.runs.best_known import known_front, standing
+from armwright.runs.best_known import front_gap, known_front
 from armwright.runs.folder import read_run
 from armwright.runs.results import read_summary, verify_run
 from armwright.search.front_search import FrontSearch
@@ -74,7 +74,7 @@ def test_the_trials_are_the_front(done: FrontRun) -> None:
     assert np.all(np.diff(values[:, 0]) > 0)
     assert np.all(values < 5.0)
     assert np.array_equal(PROBLEM.evaluate([trial.design for trial in done.history]).values, values)
-    assert {trial.source for trial in done.history} == {"front"}
+    assert {trial.source for trial in done.history} == {"front_search"}
     config, read = read_run(done.folder)
     assert config == done.config
     assert read.trials == list(done.history.trials)
@@ -290,13 +290,13 @@ def test_best_known_fronts_are_fronts_of_their_tasks(name: str) -> None:
 def test_standing_beside_the_best_known() -> None:
     known = known_front(PROBLEM)
     assert known is not None
-    same = standing(PROBLEM, known.values, (5.0, 5.0))
+    same = front_gap(PROBLEM, known.values, (5.0, 5.0))
     assert same is not None
     assert (same.share, same.beyond, same.gain) == (1.0, 0, 0.0)
-    half = standing(PROBLEM, known.values[::2], (5.0, 5.0))
+    half = front_gap(PROBLEM, known.values[::2], (5.0, 5.0))
     assert half is not None
     assert half.share < 1.0
-    better = standing(PROBLEM, known.values[::2] * 0.9, (5.0, 5.0))
+    better = front_gap(PROBLEM, known.values[::2] * 0.9, (5.0, 5.0))
     assert better is not None
     assert better.beyond == len(known.values[::2])
     union = hypervolume(np.vstack([known.values, known.values[::2] * 0.9]), (5.0, 5.0))

@@ -10,9 +10,9 @@ import pytest
 from armwright.exceptions import ArmError, SettingsError, TaskError
 from armwright.llm.prompt import load_prompt
 from armwright.problem.evaluation import evaluate
-from armwright.problem.miss_reasons import why_missed
 from armwright.problem.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
 from armwright.problem.problem import Problem
+from armwright.problem.unreached_reason import unreached_reason
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.rotations import rotation_from_rpy
 from armwright.runs.folder import read_config
@@ -161,7 +161,7 @@ def test_reasons_of_missed_targets() -> None:
         ),
     )
     found = evaluate([arm], one.target_positions, target_arrays=one.target_arrays)
-    reached, far, limited, askew = (why_missed(arm, found, 0, target) for target in range(4))
+    reached, far, limited, askew = (unreached_reason(arm, found, 0, target) for target in range(4))
     assert reached == ""
     assert far.startswith(f"{1e3 * found.position_error[0, 1]:.1f} mm: out of reach by 0.400 m")
     assert "out of reach" not in limited
@@ -204,5 +204,5 @@ def test_a_run_keeps_it_all(tmp_path: Path) -> None:
     records = json.loads(first.read_text())["targets"]
     assert ["angle_error" in record for record in records] == [True, False, True, False]
     number = int(first.parent.name)
-    missed = problem.physics([run.history.trials[number].design]).missed[0]
-    assert [record["missed"] is not None for record in records] == missed.tolist()
+    missed = problem.physics([run.history.trials[number].design]).unreached[0]
+    assert [record["unreached_reason"] is not None for record in records] == missed.tolist()

@@ -35,7 +35,7 @@ def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
     summary = run.summary
     show_front(console, history, summary)
     if summary["proposer"] is not None:
-        console.print(_attribution_table(summary["credit"]))
+        console.print(_attribution_table(summary["attribution"]))
     volume = summary["hypervolume"]
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
     infeasible = f", {(~history.feasible).sum()} infeasible" if history.problem.constraints else ""
@@ -204,13 +204,13 @@ def _front_table(history: History, robust: set[int] | None) -> Table:
     return table
 
 
-def _attribution_table(credit: dict[str, dict[str, Any]]) -> Table:
+def _attribution_table(attribution: dict[str, dict[str, Any]]) -> Table:
     """Return a table of trials and gained hypervolume by source; useful only with a proposer."""
     table = Table(title="Attribution", title_justify="left", box=None, pad_edge=False)
     table.add_column("source")
     for name in ("trials", "on the front", "hypervolume gained"):
         table.add_column(name, justify="right", no_wrap=True)
-    for source, share in credit.items():
+    for source, share in attribution.items():
         gained = f"{share['hypervolume_gained']:.3f}"
         table.add_row(source, str(share["trials"]), str(share["front"]), gained)
     return table

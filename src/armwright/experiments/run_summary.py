@@ -11,7 +11,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.pareto import hypervolume
-from armwright.runs.attribution import credit_by_source
+from armwright.runs.attribution import attribution_by_source
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import read_config, read_run
 from armwright.runs.history import History
@@ -58,10 +58,13 @@ class RunSummary:
     def gained(self) -> Mapping[str, float]:
         """Share of the final hypervolume that each source's trials added when they were evaluated."""
         if self._has_own_reference_point:
-            gained = {source: credit["hypervolume_gained"] or 0.0 for source, credit in self.summary["credit"].items()}
+            gained = {
+                source: attribution["hypervolume_gained"] or 0.0
+                for source, attribution in self.summary["attribution"].items()
+            }
         else:
-            credits = credit_by_source(self.history())
-            gained = {source: credit.hypervolume_gained or 0.0 for source, credit in credits.items()}
+            attributions = attribution_by_source(self.history())
+            gained = {source: attribution.hypervolume_gained or 0.0 for source, attribution in attributions.items()}
         total = sum(gained.values())
         return {source: share / total for source, share in gained.items()} if total else dict.fromkeys(gained, 0.0)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armwright.llm.answer import LONGEST_REASON
 from armwright.llm.answer_format import NOTHING, module_lists
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.miss_reasons import AT_LIMIT, why_missed
+from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
 from armwright.robot.arm import GRAVITY
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
@@ -113,7 +113,7 @@ class Feedback:
         if not self._evaluation.target_arrays.oriented:
             return ""
         arm = self._history.problem.arm(self._history.trials[number].design)
-        reasons = [why_missed(arm, self._evaluation, row, target) for target in shown]
+        reasons = [unreached_reason(arm, self._evaluation, row, target) for target in shown]
         return "; ".join(f"target {k} by {why}" for k, why in enumerate(reasons, start=1) if why) or "none"
 
 

@@ -122,7 +122,7 @@ class Evaluation:
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
 
     @property
-    def missed(self) -> NDArray[np.bool_]:
+    def unreached(self) -> NDArray[np.bool_]:
         """(N, T) whether the tip or the tool's direction is off by a target's tolerance or more."""
         target_arrays = self.target_arrays
         return (self.position_error >= target_arrays.tolerance) | (self.angle_error >= target_arrays.angle_tolerance)

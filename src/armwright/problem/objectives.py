@@ -153,7 +153,7 @@ UNREACHED_TARGETS = Objective(
     unit="targets",
     symbol="E_unreached",
     description=f"1 where the tip misses the target by {1e3 * REACHED:g} mm or more, else 0",
-    each=lambda evaluation: evaluation.missed.astype(np.float64),
+    each=lambda evaluation: evaluation.unreached.astype(np.float64),
 )
 ORIENTATION_ERROR = Objective(
     name="orientation_error",

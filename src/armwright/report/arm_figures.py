@@ -70,7 +70,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     for place, target in enumerate(shown):
         axes: Any = figure.add_subplot(rows, columns, place + 1, projection="3d")
         _draw_panel(axes, member, evaluation, 0, [target], extent)
-        missed = evaluation.missed[0, target]
+        missed = evaluation.unreached[0, target]
         verdict = f"missed by {_describe_miss(evaluation, target)}" if missed else "reached"
         axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=MISSED if missed else FRONT)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
@@ -110,7 +110,7 @@ def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: 
         goal = evaluation.targets[target]
         axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
         _draw_goal(axes, evaluation, target, ARROW * member.arm.reach)
-        if evaluation.missed[row, target]:
+        if evaluation.unreached[row, target]:
             axes.plot(*np.array([places[-1], goal]).T, color=MISSED, linewidth=1.2, linestyle=(0, (2, 2)))
     axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
 

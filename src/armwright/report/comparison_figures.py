@@ -69,7 +69,7 @@ def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[s
     for task in comparison.tasks[: MOST_SHOWN if plane else 0]:
         yield f"attainment-{task}", draw_attainment(comparison, task)
     if any(run.proposer for run in comparison.runs):
-        yield "credit", draw_credit_shares(comparison)
+        yield "attribution", draw_attribution_shares(comparison)
     yield from _details(comparison, samples)
 
 
@@ -221,7 +221,7 @@ def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
     return figure
 
 
-def draw_credit_shares(comparison: Comparison) -> Figure:
+def draw_attribution_shares(comparison: Comparison) -> Figure:
     """Draw each source's share of the final hypervolume per method, averaged over the runs."""
     pairs = [
         (task, method)

@@ -25,7 +25,7 @@ from armwright.report.style import (
     look,
 )
 from armwright.runs.attribution import front_by_source, gained_by_source
-from armwright.runs.best_known import standing
+from armwright.runs.best_known import front_gap
 from armwright.runs.config import FrontMethod, ObjectiveRecord, RunConfig
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
@@ -55,7 +55,7 @@ def _figures(history: History, existing: Sequence[ComparedArm]) -> Iterator[tupl
     yield "hypervolume", draw_hypervolume(history)
     if plane:
         yield "samples", draw_samples(history)
-    yield "credit", draw_credit(history)
+    yield "attribution", draw_attribution(history)
     if plane:
         yield "front", draw_front(history, existing)
     yield from _arm_figures(history)
@@ -173,7 +173,7 @@ def draw_samples(history: History) -> Figure:
     return figure
 
 
-def draw_credit(history: History) -> Figure:
+def draw_attribution(history: History) -> Figure:
     """Draw hypervolume gained and designs on the front over the counted trials, stacked by source."""
     figure = several_panels(8.4, 3.4)
     volume, members = figure.subplots(1, 2)
@@ -303,7 +303,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], faint: boo
 
 def _best_known(axes: Any, history: History) -> None:
     """Draw a line at the best known hypervolume of the task, if one is known."""
-    found = standing(history.problem, history.masked_objectives, _reference(history))
+    found = front_gap(history.problem, history.masked_objectives, _reference(history))
     if found is not None:
         label = f"best known ({found.hypervolume:.2f})"
         axes.axhline(found.hypervolume, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label=label)

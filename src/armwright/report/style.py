@@ -32,7 +32,7 @@ _LOOKS = {
     INITIAL_DESIGN: Look("initial design", "#111111", "P", 36),
     BBO: Look("black box", "#0072B2", "o", 20),
     "refine": Look("refine", "#009E73", "D", 28, "...."),
-    "front": Look("front search", "#0072B2", "o", 14),
+    "front_search": Look("front search", "#0072B2", "o", 14),
     "rules": Look("rules", "#D55E00", "^", 44, "////"),
     "llm": Look("language model", "#CC79A7", "^", 44, "\\\\\\\\"),
     "scripted": Look("scripted stand-in", "#CC79A7", "v", 44, "\\\\\\\\"),

@@ -115,14 +115,14 @@ def _flat(name: str, value: Interval | None) -> dict[str, float | None]:
 
 
 def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:
-    habits = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats")
+    biases = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats")
     each: list[dict[str, Any]] = []
     for run in runs:
         summary, name = run.summary, run.proposer["name"]
-        credit = summary["credit"].get(name, {"trials": 0, "front": 0})
+        attribution = summary["attribution"].get(name, {"trials": 0, "front": 0})
         found: dict[str, Any] = {
-            "proposals": credit["trials"],
-            "front_share": credit["front"] / max(1, summary["front_size"]),
+            "proposals": attribution["trials"],
+            "front_share": attribution["front"] / max(1, summary["front_size"]),
             "gained_share": run.gained.get(name, 0.0),
             "calls": run.proposer["calls"],
             "failures": sum(run.proposer["failures"].values()),
@@ -130,8 +130,8 @@ def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:
             "cost_usd": run.proposer["cost_usd"],
         }
         for prefix, who in (("", "proposer"), ("black_box_", "black_box")):
-            habit: dict[str, Any] = summary["diagnostics"][who] or {}
-            found |= {f"{prefix}{key}": habit.get(key) for key in habits}
+            bias: dict[str, Any] = summary["proposer_bias"][who] or {}
+            found |= {f"{prefix}{key}": bias.get(key) for key in biases}
         each.append(found)
     return {"runs": len(runs)} | {key: _mean([found[key] for found in each]) for key in each[0]}
 

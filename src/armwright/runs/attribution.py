@@ -11,7 +11,7 @@ from armwright.runs.history import History
 
 
 @dataclass(frozen=True)
-class Credit:
+class Attribution:
     """What the trials of one source brought.
 
     trials: how many there are. front: how many of them are on the final front.
@@ -23,14 +23,14 @@ class Credit:
     hypervolume_gained: float | None
 
 
-def credit_by_source(history: History) -> dict[str, Credit]:
-    """The credit of each source, in the order in which they first occur."""
+def attribution_by_source(history: History) -> dict[str, Attribution]:
+    """The attribution of each source, in the order in which they first occur."""
     gains, on_front = hypervolume_gains(history), front_mask(history.masked_objectives)
-    credit: dict[str, Credit] = {}
+    attribution: dict[str, Attribution] = {}
     for source, mine in masks_by_source(history).items():
         gained = None if gains is None else float(gains[mine].sum())
-        credit[source] = Credit(int(mine.sum()), int(on_front[mine].sum()), gained)
-    return credit
+        attribution[source] = Attribution(int(mine.sum()), int(on_front[mine].sum()), gained)
+    return attribution
 
 
 def hypervolume_gains(history: History) -> Array | None:

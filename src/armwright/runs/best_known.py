@@ -32,7 +32,7 @@ class KnownFront:
 
 
 @dataclass(frozen=True)
-class Standing:
+class FrontGap:
     """A front beside the best known one, both bounded by the same reference point.
 
     hypervolume: of the best known front.
@@ -74,7 +74,7 @@ def best_known_hypervolume(task: Task) -> float | None:
     return hypervolume(known.values, task.reference_point)
 
 
-def standing(problem: Problem, values: Array, reference_point: Sequence[float]) -> Standing | None:
+def front_gap(problem: Problem, values: Array, reference_point: Sequence[float]) -> FrontGap | None:
     """Where the front of `values` (N, M) stands; None where no front is known, or none of it within the box."""
     known = known_front(problem)
     if known is None:
@@ -88,7 +88,7 @@ def standing(problem: Problem, values: Array, reference_point: Sequence[float]) 
     gain = hypervolume(together, reference_point) / best - 1.0
     if gain < BEYOND:
         beyond, gain = 0, 0.0
-    return Standing(best, hypervolume(inside, reference_point) / best, beyond, gain)
+    return FrontGap(best, hypervolume(inside, reference_point) / best, beyond, gain)
 
 
 @cache

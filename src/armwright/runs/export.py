@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.files import to_csv
-from armwright.problem.miss_reasons import why_missed
+from armwright.problem.unreached_reason import unreached_reason
 from armwright.robot.build_sheet import SheetRow, sheet_markdown, sheet_rows
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.ros2_control import to_ros2_control
@@ -53,8 +53,8 @@ def _sheet(history: History, member: FrontMember) -> str:
     evaluation = history.evaluation([member.number])
     angle = f" and {np.degrees(evaluation.angle_error.max()):.2f}°" if evaluation.target_arrays.oriented else ""
     notes.append(f"Targets are missed by {1e3 * evaluation.position_error.max():.2f} mm{angle} at most.")
-    for target in np.flatnonzero(evaluation.missed[0]):
-        notes.append(f"Target {target + 1} is missed by {why_missed(member.arm, evaluation, 0, int(target))}.")
+    for target in np.flatnonzero(evaluation.unreached[0]):
+        notes.append(f"Target {target + 1} is missed by {unreached_reason(member.arm, evaluation, 0, int(target))}.")
     return sheet_markdown(_name(history, member), member.arm, _rows(history, member), notes)
 
 

@@ -29,8 +29,8 @@ RANDOM = "random"
 BBO = "bbo"
 INITIAL_DESIGN = "initial_design"  # given by the user, such as an existing arm
 REFINE = "refine"  # a refined design of the front
-FRONT = "front"  # of a search for the whole front
-NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, REFINE, FRONT)
+FRONT_SEARCH = "front_search"
+NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, REFINE, FRONT_SEARCH)
 GROWING = (
     "values",
     "violations",

@@ -19,7 +19,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Habits:
+class SourceBias:
     """Shares of the designs of one source, 0 to 1.
 
     designs: how many there are.
@@ -52,30 +52,30 @@ class FrontShare:
 
 
 @dataclass(frozen=True)
-class Diagnostics:
+class ProposerBias:
     """A proposer's designs beside the black box's; None where there are none of them.
 
     symmetry_planes: the number of the targets' symmetry planes.
     """
 
     symmetry_planes: int
-    proposer: Habits | None
-    black_box: Habits | None
+    proposer: SourceBias | None
+    black_box: SourceBias | None
     front_share: FrontShare | None
 
 
-def diagnose(history: History, proposer: str) -> Diagnostics:
-    """The habits of the trials whose source is `proposer`, and of the black box's."""
+def proposer_bias(history: History, proposer: str) -> ProposerBias:
+    """The bias of the trials whose source is `proposer`, and of the black box's."""
     planes = symmetry_planes(history.problem.task.target_positions)
-    return Diagnostics(
+    return ProposerBias(
         symmetry_planes=len(planes),
-        proposer=habits(history, proposer, planes),
-        black_box=habits(history, BBO, planes),
+        proposer=source_bias(history, proposer, planes),
+        black_box=source_bias(history, BBO, planes),
         front_share=front_share(history, proposer),
     )
 
 
-def habits(history: History, source: str, planes: Array) -> Habits | None:
+def source_bias(history: History, source: str, planes: Array) -> SourceBias | None:
     """Of the source's designs; None where there are none.
 
     planes: (P, 3) the normals of the targets' symmetry planes.
@@ -87,7 +87,7 @@ def habits(history: History, source: str, planes: Array) -> Habits | None:
     designs = [trial.design for trial in history if trial.source == source]
     on_plane = [distance_to_planes(np.array(design.origin), points, planes) <= TOLERANCE for design in designs]
     repeats, near_repeats = repeated(history)
-    return Habits(
+    return SourceBias(
         designs=len(designs),
         lengths_5_cm=_share([are_round(design.links, 0.05) for design in designs]),
         lengths_1_cm=_share([are_round(design.links, 0.01) for design in designs]),

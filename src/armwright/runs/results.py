@@ -20,14 +20,14 @@ from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.files import replace_folder, to_csv
 from armwright.pareto import hypervolume, total_violation
-from armwright.problem.miss_reasons import why_missed
+from armwright.problem.unreached_reason import unreached_reason
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.attribution import credit_by_source
-from armwright.runs.best_known import standing
+from armwright.runs.attribution import attribution_by_source
+from armwright.runs.best_known import front_gap
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import FrontMember, History
-from armwright.runs.proposer_bias import diagnose
+from armwright.runs.proposer_bias import proposer_bias
 from armwright.runs.summary import ProposerSummary, checked_summary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify_front
@@ -121,15 +121,15 @@ def summarize(
             "mean": float(counted.mean()) if len(counted) else None,
             "history": curve.tolist(),
         },
-        "best_known": _standing_record(history, history.masked_objectives),
+        "best_known": _front_gap_record(history, history.masked_objectives),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         "evaluations": sum(trial.evaluations for trial in history),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         "refine": None,
-        "credit": {source: asdict(credit) for source, credit in credit_by_source(history).items()},
+        "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
-        "diagnostics": None if proposer is None else asdict(diagnose(history, proposer.name)),
+        "proposer_bias": None if proposer is None else asdict(proposer_bias(history, proposer.name)),
         "seconds": {part: round(seconds[part], 6) for part in PARTS},
         "versions": dict(config.versions),
     }
@@ -151,7 +151,7 @@ def summarize_front(
         "by_source": dict(Counter(trial.source for trial in history)),
         **_feasibility_record(history),
         "hypervolume": {"reference_point": list(reference), "final": hypervolume(found, reference)},
-        "best_known": _standing_record(history, found),
+        "best_known": _front_gap_record(history, found),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         "search": dict(search),
@@ -165,7 +165,7 @@ def resummarize(
     """The summary of a finished run after trials were added or designs verified; what only its sessions knew stays."""
     if isinstance(config.method, FrontMethod):
         return {**summary, "verification": _verification_record(history, verification)}
-    known = {key: summary[key] for key in ("proposer", "diagnostics", "refine") if key in summary}
+    known = {key: summary[key] for key in ("proposer", "proposer_bias", "refine") if key in summary}
     new = summarize(history, config, None, verification) | known
     if new["refine"] is not None:
         new["evaluations"] += new["refine"]["in_vain"]
@@ -209,18 +209,18 @@ def _feasibility_record(history: History) -> dict[str, Any]:
     return {
         "feasibility": {
             "infeasible": int((~history.feasible).sum()),
-            "broken_by": {c.words: n for c, n in zip(constraints, breaking, strict=True)},
+            "violated_by": {c.words: n for c, n in zip(constraints, breaking, strict=True)},
             "nearest": nearest,
         }
     }
 
 
-def _standing_record(history: History, found: Array) -> dict[str, Any] | None:
+def _front_gap_record(history: History, found: Array) -> dict[str, Any] | None:
     """How a front compares with the best known one, where there is one."""
     if history.reference_point is None:
         return None
-    stands = standing(history.problem, found, history.reference_point)
-    return None if stands is None else asdict(stands)
+    gap = front_gap(history.problem, found, history.reference_point)
+    return None if gap is None else asdict(gap)
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
@@ -346,7 +346,7 @@ def _design_records(history: History, members: Sequence[FrontMember]) -> Iterabl
                         if evaluation.target_arrays.n_angular[t]
                         else {}
                     ),
-                    "missed": why_missed(member.arm, evaluation, row, t) or None,
+                    "unreached_reason": unreached_reason(member.arm, evaluation, row, t) or None,
                     "joint_torques": evaluation.joint_torques[row, t, : len(member.arm.joints)].tolist(),
                 }
                 for t in range(len(evaluation.targets))

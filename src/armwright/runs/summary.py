@@ -39,7 +39,7 @@ class _Verification(_Record):
     hypervolume_worst_case: float
 
 
-class _Credit(_Record):
+class _Attribution(_Record):
     trials: Count
     front: Count
     hypervolume_gained: float | None
@@ -73,15 +73,15 @@ class _Proposer(_Record):
     overlap: _Overlap | None
 
 
-class _Habits(_Record):
+class _SourceBias(_Record):
     lengths_5_cm: float
     base_on_symmetry_plane: float | None
     near_repeats: float
 
 
-class _Diagnostics(_Record):
-    proposer: _Habits | None
-    black_box: _Habits | None
+class _ProposerBias(_Record):
+    proposer: _SourceBias | None
+    black_box: _SourceBias | None
 
 
 class _Refinement(_Record):
@@ -122,9 +122,9 @@ class StudySummary(_Summary):
     evaluations: Count
     duplicates: Count
     refine: _Refinement | None
-    credit: dict[str, _Credit]
+    attribution: dict[str, _Attribution]
     proposer: _Proposer | None
-    diagnostics: _Diagnostics | None
+    proposer_bias: _ProposerBias | None
     seconds: _Seconds
 
 

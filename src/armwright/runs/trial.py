@@ -31,7 +31,7 @@ class FinishedTrial:
 
     Attributes:
         number: of the trial in its run, from 0.
-        source: `random`, `initial_design`, `bbo`, `refine`, `front`, or the name of the proposer.
+        source: `random`, `initial_design`, `bbo`, `refine`, `front_search`, or the name of the proposer.
         design: what was evaluated.
         values: the objectives.
         proposal: the proposal's id, if a proposer made the design.

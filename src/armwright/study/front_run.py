@@ -25,7 +25,7 @@ from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import FrontMethod, RunConfig, record_objectives, versions
 from armwright.runs.folder import PROPOSALS, SEARCH, RunFolder, read_run
-from armwright.runs.history import FRONT, FrontMember, History, found_reference_point
+from armwright.runs.history import FRONT_SEARCH, FrontMember, History, found_reference_point
 from armwright.runs.results import discard_results, read_summary, results_are_there, summarize_front, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
@@ -246,7 +246,7 @@ class _Search:
             values, broken = outcomes.values, outcomes.violations
         trials = [
             FinishedTrial(
-                number, FRONT, design, tuple(values[number].tolist()), violations=tuple(broken[number].tolist())
+                number, FRONT_SEARCH, design, tuple(values[number].tolist()), violations=tuple(broken[number].tolist())
             )
             for number, design in enumerate(designs)
         ]

@@ -11,9 +11,9 @@ from armwright.robot.arm import Arm
 AT_LIMIT = 1e-3  # [rad] or [m] from a limit, from which a joint counts as standing at it
 
 
-def why_missed(arm: Arm, evaluation: Evaluation, row: int, target: int) -> str:
+def unreached_reason(arm: Arm, evaluation: Evaluation, row: int, target: int) -> str:
     """By how much and why; empty where the target is reached."""
-    if not evaluation.missed[row, target]:
+    if not evaluation.unreached[row, target]:
         return ""
     by = miss_words(evaluation, row, target)
     beyond = float(np.linalg.norm(evaluation.targets[target] - np.array(arm.base))) - arm.reach
