@@ -8,8 +8,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from armwright.experiments.cells import plan_cells
 from armwright.experiments.outcome import collect, published
-from armwright.experiments.plan import cells_of, load_experiment, with_only, with_seeds
+from armwright.experiments.plan import load_experiment, with_only, with_seeds
 from armwright.experiments.runner import run_cells
 from armwright.report.tables import markdown
 from armwright.study.cluster import Workers
@@ -35,7 +36,7 @@ def run(seeds: int, n_workers: int) -> tuple[float, str]:
     plan, beside = load_experiment("paper")
     plan = with_seeds(with_only(plan, ["bbo", "rules"], []), seeds)
     with tempfile.TemporaryDirectory() as out:
-        cells, _ = cells_of(plan, beside, Path(out))
+        cells, _ = plan_cells(plan, beside, Path(out))
         started = time.perf_counter()
         faults = [outcome.fault for outcome in run_cells(cells, Workers(n_workers), print) if outcome.fault]
         seconds = time.perf_counter() - started

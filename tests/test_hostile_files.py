@@ -17,7 +17,8 @@ from armwright.exceptions import (
     SpaceError,
     TaskError,
 )
-from armwright.experiments.plan import cells_of, load_experiment
+from armwright.experiments.cells import plan_cells
+from armwright.experiments.plan import load_experiment
 from armwright.llm.prompt import load_prompt
 from armwright.llm.transcript import Transcript
 from armwright.report.page import write_report
@@ -97,14 +98,14 @@ def test_experiment_with_too_many_cells_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text("name: x\ntasks: all\nseeds: 10000\nmethods: {a: {label: A}}\n")
     with pytest.raises(SettingsError, match="310,000 cells"):
-        cells_of(*load_experiment(str(file)), tmp_path)
+        plan_cells(*load_experiment(str(file)), tmp_path)
 
 
 def test_experiment_with_line_breaks_in_its_commands_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text('name: x\ntasks: [target-1]\nseeds: 1\nmethods: {a: {label: A, proposer: llm, prompt: "a\\n"}}\n')
-    with pytest.raises(SettingsError, match="can stand on no line") as refusal:
-        cells_of(*load_experiment(str(file)), tmp_path)
+    with pytest.raises(SettingsError, match="is not printable") as refusal:
+        plan_cells(*load_experiment(str(file)), tmp_path)
     assert str(refusal.value).isprintable()
 
 

@@ -20,7 +20,8 @@ import yaml
 
 import armwright as aw
 from armwright.cli.app import app
-from armwright.experiments.plan import ExperimentPlan, cells_of, load_experiment
+from armwright.experiments.cells import plan_cells
+from armwright.experiments.plan import ExperimentPlan, load_experiment
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests import ROOT
@@ -260,7 +261,7 @@ def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
     if "methods" in content:
         file.write_text(block.text)
         plan, beside = load_experiment("shown.yaml")
-        cells, skipped = cells_of(plan, beside, in_folder / "out")
+        cells, skipped = plan_cells(plan, beside, in_folder / "out")
         assert len(cells) + len(skipped) == len(plan.methods) * len(plan.task_list) * len(plan.seed_list)
     elif content.keys() & (Task.model_fields.keys() - DesignSpace.model_fields.keys()):
         named = "" if "name" in content else "name: shown\n"  # a part of a file

@@ -1,4 +1,4 @@
-"""Runs side by side: the numbers of the paper's table, and what cannot be compared."""
+"""Comparisons of runs: statistics, tables, figures, and runs that cannot be compared."""
 
 import csv
 import json
@@ -56,13 +56,13 @@ def comparison(runs: Path) -> Comparison:
 
 
 def changed(folder: Path, change: Callable[[dict], None]) -> None:
-    """Changes a run's summary, as another run would have left it."""
+    """Change a run's summary."""
     summary = json.loads((folder / "summary.json").read_text())
     change(summary)
     (folder / "summary.json").write_text(json.dumps(summary))
 
 
-def test_the_numbers_of_the_table_are_those_of_the_histories(runs: Path, comparison: Comparison) -> None:
+def test_table_values_match_the_hypervolume_histories(runs: Path, comparison: Comparison) -> None:
     assert comparison.rows
     for row in comparison.rows:
         proposer = "none" if row.method.startswith("BBO (") else "rules"
@@ -77,14 +77,14 @@ def test_the_numbers_of_the_table_are_those_of_the_histories(runs: Path, compari
     assert len(comparison.rows) == 4
 
 
-def test_shares_are_given_where_a_front_is_known(comparison: Comparison) -> None:
+def test_share_of_best_known_needs_a_known_front(comparison: Comparison) -> None:
     shares = {row.task: row.share for row in comparison.rows}
     assert shares["random-4"] is None
     assert shares["target-1"] is not None
     assert 0.0 < shares["target-1"].mean < 1.0
 
 
-def test_contrasts_pair_the_seeds(comparison: Comparison) -> None:
+def test_contrasts_pair_runs_by_seed(comparison: Comparison) -> None:
     assert comparison.contrasts
     for contrast in comparison.contrasts:
         ours, theirs = (
@@ -96,7 +96,7 @@ def test_contrasts_pair_the_seeds(comparison: Comparison) -> None:
     assert comparison.is_undecidable
 
 
-def test_over_all_tasks_each_counts_once(runs: Path) -> None:
+def test_overall_contrast_counts_every_task_once(runs: Path) -> None:
     records = [read_run_summary(folder) for folder in find_runs([runs]) if "target-1" in folder.name]
     gains = [0.9, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
 
@@ -120,7 +120,7 @@ def test_over_all_tasks_each_counts_once(runs: Path) -> None:
     assert compare_summaries(five).overall == []
 
 
-def test_times_say_how_many_got_there(comparison: Comparison) -> None:
+def test_times_count_the_runs_that_reached_the_target(comparison: Comparison) -> None:
     assert comparison.times
     for time in comparison.times:
         curves = comparison.curves(time.method, time.task)
@@ -129,7 +129,7 @@ def test_times_say_how_many_got_there(comparison: Comparison) -> None:
         assert (time.median is None) == (time.reached < 2)
 
 
-def test_a_flagged_run_stands_for_nothing(runs: Path, tmp_path: Path) -> None:
+def test_flagged_runs_are_excluded(runs: Path, tmp_path: Path) -> None:
     place = shutil.copytree(runs, tmp_path / "runs")
     changed(place / "target-1-rules-1", lambda s: s["proposer"].update(flagged=True, fallback_share=0.5))
     found = compare_summaries([read_run_summary(folder) for folder in find_runs([place])])
@@ -138,7 +138,7 @@ def test_a_flagged_run_stands_for_nothing(runs: Path, tmp_path: Path) -> None:
     assert "excluded, because 50% of its proposals failed" in markdown(found, "x")
 
 
-def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> None:
+def test_scripted_runs_are_marked_in_tables(runs: Path, tmp_path: Path) -> None:
     place = shutil.copytree(runs, tmp_path / "runs")
     for seed in SEEDS:
         changed(place / f"target-1-rules-{seed}", lambda s: s["proposer"].update(origin="scripted", model="gpt-x"))
@@ -149,7 +149,7 @@ def test_a_stand_in_is_never_shown_as_a_model(runs: Path, tmp_path: Path) -> Non
         assert "a scripted stand-in answered instead of a language model" in text
 
 
-def test_what_cannot_be_compared_is_refused(runs: Path, tmp_path: Path) -> None:
+def test_incomparable_runs_are_refused(runs: Path, tmp_path: Path) -> None:
     record = read_run_summary(runs / "target-1-none-0")
     for words, task, settings in (
         ("targets differ", Task(name="target-1", targets=((0.3, 0.0, 0.2),), reference_point=(5.0, 5.0)), {}),
@@ -171,7 +171,7 @@ def test_what_cannot_be_compared_is_refused(runs: Path, tmp_path: Path) -> None:
         compare_summaries([])
 
 
-def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest(tmp_path: Path) -> None:
+def test_runs_with_different_reference_points_share_their_maximum(tmp_path: Path) -> None:
     task = Task(name="mine", targets=load_task("shelf").targets)
     stated = task.model_copy(update={"reference_point": (0.5, 9.0)})
     for seed in SEEDS:
@@ -200,7 +200,7 @@ def test_runs_with_reference_points_of_their_own_are_compared_within_the_largest
     assert f"{shared[0]:.4g}, {shared[1]:.4g}" in text
 
 
-def test_searches_for_the_whole_front_stand_beside_studies(runs: Path, tmp_path: Path) -> None:
+def test_front_search_is_compared_with_studies(runs: Path, tmp_path: Path) -> None:
     find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
     found = compare_summaries([read_run_summary(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     row = next(row for row in found.rows if row.method == "front search")
@@ -209,7 +209,7 @@ def test_searches_for_the_whole_front_stand_beside_studies(runs: Path, tmp_path:
     assert "front search" in markdown(found, "x")
 
 
-def test_the_tables_hold_the_same_numbers(comparison: Comparison, tmp_path: Path) -> None:
+def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: Path) -> None:
     published = {("BBO (12 trials)", "target-1"): (6.7, 2.03)}
     files = write_tables(tmp_path, comparison, "All", published, "The Paper", ["one cell is missing"])
     assert {path.name for path in files} >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "time-to.csv"}
@@ -232,7 +232,7 @@ def test_the_tables_hold_the_same_numbers(comparison: Comparison, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) -> None:
+def test_all_comparison_figures_are_written(comparison: Comparison, tmp_path: Path) -> None:
     names = {path.stem for path in write_comparison_figures(tmp_path, comparison, samples=["BBO/rules (12 trials)"])}
     assert names >= {
         "targets", "area", "hypervolume-methods", "time-to", "attainment-target-1", "attainment-random-4",
@@ -245,7 +245,7 @@ def test_every_figure_of_a_comparison(comparison: Comparison, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_figures_show_a_front_search_beside_a_study(runs: Path, tmp_path: Path) -> None:
+def test_comparison_figures_include_a_front_search(runs: Path, tmp_path: Path) -> None:
     find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
     found = compare_summaries([read_run_summary(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}
@@ -253,7 +253,7 @@ def test_figures_show_a_front_search_beside_a_study(runs: Path, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_server: ChatServer) -> None:
+def test_reasons_with_markup_are_drawn_as_plain_text(tmp_path: Path, chat_server: ChatServer) -> None:
     words = "Step 1: $\\alpha_{x \x1b[31m and _no_ markup\n" + "reason " * 3000
     problem = Problem(load_task("target-1"))
     known = known_front(problem)
@@ -266,7 +266,7 @@ def test_the_words_of_a_proposal_are_shown_as_they_are(tmp_path: Path, chat_serv
     assert "reasoning-target-1" in names
 
 
-def test_the_commands(runs: Path, tmp_path: Path) -> None:
+def test_compare_and_runs_commands(runs: Path, tmp_path: Path) -> None:
     runner = CliRunner()
     result = runner.invoke(app, ["compare", str(runs), "--out", str(tmp_path / "out"), "--no-figures"])
     assert result.exit_code == 0, result.output
@@ -278,7 +278,7 @@ def test_the_commands(runs: Path, tmp_path: Path) -> None:
     assert "random-4" in runner.invoke(app, ["runs", str(runs)]).output
 
 
-def test_runs_that_are_not_whole_are_listed_as_they_are(runs: Path, tmp_path: Path) -> None:
+def test_unfinished_and_damaged_runs_are_listed(runs: Path, tmp_path: Path) -> None:
     half = shutil.copytree(runs / "target-1-none-0", tmp_path / "a" / "half")
     (half / "summary.json").unlink()
     (half / "trials.jsonl").write_bytes(b"\n".join((half / "trials.jsonl").read_bytes().split(b"\n")[:7]) + b"\n")

@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import FailureError, SettingsError, TaskError
+from armwright.experiments.cells import plan_cells
 from armwright.experiments.outcome import collect, published
 from armwright.experiments.plan import (
     ExperimentPlan,
     builtin_experiments,
     builtin_text,
-    cells_of,
     load_experiment,
     with_model,
     with_only,
@@ -68,7 +68,7 @@ def run_here(file: Path, *options: str) -> Any:
     return invoke("experiment", file, "--workers", "0", "--no-figures", *options)
 
 
-def test_the_paper_s_experiment_is_the_paper_s() -> None:
+def test_paper_experiment_matches_the_paper() -> None:
     plan = builtin_experiments()["paper"]
     assert plan.task_list == ("target-1", "target-2", "target-3")
     assert plan.seed_list == (0, 1, 2, 3, 4)
@@ -83,7 +83,7 @@ def test_the_paper_s_experiment_is_the_paper_s() -> None:
     assert table["BBO/LLM+", "target-3"] == (16.29, 1.53)
 
 
-def test_the_built_in_experiments_can_be_edited(tmp_path: Path) -> None:
+def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> None:
     for name, plan in builtin_experiments().items():
         file = tmp_path / f"{name}.yaml"
         file.write_text(builtin_text(name))
@@ -98,7 +98,7 @@ def test_the_built_in_experiments_can_be_edited(tmp_path: Path) -> None:
         ({"methods": {"bbo": {"label": "BBO", "propser": "none"}}}, "propser"),
         ({"methods": {"bbo": {"label": "BBO", "proposer": "ruls"}}}, 'Did you mean "rules"'),
         ({"baseline": "bob"}, 'Did you mean "bbo"'),
-        ({"samples": ["x"]}, 'samples names "x"'),
+        ({"samples": ["x"]}, 'samples names the unknown method "x"'),
         ({"seeds": []}, "seeds"),
         ({"seeds": [1, 1]}, "each once"),
         ({"tasks": []}, "tasks is empty"),
@@ -108,29 +108,29 @@ def test_the_built_in_experiments_can_be_edited(tmp_path: Path) -> None:
         ({"n_total": 0}, "n_total"),
     ],
 )
-def test_a_mistake_in_the_file_is_named(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+def test_mistakes_in_experiment_files_are_reported(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         load_experiment(str(file_of(tmp_path, **changes)))
 
 
-def test_unknown_names_are_refused(tmp_path: Path) -> None:
+def test_unknown_experiments_methods_and_tasks_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match='Did you mean "paper"'):
         load_experiment("papr")
     with pytest.raises(SettingsError, match=r'has no method "rulez"\. Did you mean "rules"'):
         with_only(plan_of(), ["rulez"], [])
     with pytest.raises(TaskError, match="unknown task"):
-        cells_of(plan_of(tasks=["targt-1"]), tmp_path, tmp_path)
+        plan_cells(plan_of(tasks=["targt-1"]), tmp_path, tmp_path)
     with pytest.raises(TaskError, match="there is no file"):
-        cells_of(plan_of(tasks=["mine.yaml"]), tmp_path, tmp_path)
-    with pytest.raises(SettingsError, match="--seeds 0"):
+        plan_cells(plan_of(tasks=["mine.yaml"]), tmp_path, tmp_path)
+    with pytest.raises(SettingsError, match="--seeds: expected a whole number from 1 to 10000, got 0"):
         with_seeds(plan_of(), 0)
 
 
-def test_files_are_found_beside_the_experiment(tmp_path: Path) -> None:
+def test_task_and_space_files_next_to_the_experiment_are_found(tmp_path: Path) -> None:
     (tmp_path / "shelf.yaml").write_text("name: shelf\ntargets: [[0.4, 0.0, 0.2]]\nreference_point: [1.0, 1.0]\n")
     (tmp_path / "three.yaml").write_text("joints: 3\n")
     plan = plan_of(tasks=["shelf.yaml"], space="three.yaml")
-    cells, _ = cells_of(plan, tmp_path, tmp_path / "out")
+    cells, _ = plan_cells(plan, tmp_path, tmp_path / "out")
     assert {cell.task_name for cell in cells} == {"shelf"}
     assert all(Path(cell.task).is_absolute() and Path(str(cell.space)).is_absolute() for cell in cells)
     outcome = run_cell(cells[0])
@@ -138,20 +138,20 @@ def test_files_are_found_beside_the_experiment(tmp_path: Path) -> None:
     assert len(json.loads((cells[0].folder / "trials.jsonl").read_text().splitlines()[0])["params"]) == 9
 
 
-def test_cells_without_a_model_are_skipped_and_said_so(tmp_path: Path) -> None:
+def test_cells_without_a_model_are_skipped_with_a_reason(tmp_path: Path) -> None:
     methods = {**SMALL["methods"], "llm": {"label": "BBO/LLM", "proposer": "llm"}}
-    cells, skipped = cells_of(plan_of(methods=methods), tmp_path, tmp_path)
+    cells, skipped = plan_cells(plan_of(methods=methods), tmp_path, tmp_path)
     assert {one.cell.method for one in skipped} == {"llm"}
     assert len(skipped) == 4
     assert "no language model is configured" in skipped[0].reason
     assert {cell.method for cell in cells} == {"bbo", "rules"}
-    cells, skipped = cells_of(with_model(plan_of(methods=methods), ModelOptions(model="gpt-x")), tmp_path, tmp_path)
+    cells, skipped = plan_cells(with_model(plan_of(methods=methods), ModelOptions(model="gpt-x")), tmp_path, tmp_path)
     assert not skipped
     assert {cell.plan.model_options.model for cell in cells if cell.method == "llm"} == {"gpt-x"}
 
 
 @pytest.mark.slow
-def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
+def test_experiment_command_runs_resumes_and_writes_tables(in_folder: Path) -> None:
     file = file_of(in_folder)
     result = invoke("experiment", file, "--workers", "2", "--no-figures")
     assert result.exit_code == 0, result.output
@@ -173,7 +173,7 @@ def test_an_experiment_from_its_file_to_its_tables(in_folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_changed_file_is_not_taken_for_the_run_that_lies_there(in_folder: Path) -> None:
+def test_changed_method_does_not_reuse_an_existing_run(in_folder: Path) -> None:
     assert run_here(file_of(in_folder, seeds=1, tasks=["random-3"])).exit_code == 0
     methods = {**SMALL["methods"], "rules": {**SMALL["methods"]["rules"], "n_step": 2}}
     result = run_here(file_of(in_folder, seeds=1, tasks=["random-3"], methods=methods))
@@ -183,7 +183,7 @@ def test_a_changed_file_is_not_taken_for_the_run_that_lies_there(in_folder: Path
 
 
 @pytest.mark.slow
-def test_a_failing_cell_is_reported_and_does_not_stop_the_others(in_folder: Path) -> None:
+def test_failing_cell_is_reported_and_others_continue(in_folder: Path) -> None:
     blocked = in_folder / "experiments/small/runs/rules/target-1"
     blocked.mkdir(parents=True)
     (blocked / "seed1").write_text("a file where a folder should be")
@@ -202,11 +202,11 @@ def test_a_failing_cell_is_reported_and_does_not_stop_the_others(in_folder: Path
 
 
 @pytest.mark.slow
-def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
+def test_printed_commands_make_the_same_runs(in_folder: Path) -> None:
     methods = {
         "bbo": {"label": "BBO", "sampler": "nsga2"},
         "rules": {"label": "BBO/rules", "proposer": "rules", "n_step": 3, "refine_every": 3},
-        "front": {"label": "front", "front": "1500"},
+        "front": {"label": "front", "design": "1500"},
     }
     file = file_of(in_folder, methods=methods, tasks=["random-3"], seeds=[7], robust=True)
     printed = invoke("experiment", file, "--print-commands")
@@ -220,12 +220,12 @@ def test_the_printed_commands_make_the_same_runs(in_folder: Path) -> None:
     assert "3 cells: 1 to run one after another, " in result.output
     assert "2 finished before" in result.output
     plan, beside = load_experiment(str(file))
-    cells, _ = cells_of(plan, beside, in_folder / "experiments" / "small")
+    cells, _ = plan_cells(plan, beside, in_folder / "experiments" / "small")
     assert all(run_cell(cell).resumed for cell in cells)
 
 
 @pytest.mark.slow
-def test_a_recorded_experiment_is_played_again_without_a_model(in_folder: Path, chat_server: ChatServer) -> None:
+def test_recorded_experiment_replays_without_a_model(in_folder: Path, chat_server: ChatServer) -> None:
     settings: dict[str, Any] = {"tasks": ["random-3"], "methods": {"llm": asking(chat_server)}}
     file = file_of(in_folder, **settings)
     first = run_here(file, "--out", "first")
@@ -236,14 +236,14 @@ def test_a_recorded_experiment_is_played_again_without_a_model(in_folder: Path, 
     again = run_here(file, "--out", "again", "--replay", "first", "--seeds", "3")
     assert again.exit_code == 0, again.output
     assert not chat_server.requests
-    assert "skipped: BBO/LLM+, 1 cell: first holds no record of it" in again.output
+    assert "skipped: BBO/LLM+, 1 cell: first has no recorded run of it" in again.output
     for seed in range(2):
         runs = [in_folder / place / f"runs/llm/random-3/seed{seed}/trials.jsonl" for place in ("first", "again")]
         one, other = ([json.loads(line)["params"] for line in run.read_text().splitlines()] for run in runs)
         assert one == other
 
 
-def test_nothing_finished_is_nothing_to_compare(tmp_path: Path) -> None:
-    cells, _ = cells_of(plan_of(), tmp_path, tmp_path)
+def test_collect_without_finished_cells_is_refused(tmp_path: Path) -> None:
+    cells, _ = plan_cells(plan_of(), tmp_path, tmp_path)
     with pytest.raises(FailureError, match="no cell of the experiment is finished"):
         collect(plan_of(), cells)

@@ -216,13 +216,14 @@ def run_space(data: bytes) -> None:
 
 
 def run_experiment(data: bytes) -> None:
-    from armwright.experiments.plan import MOST_CELLS, cells_of, load_experiment
+    from armwright.experiments.cells import MOST_CELLS, plan_cells
+    from armwright.experiments.plan import load_experiment
 
     out = folder() / "out"
     plan, beside = load_experiment(str(file_of(data, "experiment.yaml")))
     if 2000 < len(plan.task_list) * len(plan.seed_list) * len(plan.methods) <= MOST_CELLS:
         return
-    cells, skipped = cells_of(plan, beside, out)
+    cells, skipped = plan_cells(plan, beside, out)
     for cell in [*cells, *(one.cell for one in skipped)]:
         if not cell.folder.is_relative_to(out.resolve()) or ".." in cell.folder.parts:
             raise DefectError(f"{cell.folder} is not in {out}")

@@ -20,7 +20,8 @@ from armwright.exceptions import (
     SettingsError,
     StoppedError,
 )
-from armwright.experiments.plan import ExperimentPlan, cells_of
+from armwright.experiments.cells import plan_cells
+from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.runner import run_cell
 from armwright.llm import client as chat
 from armwright.llm.model_options import PromptOptions
@@ -259,7 +260,7 @@ def test_a_cell_that_is_stopped_has_failed_in_words(chat_server: ChatServer, tmp
     plan = ExperimentPlan.model_validate(
         {"name": "one", "tasks": ["target-1"], "seeds": 1, "n_init": 4, "n_total": 6, "methods": {"llm": method}}
     )
-    (cell,), _ = cells_of(plan, tmp_path, tmp_path / "out")
+    (cell,), _ = plan_cells(plan, tmp_path, tmp_path / "out")
 
     def answer(request: Request) -> Answer:
         if len(chat_server.requests) == 2:

@@ -15,7 +15,8 @@ import yaml
 
 import armwright as aw
 from armwright.exceptions import ClusterError, EvaluatorError, SettingsError, StoppedError
-from armwright.experiments.plan import Cell, ExperimentPlan, cells_of
+from armwright.experiments.cells import Cell, plan_cells
+from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.runner import _outcome_of, finished_before, run_cells
 from armwright.problem.objectives import Objective
 from armwright.runs.control import stop_study
@@ -385,7 +386,7 @@ def two_cells(folder: Path, n_total: int) -> tuple[ExperimentPlan, list[Cell]]:
     method = {"label": "BBO", "proposer": "none", "sampler": "random"}
     content = {"name": "two", "tasks": ["random-3"], "seeds": 2, "n_init": 4, "n_total": n_total}
     plan = ExperimentPlan.model_validate({**content, "methods": {"bbo": method}})
-    return plan, cells_of(plan, folder, folder)[0]
+    return plan, plan_cells(plan, folder, folder)[0]
 
 
 def have_begun(cells: list[Cell]) -> bool:

@@ -490,6 +490,7 @@ def experiment(
     from armwright.cli import console as view
     from armwright.experiments import outcome, plan
     from armwright.experiments import runner as running
+    from armwright.experiments.cells import plan_cells
     from armwright.llm.configuration import load_model_options
     from armwright.report.experiment import write_experiment_figures, write_experiment_tables
 
@@ -503,7 +504,7 @@ def experiment(
         load_model_options(model_options, model=model),
     )
     out = out or Path("experiments") / chosen.name
-    cells, skipped = plan.cells_of(chosen, beside, out, replay)
+    cells, skipped = plan_cells(chosen, beside, out, replay)
     before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
     finished = {done.cell for done in before}
     due = [cell for cell in cells if cell not in finished]
@@ -513,7 +514,7 @@ def experiment(
     if print_commands:
         print("\n".join(cell.command for cell in due))
         return
-    failed: list[running.Outcome] = []
+    failed: list[running.CellOutcome] = []
     try:
         outcome.write_plan(chosen, out)
         ended = running.run_cells(due, placed, words.print)

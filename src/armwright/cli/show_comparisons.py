@@ -10,9 +10,9 @@ from rich.text import Text
 
 from armwright.cli.notes import payload_note
 from armwright.cli.streams import format_point
+from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
-from armwright.experiments.plan import Cell, Skipped
-from armwright.experiments.runner import Outcome
+from armwright.experiments.runner import CellOutcome
 from armwright.extras import install_command, missing_packages
 from armwright.problem.objectives import (
     TORQUE_SCALE,
@@ -38,24 +38,25 @@ def show_plan(
         console.print(f"{len(with_model)} of them ask {models} for about {proposals:,} proposals in total")
 
 
-def notes_on_cells(skipped: Sequence[Skipped], failed: Sequence[Outcome]) -> list[str]:
+def notes_on_cells(skipped: Sequence[Skipped], failed: Sequence[CellOutcome]) -> list[str]:
     """Return a line for each method and reason of skipped cells, and one for each failure."""
     reasons = Counter((one.cell.plan.label, one.reason) for one in skipped)
     notes = [
         f"skipped: {label}, {count} {'cell' if count == 1 else 'cells'}: {reason}"
         for (label, reason), count in reasons.items()
     ]
-    return notes + [f"FAILED: {outcome.cell.words}: {outcome.fault}" for outcome in failed]
+    return notes + [f"FAILED: {outcome.cell.description}: {outcome.fault}" for outcome in failed]
 
 
-def show_outcome(console: Console, outcome: Outcome, number: int, of: int) -> None:
+def show_outcome(console: Console, outcome: CellOutcome, number: int, of: int) -> None:
     """Print the outcome of a cell."""
     if outcome.fault:
-        console.print(f"[{number}/{of}] FAILED: {outcome.cell.words}: {outcome.fault}")
+        console.print(f"[{number}/{of}] FAILED: {outcome.cell.description}: {outcome.fault}")
     else:
         assert outcome.hypervolume is not None
         console.print(
-            f"[{number}/{of}] {outcome.cell.words}: hypervolume {outcome.hypervolume:.3f}, {outcome.seconds:.1f} s"
+            f"[{number}/{of}] {outcome.cell.description}: "
+            f"hypervolume {outcome.hypervolume:.3f}, {outcome.seconds:.1f} s"
         )
     console.file.flush()
 

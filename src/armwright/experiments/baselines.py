@@ -1,6 +1,6 @@
-"""What the usual methods come to on the built-in tasks: something to compare a run with, without running it.
+"""Stored results of the usual methods on the built-in tasks, to compare a run with.
 
-Shipped in baselines.csv, made by benchmarks/baselines.py from `armwright experiment suite`.
+They are in baselines.csv, written by benchmarks/baselines.py from `armwright experiment suite`.
 """
 
 import csv
@@ -13,9 +13,10 @@ BASELINES = "baselines.csv"
 
 @dataclass(frozen=True)
 class Baseline:
-    """A method on a task: so many runs of 10 random and 200 counted trials in the paper's design space.
+    """A method on a task, with 10 random and 200 counted trials per run in the paper's design space.
 
-    e_hv, sigma_hv: as the paper's table. final: the mean hypervolume at the end. share: of the best known one.
+    runs: number of runs. e_hv, sigma_hv: as in the paper's table. final: mean hypervolume at the end.
+    share: of the best known hypervolume.
     """
 
     task: str
@@ -29,7 +30,7 @@ class Baseline:
 
 @cache
 def baselines() -> tuple[Baseline, ...]:
-    """All of them, by task and method."""
+    """Return all baselines by task and method."""
     text = (resources.files("armwright.experiments") / BASELINES).read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     return tuple(
@@ -47,5 +48,5 @@ def baselines() -> tuple[Baseline, ...]:
 
 
 def baselines_of(task: str) -> list[Baseline]:
-    """Those of one task; none for a task that is not built in."""
+    """Return the baselines of a task; empty if it is not built in."""
     return [baseline for baseline in baselines() if baseline.task == task]

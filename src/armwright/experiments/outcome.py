@@ -1,4 +1,4 @@
-"""What an experiment came to: its finished cells, side by side."""
+"""Collect the finished cells of an experiment, and store its plan."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,17 +6,18 @@ from pathlib import Path
 import yaml
 
 from armwright.exceptions import FailureError, RunFolderError
+from armwright.experiments.cells import Cell
 from armwright.experiments.compare_runs import Comparison
-from armwright.experiments.plan import Cell, ExperimentPlan
+from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.run_summary import read_run_summary
 from armwright.files import replace_file
 from armwright.runs.results import read_summary
 
-PLAN = "experiment.yaml"  # what was run, as it was
+PLAN = "experiment.yaml"  # in the experiment's folder
 
 
 def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
-    """The finished ones among the cells, with the labels and in the order of the plan."""
+    """Compare the finished cells, with the labels and in the order of the plan."""
     records = [
         read_run_summary(cell.folder, cell.plan.label) for cell in cells if read_summary(cell.folder) is not None
     ]
@@ -24,11 +25,11 @@ def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
         raise FailureError("no cell of the experiment is finished, so there is nothing to compare")
     labels = [method.label for method in plan.methods.values()]
     tasks = list(dict.fromkeys(cell.task_name for cell in cells))
-    return Comparison(records, labels, tasks, plan.methods[plan.against].label)
+    return Comparison(records, labels, tasks, plan.methods[plan.baseline_key].label)
 
 
 def published(plan: ExperimentPlan) -> dict[tuple[str, str], tuple[float, float]]:
-    """The numbers to show beside ours, by label and task."""
+    """Return the published numbers (E_hv, σ_hv) by label and task."""
     return {
         (plan.methods[key].label, task): numbers
         for key, by_task in plan.published.items()
@@ -37,7 +38,7 @@ def published(plan: ExperimentPlan) -> dict[tuple[str, str], tuple[float, float]
 
 
 def write_plan(plan: ExperimentPlan, out: Path) -> None:
-    """Keeps what was run beside its results; only the models that are named in it are those that were asked."""
+    """Store the plan, with the models that were used, next to the results."""
     text = yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True), sort_keys=False, allow_unicode=True)
     try:
         out.mkdir(parents=True, exist_ok=True)

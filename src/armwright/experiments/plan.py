@@ -1,43 +1,35 @@
-"""What an experiment consists of: the file that people write, and the cells that it stands for."""
+"""Experiment files: tasks, seeds and methods, and their selection."""
 
-import itertools
-import shlex
-import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
 
-from armwright.exceptions import SettingsError, TaskError, did_you_mean
+from armwright.exceptions import SettingsError, did_you_mean
 from armwright.files import check_name
 from armwright.llm.configuration import configured_model
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import PROMPTS
-from armwright.llm.transcript import TRANSCRIPTS
 from armwright.proposers.factory import PROPOSERS, Choice, choose_proposer
-from armwright.tasks.catalogue import builtin_names, load_task
+from armwright.tasks.catalogue import builtin_names
 from armwright.yaml_documents import parse_document, read_document
 
-ALL_TASKS = "all"  # instead of a list: every built-in task
-RUNS = "runs"  # in an experiment's folder
+ALL_TASKS = "all"  # every built-in task, instead of a list
 MOST_SEEDS = 10_000
-MOST_CELLS = 100_000
 Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$"), AfterValidator(check_name)]
 Count = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
 class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """One method: the options of `armwright optimize`, or, with `front`, the budget of `armwright front`.
+    """A method: the options of `armwright optimize`, or, with `design`, the budget of `armwright design`.
 
-    label: how tables and figures call it.
+    label: name in tables and figures.
     """
 
     label: str = Field(min_length=1, max_length=40)
     proposer: str = "none"
-    front: str | None = None  # a budget of `armwright front`, which then runs instead of a study
+    design: str | None = None  # a budget of `armwright design`, which then runs instead of a study
     sampler: str = "tpe"
     n_step: Count = 10
     refine_every: Count | None = None
@@ -45,8 +37,8 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @property
     def asks_a_model(self) -> bool:
-        """Whether it can only run with a language model, or with a record of one."""
-        return self.front is None and self.proposer == "llm"
+        """Whether it needs a language model, or a recorded run of one."""
+        return self.design is None and self.proposer == "llm"
 
     def choose_proposer(self, replay: Path | None = None) -> Choice:
         """Return its proposer; with a recorded run, that of the replay."""
@@ -59,41 +51,42 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         allowed = tuple(name for name in PROPOSERS if name != "auto")
         if self.proposer not in allowed:
             raise ValueError(
-                f'proposer "{self.proposer}" is not one of {", ".join(allowed)}.{did_you_mean(self.proposer, allowed)}'
+                f'unknown proposer "{self.proposer}"; available: {", ".join(allowed)}.'
+                f"{did_you_mean(self.proposer, allowed)}"
             )
         return self
 
 
 class FigurePlan(BaseModel, frozen=True, extra="forbid"):
-    """Hypervolume curves of some methods, a panel for each task."""
+    """A figure of hypervolume curves, with a panel for each task."""
 
     title: str  # above the curves
-    methods: tuple[Key, ...] = Field(min_length=1)  # whose curves are drawn
+    methods: tuple[Key, ...] = Field(min_length=1)  # to draw
 
 
 class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """An experiment as its file states it.
+    """The content of an experiment file.
 
-    tasks: names of built-in tasks (random-N is one of a seeded family), or task files beside the experiment's file.
-    n_init, n_total, space, robust: as of `armwright optimize`, the same for all methods, so that they can be compared.
-    seeds: so many from 0 on, or a list. baseline: what the others are compared with.
-    published: numbers to show beside ours: of a method, of a task, (E_hv, σ_hv).
-    figures: by name; without any, one with all methods. samples: the methods whose runs with the first seed are drawn,
-        the first of them that has runs.
+    tasks: names of built-in tasks (including random-N), or task files next to the experiment file.
+    n_init, n_total, space, robust: as in `armwright optimize`; equal for all methods, so that they can be compared.
+    seeds: a number of seeds from 0 on, or a list. baseline: the method that the others are compared with.
+    published: published numbers to show, by method and task: (E_hv, σ_hv).
+    figures: by name; by default one with all methods. samples: methods to draw in detail, with their first seed; the
+        first one with runs is used.
     """
 
-    name: Key  # of its folder
-    description: str = ""  # what it is to show
+    name: Key  # also of its folder
+    description: str = ""
     tasks: tuple[str, ...] | Literal["all"]
     seeds: Annotated[int, Field(ge=1, le=MOST_SEEDS)] | tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...] = 5
     n_init: Count = 10
     n_total: Count = 200
     space: str | None = None
     robust: bool = False
-    methods: dict[Key, MethodPlan] = Field(min_length=1)  # by names of yours
+    methods: dict[Key, MethodPlan] = Field(min_length=1)
     baseline: Key | None = None
     published: dict[Key, dict[str, tuple[float, float]]] = {}
-    published_in: str = ""  # where these numbers stand
+    published_in: str = ""  # source of these numbers
     figures: dict[Key, FigurePlan] = {}
     samples: tuple[Key, ...] = ()
 
@@ -101,20 +94,20 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     @classmethod
     def _each_seed_once(cls, seeds: int | tuple[int, ...]) -> int | tuple[int, ...]:
         if isinstance(seeds, tuple) and (not seeds or len(set(seeds)) < len(seeds)):
-            raise ValueError("seeds must hold at least one number, each once")
+            raise ValueError("expected at least one seed, each once")
         return seeds
 
     @model_validator(mode="after")
     def _check_names(self) -> Self:
         if not self.tasks:
-            raise ValueError("tasks is empty: name at least one, or all")
+            raise ValueError("tasks is empty; name at least one, or all")
         used = {"baseline": () if self.baseline is None else (self.baseline,), "published": tuple(self.published)}
         used |= {f"figures.{name}": figure.methods for name, figure in self.figures.items()}
         for where, keys in (used | {"samples": self.samples}).items():
             for key in keys:
                 if key not in self.methods:
                     raise ValueError(
-                        f'{where} names "{key}", which is none of the methods {", ".join(self.methods)}.'
+                        f'{where} names the unknown method "{key}"; available: {", ".join(self.methods)}.'
                         f"{did_you_mean(key, self.methods)}"
                     )
         labels = [method.label for method in self.methods.values()]
@@ -124,82 +117,22 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     @property
     def seed_list(self) -> tuple[int, ...]:
-        """The seeds, each by itself."""
+        """The seeds as a list."""
         return tuple(range(self.seeds)) if isinstance(self.seeds, int) else self.seeds
 
     @property
     def task_list(self) -> tuple[str, ...]:
-        """The tasks, each by itself."""
+        """The tasks as a list."""
         return tuple(builtin_names()) if self.tasks == ALL_TASKS else tuple(self.tasks)
 
     @property
-    def against(self) -> str:
-        """The method that the others are compared with: the stated one, else the first."""
+    def baseline_key(self) -> str:
+        """Key of the method that the others are compared with; by default the first one."""
         return self.baseline or next(iter(self.methods))
 
 
-@dataclass(frozen=True)
-class Cell:
-    """One run of an experiment: a method on a task with a seed, in a folder of its own.
-
-    task, space: names or absolute paths. replay: the recorded run that is played instead of asking a model.
-    """
-
-    method: str
-    plan: MethodPlan
-    task: str
-    task_name: str
-    space: str | None
-    seed: int
-    n_init: int
-    n_total: int
-    robust: bool
-    folder: Path
-    replay: Path | None = None
-
-    @property
-    def words(self) -> str:
-        """What it is, for the user."""
-        return f"{self.plan.label}, {self.task_name}, seed {self.seed}"
-
-    @property
-    def command(self) -> str:
-        """The same run as one command for a shell."""
-        return shlex.join([*_program(), *(self._front_options() if self.plan.front else self._study_options())])
-
-    def _study_options(self) -> list[str]:
-        plan, options = self.plan, self.plan.model_options
-        replayed = ModelOptions(in_flight=options.in_flight) if options.in_flight else ModelOptions()
-        said: dict[str, Any] = {
-            "proposer": f"replay:{self.replay}" if self.replay else plan.proposer,
-            **(replayed if self.replay else options).command_options(),
-            "sampler": plan.sampler,
-            "n-init": self.n_init,
-            "n-step": plan.n_step,
-            "n-total": self.n_total,
-            "refine-every": plan.refine_every,
-        }
-        return ["optimize", self.task, *self._options(said), "--no-figures"]
-
-    def _front_options(self) -> list[str]:
-        return ["front", self.task, *self._options({"budget": self.plan.front}), "--no-figures"]
-
-    def _options(self, said: Mapping[str, Any]) -> list[str]:
-        all_said = {**said, "space": self.space, "seed": self.seed, "out": self.folder}
-        given = [f"--{name.replace('_', '-')}={value}" for name, value in all_said.items() if value is not None]
-        return given + ["--robust"] * self.robust
-
-
-@dataclass(frozen=True)
-class Skipped:
-    """A cell that cannot be run here, and why."""
-
-    cell: Cell
-    reason: str
-
-
 def builtin_experiments() -> dict[str, ExperimentPlan]:
-    """The experiments that come with armwright, by name."""
+    """Return the built-in experiments by name."""
     folder = resources.files("armwright.experiments") / "builtin"
     files = sorted((f for f in folder.iterdir() if f.name.endswith(".yaml")), key=lambda f: f.name)
     plans = [parse_document(f.read_text(encoding="utf-8"), ExperimentPlan, SettingsError, f.name) for f in files]
@@ -207,7 +140,7 @@ def builtin_experiments() -> dict[str, ExperimentPlan]:
 
 
 def builtin_text(name: str) -> str:
-    """The file of a built-in experiment, to edit a copy of it."""
+    """Return the file of a built-in experiment, as a template."""
     file = resources.files("armwright.experiments") / "builtin" / f"{name}.yaml"
     if name not in builtin_experiments():
         raise SettingsError(_unknown(name))
@@ -215,7 +148,7 @@ def builtin_text(name: str) -> str:
 
 
 def load_experiment(name_or_path: str) -> tuple[ExperimentPlan, Path]:
-    """A built-in experiment by its name, or that of a YAML file, and the folder that its files lie in."""
+    """Return an experiment by its name or YAML file, and the folder of its other files."""
     known = builtin_experiments()
     if name_or_path in known:
         return known[name_or_path], Path.cwd()
@@ -233,69 +166,10 @@ def _unknown(name: str) -> str:
     )
 
 
-def cells_of(
-    plan: ExperimentPlan, beside: Path, out: Path, replay: Path | None = None
-) -> tuple[list[Cell], list[Skipped]]:
-    """The cells that can be run, by seed, task and method, and those that cannot.
-
-    beside: the folder that the experiment's own files lie in. out: the experiment's folder.
-    replay: a folder of an earlier experiment, whose recorded runs stand for the model.
-    """
-    if replay is not None and not replay.is_dir():
-        raise SettingsError(f"--replay {replay}: there is no such folder of an earlier experiment")
-    n_cells = len(plan.task_list) * len(plan.seed_list) * len(plan.methods)
-    if n_cells > MOST_CELLS:
-        raise SettingsError(f"the experiment has {n_cells:,} cells; at most {MOST_CELLS:,} are allowed")
-    space = None if plan.space is None else str((beside / plan.space).resolve())
-    tasks = [_task(name, beside) for name in plan.task_list]
-    names = [name for _, name in tasks]
-    if len(set(names)) < len(names):
-        raise SettingsError(f"two tasks of the experiment have the same name: {', '.join(sorted(names))}")
-    ready: list[Cell] = []
-    skipped: list[Skipped] = []
-    methods = {key: _with_prompt(method, beside) for key, method in plan.methods.items()}
-    # By seed first: what is there when an experiment is stopped then says something of every method.
-    for seed, (task, task_name), (key, method) in itertools.product(plan.seed_list, tasks, methods.items()):
-        cell = Cell(
-            method=key,
-            plan=method,
-            task=task,
-            task_name=task_name,
-            space=space,
-            seed=seed,
-            n_init=plan.n_init,
-            n_total=plan.n_total,
-            robust=plan.robust,
-            folder=out.resolve() / RUNS / key / task_name / f"seed{seed}",
-        )
-        if seed == plan.seed_list[0] and not cell.command.isprintable():
-            raise SettingsError(f"{cell.command}: a name in it has a character that can stand on no line of a script")
-        cell, reason = _source_of_model(cell, replay)
-        if reason:
-            skipped.append(Skipped(cell, reason))
-        else:
-            ready.append(cell)
-    return ready, skipped
-
-
-def _source_of_model(cell: Cell, replay: Path | None) -> tuple[Cell, str]:
-    """The cell with what answers in it, or why nothing does."""
-    if not cell.plan.asks_a_model:
-        return cell, ""
-    if replay is not None:
-        recorded = replay.resolve() / RUNS / cell.method / cell.task_name / f"seed{cell.seed}"
-        if (recorded / TRANSCRIPTS).is_file():
-            return replace(cell, replay=recorded), ""
-        return cell, f"{replay} holds no record of it"
-    if cell.plan.model_options.model is None:
-        return cell, "no language model is configured; --model names one, --replay DIR plays recorded runs"
-    return cell, ""
-
-
 def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
-    """Return the plan with the configured model, if there is one, for the methods that ask one and name none.
+    """Return the plan with the configured model, if any, for methods that need a model and name none.
 
-    What a method states goes before the options.
+    The options of a method take precedence.
     """
     methods: dict[str, MethodPlan] = {}
     for key, method in plan.methods.items():
@@ -308,28 +182,29 @@ def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
 
 
 def with_seeds(plan: ExperimentPlan, seeds: int | None) -> ExperimentPlan:
-    """The plan with so many seeds from 0 on."""
+    """Return the plan with this number of seeds from 0 on."""
     if seeds is None:
         return plan
     if not 1 <= seeds <= MOST_SEEDS:
-        raise SettingsError(f"--seeds {seeds}: a whole number from 1 to {MOST_SEEDS} is needed")
+        raise SettingsError(f"--seeds: expected a whole number from 1 to {MOST_SEEDS}, got {seeds}")
     return plan.model_copy(update={"seeds": seeds})
 
 
 def with_only(plan: ExperimentPlan, methods: Sequence[str], tasks: Sequence[str]) -> ExperimentPlan:
-    """The plan with some of its methods and tasks alone; all, where none is named."""
-    for asked, there, what in ((methods, plan.methods, "method"), (tasks, plan.task_list, "task")):
-        for name in asked:
-            if name not in there:
+    """Return the plan with only these methods and tasks; an empty selection keeps all."""
+    for names, available, what in ((methods, plan.methods, "method"), (tasks, plan.task_list, "task")):
+        for name in names:
+            if name not in available:
                 raise SettingsError(
-                    f'{plan.name} has no {what} "{name}".{did_you_mean(name, there)} It has: {", ".join(there)}'
+                    f'{plan.name} has no {what} "{name}".{did_you_mean(name, available)} '
+                    f"Available: {', '.join(available)}"
                 )
     kept = {key: method for key, method in plan.methods.items() if not methods or key in methods}
     return plan.model_copy(
         update={
             "methods": kept,
             "tasks": tuple(name for name in plan.task_list if not tasks or name in tasks),
-            "baseline": plan.against if plan.against in kept else None,
+            "baseline": plan.baseline_key if plan.baseline_key in kept else None,
             "published": {key: numbers for key, numbers in plan.published.items() if key in kept},
             "figures": {
                 name: figure.model_copy(update={"methods": tuple(key for key in figure.methods if key in kept)})
@@ -339,28 +214,3 @@ def with_only(plan: ExperimentPlan, methods: Sequence[str], tasks: Sequence[str]
             "samples": tuple(key for key in plan.samples if key in kept),
         }
     )
-
-
-def _task(name: str, beside: Path) -> tuple[str, str]:
-    """What `load_task` takes, wherever the cell runs, and the task's own name."""
-    file = beside / name
-    if Path(name).suffix in (".yaml", ".yml"):
-        if not file.is_file():
-            raise TaskError(f"there is no file {file}, which the experiment names as a task")
-        return str(file.resolve()), load_task(file).name
-    return name, load_task(name).name
-
-
-def _with_prompt(method: MethodPlan, beside: Path) -> MethodPlan:
-    """Return the method with its prompt's file as an absolute path."""
-    options = method.model_options
-    if options.prompt in PROMPTS:
-        return method
-    options = options.model_copy(update={"prompt": str((beside / options.prompt).resolve())})
-    return method.model_copy(update={"model_options": options})
-
-
-def _program() -> list[str]:
-    """How armwright was called, for a shell on the same machine."""
-    called = Path(sys.argv[0])
-    return [str(called.resolve())] if called.name == "armwright" and called.is_file() else ["armwright"]

@@ -1,4 +1,4 @@
-"""Runs cells: in this process, or on workers."""
+"""Run the cells of an experiment, in this process or on workers."""
 
 import time
 from collections import deque
@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from armwright.exceptions import ArmwrightError
-from armwright.experiments.plan import Cell
+from armwright.experiments.cells import Cell
 from armwright.extras import missing_packages
 from armwright.kinematics.devices import cores, resolve_device
 from armwright.problem.problem import Problem
@@ -24,14 +24,14 @@ from armwright.study.front_run import find_front
 from armwright.study.study import optimize, study_config, study_method
 from armwright.tasks.catalogue import load_task
 
-LOOK_SECONDS = 1.0  # between two looks whether the cluster is still there
+POLL = 1.0  # [s] between two checks of the cluster
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of a cell.
+class CellOutcome:
+    """The outcome of a cell.
 
-    fault: why it failed; empty where it is finished. resumed: whether all of it lay there before.
+    fault: why it failed; empty if it is finished. resumed: whether it was complete before.
     """
 
     cell: Cell
@@ -41,23 +41,23 @@ class Outcome:
     resumed: bool = False
 
 
-def run_cell(cell: Cell) -> Outcome:
-    """Runs one cell, or what is left of it, in this process; what goes wrong is told, not raised."""
+def run_cell(cell: Cell) -> CellOutcome:
+    """Run one cell, or the rest of it, in this process; a failure is returned, not raised."""
     started = time.perf_counter()
     try:
         summary, resumed = _run(cell)
     except ArmwrightError as fault:
-        return Outcome(cell, time.perf_counter() - started, fault=str(fault))
-    except Exception as fault:  # noqa: BLE001 (a cell must not stop the others, whatever is wrong with it)
-        words = " ".join(f"{type(fault).__name__}: {fault}".split())
-        return Outcome(cell, time.perf_counter() - started, fault=words)
-    return Outcome(cell, time.perf_counter() - started, summary["hypervolume"]["final"], resumed=resumed)
+        return CellOutcome(cell, time.perf_counter() - started, fault=str(fault))
+    except Exception as fault:  # noqa: BLE001 (a failing cell must not stop the others)
+        message = " ".join(f"{type(fault).__name__}: {fault}".split())
+        return CellOutcome(cell, time.perf_counter() - started, fault=message)
+    return CellOutcome(cell, time.perf_counter() - started, summary["hypervolume"]["final"], resumed=resumed)
 
 
 def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
     plan, problem = cell.plan, _problem(cell)
-    if plan.front is not None:
-        found = find_front(problem, budget=plan.front, seed=cell.seed, out=cell.folder)
+    if plan.design is not None:
+        found = find_front(problem, budget=plan.design, seed=cell.seed, out=cell.folder)
         return found.summary, found.resumed == found.summary["search"]["evaluations"]
     run = optimize(
         problem,
@@ -79,14 +79,14 @@ def _problem(cell: Cell) -> Problem:
         load_task(cell.task),
         paper_space() if cell.space is None else load_space(cell.space),
         tolerance=TOLERANCE if cell.robust else 0.0,
-        device=resolve_device("auto", many=cell.plan.front is not None),
+        device=resolve_device("auto", many=cell.plan.design is not None),
     )
 
 
-def finished_before(cell: Cell) -> Outcome | None:
-    """What a cell came to that was finished before with the same settings; None where there is anything to do."""
+def finished_before(cell: Cell) -> CellOutcome | None:
+    """Return the outcome of a cell that is finished with the same settings; None if anything is left to do."""
     summary = read_summary(cell.folder)
-    if summary is None or cell.plan.front is not None or summary["n_trials"] < cell.n_init + cell.n_total:
+    if summary is None or cell.plan.design is not None or summary["n_trials"] < cell.n_init + cell.n_total:
         return None
     plan = cell.plan
     try:
@@ -102,30 +102,30 @@ def finished_before(cell: Cell) -> Outcome | None:
         )
         check_same_run(cell.folder, read_config(cell.folder), study_config(_problem(cell), method, cell.seed))
     except ArmwrightError:
-        return None  # `run_cell` tells of it
-    return Outcome(cell, 0.0, summary["hypervolume"]["final"], resumed=True)
+        return None  # `run_cell` reports it
+    return CellOutcome(cell, 0.0, summary["hypervolume"]["final"], resumed=True)
 
 
 def _check_extras(cells: Sequence[Cell]) -> None:
-    """MissingExtraError before any cell is run, rather than in each."""
+    """Raise MissingExtraError before any cell is run, rather than in each."""
     for cell in cells:
         sampler_factory(cell.plan.sampler)
         if cell.plan.asks_a_model and cell.replay is None:
             import_module("armwright.llm.client")
 
 
-def run_cells(cells: Sequence[Cell], workers: Workers | None, notify: Callable[[str], None]) -> Iterator[Outcome]:
+def run_cells(cells: Sequence[Cell], workers: Workers | None, notify: Callable[[str], None]) -> Iterator[CellOutcome]:
     """Run cells, and return the outcome of each as it ends.
 
     A cell whose worker is lost is run again by another worker, which resumes from its last finished trial.
 
     Args:
-        cells: what to run.
-        workers: where; None for one after another in this process.
-        notify: called with news of the workers for the user.
+        cells: The cells to run.
+        workers: The workers; None to run the cells one after another in this process.
+        notify: Called with messages about the workers for the user.
 
     Raises:
-        ClusterError: the workers did not start, or the scheduler was lost.
+        ClusterError: The workers did not start, or the scheduler was lost.
     """
     _check_extras(cells)
     if workers is None or not cells:
@@ -133,27 +133,27 @@ def run_cells(cells: Sequence[Cell], workers: Workers | None, notify: Callable[[
     return _run_on(workers, cells, notify)
 
 
-def _run_on(workers: Workers, cells: Sequence[Cell], notify: Callable[[str], None]) -> Iterator[Outcome]:
+def _run_on(workers: Workers, cells: Sequence[Cell], notify: Callable[[str], None]) -> Iterator[CellOutcome]:
     with closing(Cluster(workers, notify)) as cluster:
         waiting = deque(cells)
         while waiting or cluster.n_in_flight:
-            # A worker has no cell beside the one that it runs, which would be blamed with it for its end.
+            # One cell per worker: a queued cell would be blamed for the loss of its worker, too.
             while waiting and cluster.n_in_flight < cluster.capacity:
                 cell = waiting.popleft()
-                cluster.submit(cell, cell.words, run_cell, cell)
-            finished = cluster.wait(LOOK_SECONDS)
+                cluster.submit(cell, cell.description, run_cell, cell)
+            finished = cluster.wait(POLL)
             if finished is not None:
                 yield _outcome_of(finished)
 
 
-def _outcome_of(finished: Finished) -> Outcome:
+def _outcome_of(finished: Finished) -> CellOutcome:
     cell: Any = finished.key
     if finished.is_lost:
-        return Outcome(cell, 0.0, fault=f"{MOST_LOSSES} workers were lost over it (killed, or out of memory?)")
-    return finished.value if finished.error is None else Outcome(cell, 0.0, fault=str(finished.error))
+        return CellOutcome(cell, 0.0, fault=f"{MOST_LOSSES} workers were lost over it (killed, or out of memory?)")
+    return finished.value if finished.error is None else CellOutcome(cell, 0.0, fault=str(finished.error))
 
 
 def default_workers(n_cells: int) -> Workers | None:
-    """Return one local worker a core, but no more than there are cells; None without the extra or with one."""
+    """Return one local worker per core, but at most one per cell; None without the extra or for a single worker."""
     n_workers = min(cores(), n_cells)
     return None if n_workers < 2 or missing_packages("distributed") else Workers(n_workers)
