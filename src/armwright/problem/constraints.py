@@ -22,7 +22,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
 class Quantity(Protocol):
-    """A number per arm that can be bounded, whether less or more of it is better; every objective is one."""
+    """A number per arm that can be bounded; every objective is one."""
 
     @property
     def name(self) -> str: ...
@@ -38,7 +38,7 @@ class Quantity(Protocol):
     def over(self) -> str: ...
 
     def __call__(self, evaluation: Evaluation) -> Array:
-        """One value per arm, (N,)."""
+        """Return one value per arm, (N,)."""
         ...
 
 
@@ -65,18 +65,22 @@ class Constraint:
         return abs(self.bound) if abs(self.bound) > SMALLEST_SCALE else 1.0
 
     def __call__(self, evaluation: Evaluation) -> Array:
-        """(N,) how far arms break it: by its scale, and <= 0 where it is met."""
+        """Return the (N,) violations of arms, divided by the scale; satisfied at <= 0."""
         excess = self.quantity(evaluation) - self.bound
         return (excess if self.relation == "<=" else -excess) / self.scale
 
     def measured(self, broken: float) -> float:
-        """The quantity of a design that breaks it so far, in the quantity's unit, to 12 digits."""
+        """Return the quantity that has this violation, in its own unit, to 12 digits."""
         excess = self.scale * broken
         return float(f"{self.bound + (excess if self.relation == '<=' else -excess):.12g}")
 
 
 def read_constraints(sentences: Sequence[str]) -> tuple[Constraint, ...]:
-    """The constraints of a task; TaskError where one is none, or no design can keep all. Nothing is evaluated."""
+    """Parse the constraints of a task without evaluating them.
+
+    Raises:
+        TaskError: a sentence is no constraint, or no design can satisfy all of them.
+    """
     constraints = tuple(map(_read, sentences))
     bounds: dict[tuple[str, Relation], Constraint] = {}
     for constraint in constraints:

@@ -1,4 +1,4 @@
-"""What the physics says of an arm at its targets: no preference, no sums."""
+"""Per-target kinematics and statics of arms, not aggregated."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class Evaluation:
         return self.joint_torques * self.arms.travel[:, None]
 
     def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
-        """(N, T) a measure of motor torques, the largest of a target's posture and of the moves that end there.
+        """Return (N, T) a measure of motor torques, the largest of a target's posture and of the moves that end there.
 
         measure: from torques (N, K, J) [N m] to (N, K), of K postures.
         """
@@ -65,7 +65,7 @@ class Evaluation:
 
     @cached_property
     def paths(self) -> Paths:
-        """The arms along the moves; SettingsError where there are none."""
+        """The arms along the moves; SettingsError if the task has none."""
         if not self.moves:
             raise SettingsError(
                 "path_error, max_joint_step and all else of moves need some in the task: moves: in_order, or "
@@ -75,7 +75,7 @@ class Evaluation:
 
     @cached_property
     def drives(self) -> Drives:
-        """What the joints do along the timed moves; SettingsError where these take no time."""
+        """Torques and speeds along timed moves; SettingsError if the moves have no duration."""
         paths = self.paths
         if not self.moves.times:
             raise SettingsError(
@@ -85,7 +85,7 @@ class Evaluation:
         return drives_along(self.arms, paths)
 
     def worst_drives(self, measure: Callable[[Array, Array], Array]) -> Array:
-        """(N, T) a measure of what actuators do, the largest along the moves that end at a target; 0 where none does.
+        """Return (N, T) a measure of torques and speeds, the largest along the moves that end at a target, else 0.
 
         measure: from torques [N m] and speeds [rad/s], each (N, F, J), to (N, F), of F moments.
         """
@@ -165,7 +165,7 @@ def evaluate(
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
-    """Every arm at every target. Not reaching a target is a result, never an exception.
+    """Evaluate every arm at every target. An unreached target is a result, never an exception.
 
     targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
     obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
@@ -194,7 +194,7 @@ def evaluate_arrays(
     moves: Moves = NO_MOVES,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
-    """The same for arms that are stacked already, in their precision.
+    """Evaluate stacked arms at every target, in their precision.
 
     start: values [rad] or [m] that broadcast to (N, T, D); None for the straight start. Restarts begin elsewhere.
     """
@@ -247,7 +247,7 @@ def _postures(
 
 
 def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
-    """n times (N, 1, D) postures to start from, each the same share of every joint's range for all arms."""
+    """Yield n times (N, 1, D) initial postures, each the same share of every joint's range for all arms."""
     if n == 0:
         return
     shares = np.random.default_rng(0).uniform(size=(n, MAX_JOINTS))[:, : arrays.dof]
@@ -257,7 +257,7 @@ def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
 
 
 def _nearer(first: Postures, second: Postures, targets: Array, target_arrays: TargetArrays) -> Postures:
-    """Of each arm and target the posture of the smaller distance, angles counted; the first of equals."""
+    """Return, per arm and target, the posture with the smaller distance, angles included; the first of equals."""
 
     def off(postures: Postures) -> Array:
         distance = np.linalg.norm(postures.reached.astype(np.float64) - targets, axis=-1)

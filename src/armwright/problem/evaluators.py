@@ -68,7 +68,7 @@ class Evaluator:
         return Evaluator.__new__, (Evaluator,), self.__dict__
 
     def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
-        """The objectives of an arm; EvaluatorError where the function fails, or asks for the end of its process."""
+        """Return the objectives of an arm; EvaluatorError if the function fails or exits."""
         try:
             with _staying():
                 made = self.measure(arm, task)
@@ -90,7 +90,7 @@ class Evaluator:
 
 
 def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callable[[Measure], Evaluator]:
-    """Makes an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
+    """Make an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
 
     objectives: their names, each with its unit in brackets where it has one: "energy [J]".
     worst: what an arm counts for which the function fails, one number for each; without it, the run stops there.
@@ -117,7 +117,7 @@ def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callabl
 
 
 def load_evaluator(place: str) -> Evaluator:
-    """The evaluator of `file.py:function` or `module:function`; its code is run, so it has to be one's own.
+    """Load the evaluator `file.py:function` or `module:function`, which runs its code.
 
     SettingsError where there is none.
     """
@@ -148,7 +148,7 @@ def _version(source: bytes) -> str:
 
 
 def _found(module: ModuleType, where: str, function: str) -> Evaluator:
-    """The evaluator `function` of a module; SettingsError where there is none."""
+    """Return the evaluator `function` of a module; SettingsError if there is none."""
     found = getattr(module, function, None)
     if isinstance(found, Evaluator):
         return found
@@ -162,7 +162,7 @@ def _found(module: ModuleType, where: str, function: str) -> Evaluator:
 
 
 def _numbers(made: object) -> tuple[float, ...]:
-    """What a function gave as numbers; none where it is anything else."""
+    """Return the numbers that a function returned; empty if it returned anything else."""
     if isinstance(made, np.ndarray):
         made = cast("NDArray[Any]", made).tolist()
     several = list(cast("tuple[object, ...]", made)) if isinstance(made, (tuple, list)) else [made]
@@ -192,7 +192,7 @@ def _staying() -> Generator[None]:
 
 
 def _objective(given: str, words: str, name: str) -> Objective:
-    """The objective of a name with a unit; its value comes from the evaluator alone."""
+    """Return the objective of a name with a unit; its value comes from the evaluator alone."""
     match = NAMED.fullmatch(given)
     if match is None or len(match[1]) > LONGEST_NAME:
         raise SettingsError(
@@ -231,7 +231,7 @@ class _Source(importlib.abc.SourceLoader):
 
 
 def _file_module(path: Path, source: bytes) -> ModuleType:
-    """A Python file as a module; what lies beside it can be imported there, as where it is run as a program."""
+    """Import a Python file as a module; it can import its neighbours, as a program can."""
     name = f"armwright_evaluator_{path.stem}"
     beside = str(path.resolve().parent)
     if beside not in sys.path:

@@ -385,7 +385,7 @@ TO_BOUND = (*CLEARANCES, MANIPULABILITY)  # of which more is better: no objectiv
 
 
 def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> tuple[Objective, ...]:
-    """The objectives of these names; SettingsError where one does not exist, or they are too many or named twice.
+    """Return the objectives of these names; SettingsError if one is unknown or repeated, or there are too many.
 
     others: that may be named as well.
     """

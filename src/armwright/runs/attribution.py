@@ -1,4 +1,4 @@
-"""Who found what: the hypervolume and the front of a history, by the source of the trials."""
+"""Attribution: the hypervolume and the front of a history by the source of the trials."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from armwright.runs.history import History
 
 @dataclass(frozen=True)
 class Attribution:
-    """What the trials of one source brought.
+    """The contribution of the trials of one source.
 
     trials: how many there are. front: how many of them are on the final front.
     hypervolume_gained: see `hypervolume_gains`, summed; None as long as there is no reference point.
@@ -24,7 +24,7 @@ class Attribution:
 
 
 def attribution_by_source(history: History) -> dict[str, Attribution]:
-    """The attribution of each source, in the order in which they first occur."""
+    """Return the attribution of each source, in the order of their first trials."""
     gains, on_front = hypervolume_gains(history), front_mask(history.masked_objectives)
     attribution: dict[str, Attribution] = {}
     for source, mine in masks_by_source(history).items():
@@ -34,7 +34,7 @@ def attribution_by_source(history: History) -> dict[str, Attribution]:
 
 
 def hypervolume_gains(history: History) -> Array | None:
-    """(N,) by how much each trial, the random ones included, enlarged the hypervolume when it entered.
+    """Return (N,) the hypervolume that each trial, random ones included, added when it entered.
 
     The sum is the final hypervolume. What a trial would have brought later, or what it took away from one that came
     after it, is not weighed. None as long as there is no reference point.
@@ -45,7 +45,7 @@ def hypervolume_gains(history: History) -> Array | None:
 
 
 def gained_by_source(history: History) -> dict[str, Array] | None:
-    """For each source (I + 1,): the hypervolume that its trials have gained after 0, 1, …, I counted iterations.
+    """Return for each source (I + 1,) the hypervolume that its trials gained after 0, 1, …, I counted iterations.
 
     None as long as there is no reference point.
     """
@@ -60,7 +60,7 @@ def gained_by_source(history: History) -> dict[str, Array] | None:
 
 
 def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
-    """For each source (I + 1,): how many of its trials are on the front after 0, 1, …, I counted iterations."""
+    """Return for each source (I + 1,) its number of trials on the front after 0, 1, …, I counted iterations."""
     first, *_ = last = _last_trials(history).tolist()
     on_front = np.flatnonzero(front_mask(history.masked_objectives[:first]))
     fronts = [on_front]
@@ -75,11 +75,11 @@ def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
 
 
 def masks_by_source(history: History) -> dict[str, NDArray[np.bool_]]:
-    """For each source (N,): True at its trials; the sources in the order in which they first occur."""
+    """Return for each source (N,) a mask of its trials, in the order of the first trials."""
     sources = np.array([trial.source for trial in history], dtype=object)
     return {source: sources == source for source in dict.fromkeys(sources.tolist())}
 
 
 def _last_trials(history: History) -> NDArray[np.int_]:
-    """(I + 1,) the number of trials after 0, 1, …, I counted iterations."""
+    """Return (I + 1,) the number of trials after 0, 1, …, I counted iterations."""
     return np.arange(min(history.n_init, len(history)), len(history) + 1)

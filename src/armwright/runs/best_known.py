@@ -33,7 +33,7 @@ class KnownFront:
 
 @dataclass(frozen=True)
 class FrontGap:
-    """A front beside the best known one, both bounded by the same reference point.
+    """A front compared with the best known one, within the same reference point.
 
     hypervolume: of the best known front.
     share: of it, what the front has; above 1 where it is better.
@@ -48,7 +48,7 @@ class FrontGap:
 
 
 def known_front(problem: Problem) -> KnownFront | None:
-    """The best known front of a problem: of a built-in task's targets in the paper's design space, else None."""
+    """Return the best known front of a problem, if it has a built-in task's targets and the paper's space."""
     paper = paper_space()
     same_space = problem.space.model_copy(update={"name": paper.name}) == paper
     as_the_paper = (
@@ -67,7 +67,7 @@ def known_front(problem: Problem) -> KnownFront | None:
 
 
 def best_known_hypervolume(task: Task) -> float | None:
-    """Of a task in the paper's design space, within its own reference point; None where no front is known."""
+    """Return the best known hypervolume of a task in the paper's design space; None if no front is known."""
     known = known_front(Problem(task))
     if known is None or task.reference_point is None:
         return None
@@ -75,7 +75,7 @@ def best_known_hypervolume(task: Task) -> float | None:
 
 
 def front_gap(problem: Problem, values: Array, reference_point: Sequence[float]) -> FrontGap | None:
-    """Where the front of `values` (N, M) stands; None where no front is known, or none of it within the box."""
+    """Compare the front of `values` (N, M) with the best known; None if none is known within the reference point."""
     known = known_front(problem)
     if known is None:
         return None

@@ -48,7 +48,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     @field_validator("proposer")
     @classmethod
     def _check_proposer(cls, settings: dict[str, Any] | None) -> dict[str, Any] | None:
-        """That what is asked again can be asked as before."""
+        """Check the settings that a resumed run asks its proposer with."""
         kinds = {"name": str} | ({"prompt": str} if settings and "prompt" in settings else {})
         if "prompt" in kinds:
             kinds |= {"memory": str, "answer": str, "proposals": int}
@@ -77,7 +77,7 @@ class FrontMethod(BaseModel, frozen=True, extra="forbid"):
 
 
 class ObjectiveRecord(BaseModel, frozen=True, extra="forbid"):
-    """An objective as a run's settings tell of it; its formula is code."""
+    """An objective as recorded in a run's settings; its formula is code."""
 
     name: str
     label: str
@@ -86,7 +86,7 @@ class ObjectiveRecord(BaseModel, frozen=True, extra="forbid"):
 
 
 def record_objectives(objectives: Sequence[Objective]) -> tuple[ObjectiveRecord, ...]:
-    """What a run's settings tell of its objectives."""
+    """Return the records of objectives."""
     return tuple(ObjectiveRecord(name=o.name, label=o.label, unit=o.unit, symbol=o.symbol) for o in objectives)
 
 
@@ -119,14 +119,14 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
         return self.problem_with(None)
 
     def problem_with(self, evaluator: Evaluator | None) -> Problem:
-        """The problem of the run with the evaluator that measures its designs."""
+        """Return the problem of the run with the evaluator that measures its designs."""
         own = {} if evaluator is None else {objective.name: objective for objective in evaluator.objectives}
         objectives = tuple(own.get(record.name) or _recorded(record) for record in self.objectives)
         return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives, evaluator)
 
     @property
     def study(self) -> Method:
-        """How its study searches; RunFolderError where it is a search for the whole front."""
+        """The settings of its study; RunFolderError if it is a search for the whole front."""
         if isinstance(self.method, FrontMethod):
             raise RunFolderError(
                 "this run is a search for the whole front, not a study: its front needs no refinement, and "
@@ -136,7 +136,7 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
 
 
 def _recorded(record: ObjectiveRecord) -> Objective:
-    """The objective of a record: ours by its name; of one that is none of ours, only what was written down."""
+    """Return the built-in objective of a record, or one without a formula."""
     known = OBJECTIVES.get(record.name)
     if known is not None and record_objectives((known,)) == (record,):
         return known
@@ -151,7 +151,7 @@ def _recorded(record: ObjectiveRecord) -> Objective:
 
 
 def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
-    """The versions that the numbers of a run depend on; of an evaluator's file, a part of its sha256."""
+    """Return the versions that results depend on, with a part of the sha256 of an evaluator's file."""
     found = {"python": platform.python_version()}
     if evaluator is not None and evaluator.version:
         found["evaluator"] = evaluator.version
@@ -162,7 +162,7 @@ def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
 
 
 def check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
-    """RunConflictError where `asked` is another run than the one that lies there; a larger n_total is the same."""
+    """Raise RunConflictError if `asked` differs from the existing run; a larger n_total is allowed."""
     old, new = _identity(there), _identity(asked)
     differences = [
         f"{key}: {_brief(old.get(key))} there, {_brief(new.get(key))} asked"
@@ -180,13 +180,13 @@ def check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
 
 
 def _brief(value: Any) -> str:
-    """A setting on one line; a prompt of the user's own is a whole page."""
+    """Return a setting on one short line; custom prompts fill a page."""
     text = " ".join(str(value).split())
     return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _identity(config: RunConfig) -> dict[str, Any]:
-    """What makes a run this run and no other, flat."""
+    """Return the settings that identify a run, flat."""
     content = config.model_dump(mode="json")
     content["task"] = {key: content["task"][key] for key in IDENTITY}
     content["objectives"] = [objective["name"] for objective in content["objectives"]]

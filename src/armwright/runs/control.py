@@ -34,7 +34,7 @@ Doing = Literal["evaluating", "asking", "paused", "stopped", "finished"]
 
 @dataclass(frozen=True)
 class Hint:
-    """What a watcher wants the language model to know; it goes into one prompt, the next."""
+    """A hint to the language model, for its next prompt only."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True)
 
@@ -43,7 +43,7 @@ class Hint:
 
 
 class Control(BaseModel, frozen=True, extra="forbid", strict=True):
-    """What is asked of a study.
+    """A request to a study.
 
     paused: no trial begins.  stop: its session ends before the next trial.
     hints: all of the run, those that were used included, by rising id.
@@ -63,7 +63,7 @@ class Control(BaseModel, frozen=True, extra="forbid", strict=True):
 
 
 class Status(BaseModel, frozen=True, extra="forbid", strict=True):
-    """What a study does.
+    """The status of a study.
 
     pid: of its process, which may have been killed since.
     number: the trial that it came to when it began to do so; of a finished study, how many trials there are.
@@ -82,32 +82,32 @@ Content = TypeVar("Content", bound=BaseModel)
 
 
 def read_control(folder: Path) -> Control:
-    """What is asked of the study in a run folder; nothing where the file is damaged, or none of ours."""
+    """Return the request for the study in a run folder; empty if the file is missing or damaged."""
     return _read(folder / CONTROL, Control) or Control()
 
 
 def read_status(folder: Path) -> Status | None:
-    """What the study in a run folder does, as far as it has said so."""
+    """Return the status of the study in a run folder, if it has written one."""
     return _read(folder / STATUS, Status)
 
 
 def pause_study(folder: Path) -> None:
-    """Lets no new trial begin, until `resume_study`."""
+    """Begin no new trial until `resume_study`."""
     _change(folder, lambda asked: asked.model_copy(update={"paused": True}))
 
 
 def resume_study(folder: Path) -> None:
-    """Lets a paused study go on."""
+    """Continue a paused study."""
     _change(folder, lambda asked: asked.model_copy(update={"paused": False}))
 
 
 def stop_study(folder: Path) -> None:
-    """Ends the study's session after the present trial, or at once where it is paused."""
+    """End the study's session after the current trial, or at once if it is paused."""
     _change(folder, lambda asked: asked.model_copy(update={"stop": True}))
 
 
 def add_hint(folder: Path, text: str) -> Hint:
-    """Gives the language model a hint for its next prompt; SettingsError where the text cannot be one."""
+    """Give the language model a hint for its next prompt; SettingsError if the text is empty or too long."""
     words = replace_surrogates(text).strip()
     if not 1 <= len(words) <= LONGEST_HINT:
         raise SettingsError(f"a hint of {len(words):,} characters: from 1 to {LONGEST_HINT:,} are possible")
@@ -130,7 +130,7 @@ class ControlFile:
         self._asked = Control()
 
     def read(self) -> Control:
-        """What is asked now."""
+        """Return the current request."""
         if self._folder is None:
             return self._asked
         try:
@@ -153,18 +153,18 @@ class Channel:
         self._said: Status | None = None  # in this session
 
     def begin(self, number: int) -> None:
-        """A session begins with this trial: what was asked of an earlier one is past, its hints stay."""
+        """Begin a session with this trial; clear earlier requests, but keep hints."""
         earlier = self.asked()
         if self._folder is not None and (earlier.paused or earlier.stop):
             _change(self._folder, lambda asked: Control(hints=asked.hints))
         self.say("evaluating", number)
 
     def asked(self) -> Control:
-        """What is asked of the study now."""
+        """Return the current request."""
         return self._control.read()
 
     def say(self, doing: Doing, number: int, fault: str | None = None) -> None:
-        """Writes what the study does where that has changed; a file that cannot be written is no matter.
+        """Write the status if it has changed; ignore a file that cannot be written.
 
         fault: None where there is nothing new to say of it.
         """
@@ -180,14 +180,14 @@ class Channel:
             replace_file(self._folder / STATUS, self._said.model_dump_json().encode())
 
     def finish(self, number: int) -> None:
-        """The study is finished; where an earlier session said so, it stays as it is."""
+        """Mark the study as finished, unless an earlier session did."""
         there = None if self._folder is None else read_status(self._folder)
         if self._said is not None or there is None or there.doing != "finished":
             self.say("finished", number)
 
 
 def _change(folder: Path, change: Callable[[Control], Control]) -> Control:
-    """Replaces what is asked of a study by what `change` makes of it."""
+    """Replace the request by the result of `change`."""
     try:
         with FileLock(folder / LOCK, timeout=LOCK_SECONDS):
             asked = change(read_control(folder))
@@ -198,7 +198,7 @@ def _change(folder: Path, change: Callable[[Control], Control]) -> Control:
 
 
 def _read(path: Path, schema: type[Content]) -> Content | None:
-    """The content of a file that another process wrote; None where there is none that can be used."""
+    """Return the content of a file that another process wrote; None if it is unusable."""
     try:
         if not path.is_file() or path.stat().st_size > LARGEST_FILE:
             return None

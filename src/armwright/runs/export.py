@@ -25,7 +25,7 @@ OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
 
 
 def export_design(run: Path, number: int | None, kind: str) -> str:
-    """The design with this number of a run, in a format; without a number, the knee of its front."""
+    """Return a design of a run in a format; without a number, the knee of its front."""
     if kind not in FORMATS:
         kinds = (*FORMATS, OPTUNA)
         raise SettingsError(f'unknown format "{kind}".{did_you_mean(kind, kinds)} Formats: {", ".join(kinds)}')

@@ -75,7 +75,7 @@ class RunFolder:
         self._lock.release()
 
     def adopt(self, config: RunConfig) -> RunConfig:
-        """The folder's configuration: `config` for a folder without trials, or for one whose run it extends.
+        """Return the folder's configuration: `config` for a folder without trials, or for one whose run it extends.
 
         RunConflictError with the differences where the folder holds a run with other settings.
         """
@@ -95,7 +95,7 @@ class RunFolder:
         return there
 
     def note_versions(self, config: RunConfig, evaluator: Evaluator | None = None) -> RunConfig:
-        """The configuration of a run that goes on: where the versions are others now, those before are noted."""
+        """Return the configuration of a resumed run, with earlier versions if they differ."""
         now = versions(evaluator)
         if config.versions != now:
             earlier = [*config.earlier_versions, config.versions]
@@ -127,14 +127,14 @@ class RunFolder:
             )
 
     def write_config(self, config: RunConfig) -> None:
-        """Replaces config.yaml in one step."""
+        """Replace config.yaml atomically."""
         content = config.model_dump(mode="json")
         self.write_text(CONFIG, yaml.dump(content, Dumper=_ConfigDumper, sort_keys=False, allow_unicode=True))
 
     def open_trials(
         self, space: DesignSpace, n_objectives: int = len(PAPER_OBJECTIVES), n_constraints: int = 0
     ) -> list[FinishedTrial]:
-        """The finished trials; a last line that a crash cut short is dropped. Opens the file for `append`."""
+        """Return the finished trials without a truncated last line, and open the file for `append`."""
         path = self.path / TRIALS
         trials, intact = read_trials(path, space, n_objectives, n_constraints)
         try:
@@ -146,7 +146,7 @@ class RunFolder:
         return trials
 
     def append(self, trial: FinishedTrial) -> None:
-        """Writes one finished trial: a single write, so that a crash leaves a whole line or a cut last one."""
+        """Append a finished trial in a single write, so that a crash truncates the last line at most."""
         assert self._trials is not None, "open_trials comes first"
         self._check_here()
         line = trial_line(trial)
@@ -174,15 +174,15 @@ class RunFolder:
             )
 
     def replace_trials(self, trials: Iterable[FinishedTrial]) -> None:
-        """Writes all trials anew."""
+        """Rewrite all trials."""
         self.write_bytes(TRIALS, b"".join(map(trial_line, trials)))
 
     def write_text(self, name: str, text: str) -> None:
-        """Replaces a file in one step, so that a crash leaves the old or the new one."""
+        """Replace a file atomically, so that a crash leaves the old or the new one."""
         self.write_bytes(name, text.encode())
 
     def write_bytes(self, name: str, content: bytes) -> None:
-        """The same for a file that is no text."""
+        """Replace a binary file atomically."""
         target = self.path / name
         self._check_here()
         try:
@@ -226,7 +226,7 @@ _ConfigDumper.add_representer(list, _ConfigDumper.represent_list)
 
 
 def read_config(path: Path) -> RunConfig:
-    """The configuration of a run folder."""
+    """Read the configuration of a run folder."""
     file = path / CONFIG
     try:
         text = file.read_text(encoding="utf-8")
@@ -247,7 +247,7 @@ def _writer(config: str) -> str:
 
 
 def read_run(path: str | Path) -> tuple[RunConfig, History]:
-    """The configuration and the finished trials of a run folder, for readers; nothing is changed."""
+    """Read the configuration and the finished trials of a run folder without changing it."""
     path = Path(path)
     config = read_config(path)
     trials, _ = read_trials(path / TRIALS, config.space, len(config.objectives), len(config.task.constraints))

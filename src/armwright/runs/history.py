@@ -1,4 +1,4 @@
-"""What a study has found so far: its finished trials, their front and hypervolume."""
+"""The history of a study: its finished trials, their front and hypervolume."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
@@ -76,7 +76,7 @@ class History:
         return iter(self.trials)
 
     def grown(self, trials: Sequence[FinishedTrial], frozen_reference_point: tuple[float, ...] | None) -> "History":
-        """The history of these trials, whose first are this one's; what is known of those is not computed again."""
+        """Return the history of these trials, which begin with this one's; reuse the values computed for those."""
         same_point = frozen_reference_point == self.frozen_reference_point
         if same_point and len(trials) == len(self):
             return self
@@ -86,7 +86,7 @@ class History:
         return History(self.problem, trials, self.n_init, frozen_reference_point, known)
 
     def _known(self, name: str, nothing: Any) -> tuple[Any, Sequence[FinishedTrial]]:
-        """What the earlier history knew, and the trials that came after it."""
+        """Return the earlier history's value, and the trials after it."""
         n, known = self.earlier.get(name, (0, nothing))
         return known, self.trials[n:]
 
@@ -119,7 +119,7 @@ class History:
         return np.vstack([known, masked_objectives(self.values[n:], self.violations[n:])])
 
     def nearest(self, most: int) -> list[int]:
-        """The numbers of so many designs at most that break the constraints least, summed; the nearest first."""
+        """Return at most this many trial numbers with the smallest total violation, in its order."""
         return np.argsort(total_violation(self.violations), kind="stable")[:most].tolist()
 
     @property
@@ -151,17 +151,17 @@ class History:
         return known
 
     def has_tried(self, design: Design) -> bool:
-        """Whether a trial has this design."""
+        """Return whether a trial has this design."""
         return self._first_of.get(design, len(self)) < len(self)
 
     def before(self, number: int) -> "History":
-        """What was known when trial `number` began."""
+        """Return the history at the start of trial `number`."""
         if number >= len(self):
             return self
         return History(self.problem, self.trials[:number], self.n_init, self.frozen_reference_point)
 
     def member(self, number: int) -> FrontMember:
-        """The design of one trial and its arm."""
+        """Return the design of one trial and its arm."""
         trial = self.trials[number]
         return FrontMember(number, trial.source, trial.design, self.problem.arm(trial.design), trial.values)
 
@@ -188,16 +188,16 @@ class History:
         return self.hypervolumes[self.n_init :]
 
     def found_reference_point(self) -> tuple[float, ...]:
-        """For a task that states none, from the first n_init trials."""
+        """Choose a reference point from the first n_init trials."""
         return found_reference_point(self.values[: self.n_init], self.violations[: self.n_init])
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
-        """The physics of these trials' designs, computed again (the kernels give the same bits)."""
+        """Evaluate the designs of these trials again; the kernels return the same bits."""
         return self.problem.physics([self.trials[number].design for number in numbers])
 
 
 def found_reference_point(values: Array, broken: Array) -> tuple[float, ...]:
-    """From the feasible designs of values (N, M) and broken (N, C), where their front has M designs; else from all.
+    """Choose a reference point from the feasible designs if their front has M designs, else from all.
 
     A front of fewer is the worst of itself in some objective: within 1.1 times its values there is hardly any room.
     """

@@ -1,4 +1,4 @@
-"""What a proposer's designs have in common, beside the black box's: round numbers, symmetry, repeats."""
+"""Bias of a proposer's designs, compared with the black box: round numbers, symmetry, repeats."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class SourceBias:
 
 @dataclass(frozen=True)
 class FrontShare:
-    """Which share of the front is the proposer's, after half of the counted iterations and at the end.
+    """A proposer's share of the front after half of the counted iterations and at the end.
 
     grows: whether it is larger at the end.
     """
@@ -53,7 +53,7 @@ class FrontShare:
 
 @dataclass(frozen=True)
 class ProposerBias:
-    """A proposer's designs beside the black box's; None where there are none of them.
+    """The bias of a proposer's designs and of the black box's; None without designs.
 
     symmetry_planes: the number of the targets' symmetry planes.
     """
@@ -65,7 +65,7 @@ class ProposerBias:
 
 
 def proposer_bias(history: History, proposer: str) -> ProposerBias:
-    """The bias of the trials whose source is `proposer`, and of the black box's."""
+    """Return the bias of the trials of a proposer, and of the black box's."""
     planes = symmetry_planes(history.problem.task.target_positions)
     return ProposerBias(
         symmetry_planes=len(planes),
@@ -76,7 +76,7 @@ def proposer_bias(history: History, proposer: str) -> ProposerBias:
 
 
 def source_bias(history: History, source: str, planes: Array) -> SourceBias | None:
-    """Of the source's designs; None where there are none.
+    """Return the bias of a source's designs; None if it has none.
 
     planes: (P, 3) the normals of the targets' symmetry planes.
     """
@@ -98,7 +98,7 @@ def source_bias(history: History, source: str, planes: Array) -> SourceBias | No
 
 
 def front_share(history: History, source: str) -> FrontShare | None:
-    """Of one source; None before the first counted iteration, and where the source has no trials."""
+    """Return a source's share of the front; None before the first counted iteration or without trials."""
     fronts = front_by_source(history)
     if source not in fronts or len(history) <= history.n_init:
         return None
@@ -108,13 +108,13 @@ def front_share(history: History, source: str) -> FrontShare | None:
 
 
 def are_round(lengths: Sequence[float], step: float) -> bool:
-    """Whether all `lengths` are multiples of `step` [m], within 1e-9 m."""
+    """Return whether all `lengths` are multiples of `step` [m], within 1e-9 m."""
     values = np.array(lengths)
     return bool(np.all(np.abs(values - step * np.round(values / step)) <= EXACT))
 
 
 def repeated(history: History) -> tuple[Mask, Mask]:
-    """(N,) and (N,): whether an earlier trial has the same design, and whether one has nearly the same."""
+    """Return two (N,) masks: an earlier trial has the same design; an earlier trial has nearly the same."""
     designs = [trial.design for trial in history]
     space = history.problem.space
     rows = space.matrix(designs)

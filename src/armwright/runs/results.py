@@ -1,4 +1,4 @@
-"""What is made from the finished trials of a run folder: the summary, tables, and the front's designs.
+"""Write the results of a run folder: the summary, tables, and the front's designs.
 
 summary.json              what the run came to
 trials.csv, front.csv     all trials, and those of the front
@@ -44,7 +44,7 @@ PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
 def write_results(
     folder: RunFolder, history: History, summary: Mapping[str, Any], verification: Verification | None
 ) -> None:
-    """Writes all of it; the summary last, as the sign that all is there.
+    """Write all results, and the summary last: it marks them as complete.
 
     verification: of the front, by rising position error; None where none was made.
     """
@@ -58,7 +58,7 @@ def write_results(
 
 
 def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
-    """Verifies the front of a finished run anew, and writes its results anew; its history and its summary."""
+    """Verify the front of a finished run again, rewrite its results, and return history and summary."""
     path = Path(path)
     config, history = read_run(path)
     summary = read_summary(path)
@@ -80,7 +80,7 @@ def results_are_there(path: Path, history: History) -> bool:
 
 
 def discard_results(path: Path) -> None:
-    """Takes away what says that a run is finished: its summary, its page and its figures."""
+    """Remove the summary, the page and the figures of a run, so that it is not finished."""
     try:
         (path / SUMMARY).unlink(missing_ok=True)
         (path / REPORT).unlink(missing_ok=True)
@@ -103,7 +103,7 @@ def summarize(
     proposer: ProposerSummary | None,
     verification: Verification | None = None,
 ) -> dict[str, Any]:
-    """What a study came to, as summary.json says it."""
+    """Return the content of summary.json for a study."""
     curve = history.hypervolume
     counted = curve[: config.study.n_total]  # without what was refined afterwards
     seconds: Counter[str] = Counter()
@@ -138,7 +138,7 @@ def summarize(
 def summarize_front(
     history: History, config: RunConfig, found: Array, search: Mapping[str, Any], verification: Verification | None
 ) -> dict[str, Any]:
-    """What a search for the whole front came to, as summary.json says it.
+    """Return the content of summary.json for a search for the whole front.
 
     found: (N, M) the whole front, of which `history` may hold a part only.
     search: evaluations, seconds, why it ended, and the hypervolume over the evaluations.
@@ -162,7 +162,7 @@ def summarize_front(
 def resummarize(
     summary: Mapping[str, Any], history: History, config: RunConfig, verification: Verification | None
 ) -> dict[str, Any]:
-    """The summary of a finished run after trials were added or designs verified; what only its sessions knew stays."""
+    """Return the summary after trials were added or designs verified; keep what only its sessions knew."""
     if isinstance(config.method, FrontMethod):
         return {**summary, "verification": _verification_record(history, verification)}
     known = {key: summary[key] for key in ("proposer", "proposer_bias", "refine") if key in summary}
@@ -216,7 +216,7 @@ def _feasibility_record(history: History) -> dict[str, Any]:
 
 
 def _front_gap_record(history: History, found: Array) -> dict[str, Any] | None:
-    """How a front compares with the best known one, where there is one."""
+    """Compare a front with the best known one, if there is one."""
     if history.reference_point is None:
         return None
     gap = front_gap(history.problem, found, history.reference_point)
@@ -224,7 +224,7 @@ def _front_gap_record(history: History, found: Array) -> dict[str, Any] | None:
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
-    """How many designs of the front are robust, the hypervolume of these, and that of what a workshop makes of all."""
+    """Return the number of robust designs, their hypervolume, and the worst-case hypervolume of the front."""
     if verification is None:
         return None
     robust = [member.number for member, holds in zip(history.front, verification.robust, strict=True) if holds]
@@ -240,7 +240,7 @@ def _verification_record(history: History, verification: Verification | None) ->
 
 
 def _verdicts(history: History, verification: Verification | None) -> dict[int, dict[str, Any]]:
-    """For each design of the front: whether it is robust, and its objectives under each disturbance."""
+    """Return for each design of the front whether it is robust, and its objectives in each case."""
     if verification is None:
         return {}
     return {
@@ -256,7 +256,7 @@ def _verdicts(history: History, verification: Verification | None) -> dict[int, 
 
 
 def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
-    """A verdict as columns of front.csv."""
+    """Return a verdict as columns of front.csv."""
     if verdict is None:
         return {}
     kinds = ("exact", "moved", "started")
@@ -363,7 +363,7 @@ def _rows(history: History) -> Iterable[dict[str, Any]]:
 
 
 def _violations(history: History, number: int) -> dict[str, Any]:
-    """Of one design, how far it breaks each constraint (<= 0: not at all); nothing of a task without any."""
+    """Return the violation of each constraint by one design; empty for a task without any."""
     names = [constraint.words for constraint in history.problem.constraints]
     return {"violations": dict(zip(names, history.trials[number].violations, strict=True))} if names else {}
 

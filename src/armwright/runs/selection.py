@@ -34,7 +34,7 @@ class Condition:
 
 
 def read_condition(words: str) -> Condition:
-    """`position_error<=0.05` as a condition; SettingsError where it is none. Nothing in it is evaluated."""
+    """Parse a condition such as `position_error<=0.05`; SettingsError if it is none."""
     found = _CONDITION.fullmatch(words)
     if found is None:
         raise SettingsError(f'--where "{words}": a name, one of <= < >= >, and a number are needed, such as mass<=2.5')
@@ -42,7 +42,7 @@ def read_condition(words: str) -> Condition:
 
 
 def read_weights(words: str) -> dict[str, float]:
-    """`position_error=2,torque=1` as weights by name."""
+    """Parse weights such as `position_error=2,torque=1`."""
     weights: dict[str, float] = {}
     for part in words.split(","):
         found = _WEIGHT.fullmatch(part)
@@ -57,7 +57,7 @@ def read_weights(words: str) -> dict[str, float]:
 
 
 def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
-    """What a design can be chosen by: its objectives, its real parameters, the length and mass of its arm.
+    """Return the quantities to select by: objectives, real parameters, the length and mass of the arm.
 
     And what the constraints bound.
     """
@@ -71,7 +71,7 @@ def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
 
 
 def bounded_numbers(history: History, number: int) -> dict[str, float]:
-    """The quantities of a design that the constraints bound, by name."""
+    """Return the quantities of a design that the constraints bound, by name."""
     pairs = zip(history.problem.constraints, history.trials[number].violations, strict=True)
     return {constraint.quantity.name: constraint.measured(broken) for constraint, broken in pairs}
 
@@ -83,7 +83,7 @@ def pick(
     weights: Mapping[str, float] | None = None,
     numbers: Sequence[int] | None = None,
 ) -> list[FrontMember]:
-    """The designs of the front that meet all conditions, the best first.
+    """Select the designs of the front that meet all conditions, the best first.
 
     by: the number that should be small. weights: of the objectives, each divided by its reference point, whose sum
     should be small. Without either, the knee of the front comes first, then what lies nearest to its corner.
@@ -135,7 +135,7 @@ def pick_from(
     weights: Mapping[str, float] | None = None,
     robust: bool = False,
 ) -> tuple[History, list[FrontMember]]:
-    """The same of a run folder; robust: only designs that hold when they are built a little off."""
+    """Select designs of a run folder; robust: only designs that were verified to be robust."""
     _, history = read_run(run)
     numbers = None
     if robust and history.front:
@@ -154,7 +154,7 @@ def _check_name(name: str, names: Sequence[str]) -> None:
 
 
 def _nearest_miss(where: Sequence[Condition], told: Sequence[Mapping[str, float]]) -> str:
-    """Why no design is left: the first condition that none meets, and how near the front comes to it."""
+    """Describe the first condition that no design meets, and the nearest value."""
     for condition in where:
         if not any(condition.holds(numbers) for numbers in told):
             values = [numbers[condition.name] for numbers in told]

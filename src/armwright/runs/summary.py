@@ -139,7 +139,7 @@ _OF_STUDY, _OF_SEARCH = TypeAdapter(StudySummary), TypeAdapter(SearchSummary)
 
 
 def checked_summary(content: Any) -> dict[str, Any]:
-    """The content of a summary.json, as it is; ValueError where it is none."""
+    """Validate and return the content of a summary.json; ValueError if it is none."""
     is_search = isinstance(content, dict) and "search" in content
     (_OF_SEARCH if is_search else _OF_STUDY).validate_python(content)
     return cast("dict[str, Any]", content)

@@ -16,7 +16,7 @@ TRIALS = "trials.jsonl"
 def read_trials(
     path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
 ) -> tuple[list[FinishedTrial], int]:
-    """The trials of a file, and its length [bytes] without a cut last line."""
+    """Read the trials of a file, and its length [bytes] without a truncated last line."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
@@ -29,7 +29,7 @@ def read_trials(
 def parse_trials(
     content: bytes, first: int, path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
 ) -> tuple[list[FinishedTrial], int]:
-    """The trials from number `first` on in a part of a file, and its length [bytes] without a cut last line."""
+    """Parse the trials from number `first` on, and the length [bytes] without a truncated last line."""
     end = content.rfind(b"\n") + 1
     trials: list[FinishedTrial] = []
     for number, line in enumerate(content[:end].split(b"\n")[:-1], start=first):
@@ -44,7 +44,7 @@ def parse_trials(
 
 
 class TrialsReader:
-    """Reads the finished trials of a run that may go on elsewhere; a line that was read is not read again."""
+    """Reader of a growing trials file that reads each line once."""
 
     def __init__(self, folder: Path, config: RunConfig) -> None:
         self._path = folder / TRIALS
@@ -54,7 +54,7 @@ class TrialsReader:
         self._file = 0  # which file it was
 
     def read_on(self) -> bool:
-        """Reads what has come; whether it is another file than before (the run was refined), read from its start."""
+        """Read new trials; return whether the file was replaced, as by a refinement, and read from its start."""
         try:
             with self._path.open("rb") as file:
                 there = os.fstat(file.fileno())

@@ -1,4 +1,4 @@
-"""Which designs of a front are robust: the solver is chaotic in places, so a search collects flukes.
+"""Verify which designs of a front are robust: the solver is chaotic in places, so a search collects flukes.
 
 Each design is computed again in float64: as it is, with its base or one link off by 1 mm, and from 20 other start
 postures. docs/method.md §10.
@@ -51,7 +51,7 @@ class Verification:
 
 
 def verify_front(history: History) -> Verification | None:
-    """The designs of a history's front; None as long as it has no reference point."""
+    """Verify the designs of a history's front; None while it has no reference point."""
     if history.reference_point is None or not history.front:
         return None
     designs = [member.design for member in history.front]
@@ -62,7 +62,7 @@ def verify_front(history: History) -> Verification | None:
 def verify(
     problem: Problem, designs: Sequence[Design], values: Array, reference_point: Sequence[float]
 ) -> Verification:
-    """Computes designs again, and says which are robust.
+    """Evaluate designs again, and decide which are robust.
 
     values: (N, M) what the search found.  reference_point: (M,) sets the scale of what is allowed.
     """
