@@ -179,7 +179,7 @@ def test_nearly_parallel_and_touching_segments() -> None:
 # What must hold whatever the arm
 
 
-def test_depth_is_that_of_the_axis_and_the_radius() -> None:
+def test_penetration_depth_adds_axis_and_radius() -> None:
     """A rod straight through a large sphere, a plate and a pole; and two links that cross."""
     rod = Arm((0.0, 0.0, 0.0), (Joint("revolute", "x", -1, 1),), (uniform_link((0.0, 0.0, 1.0), 1.0, 0.02),))
     for obstacle, depth in (
@@ -197,7 +197,7 @@ def test_depth_is_that_of_the_axis_and_the_radius() -> None:
     assert clearances(stack_arms([square]), folded)[0][0, 0] == pytest.approx(-0.04, abs=1e-6)
 
 
-def test_infinity_where_there_is_nothing_to_hit() -> None:
+def test_clearance_is_infinite_without_anything_to_hit() -> None:
     own, clear = clearances(stack_arms(moving_arms(5, 2, 0)), np.zeros((5, 4, 2)))
     assert own.shape == clear.shape == (5, 4)
     assert np.all(np.isinf(own))
@@ -205,7 +205,7 @@ def test_infinity_where_there_is_nothing_to_hit() -> None:
     assert np.all(np.isfinite(clearances(stack_arms(moving_arms(5, 3, 0)), np.zeros((5, 4, 3)))[0]))
 
 
-def test_moving_everything_changes_nothing() -> None:
+def test_clearance_is_invariant_to_rigid_motion() -> None:
     rng = np.random.default_rng(2)
     turn, shift = 1.1, (0.3, -0.2, 0.4)
     c, s = np.cos(turn), np.sin(turn)
@@ -241,7 +241,7 @@ def test_moving_everything_changes_nothing() -> None:
     assert np.array(after) == pytest.approx(np.array(before), abs=1e-9)
 
 
-def test_thicker_links_are_nearer() -> None:
+def test_thicker_links_have_less_clearance() -> None:
     arms = [
         Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -3, 3) for axis in ("x", "y", "x", "y", "x")), links)
         for links in (tuple(uniform_link((0.0, 0.0, 0.3), 1.0, 0.01) for _ in range(5)) for _ in range(100))
@@ -258,7 +258,7 @@ def test_thicker_links_are_nearer() -> None:
     assert np.mean(rest < thin[1] - 0.019) > 0.5
 
 
-def test_links_that_are_not_there() -> None:
+def test_links_of_no_radius_are_ignored() -> None:
     """Of radius 0: as if the arm ended before them."""
     arms = stack_arms(moving_arms(30, 6, 2))
     q = random_postures(moving_arms(30, 6, 2), 3, 0)
@@ -308,7 +308,7 @@ def test_the_first_link_may_stand_on_what_its_foot_touches() -> None:
     assert out == pytest.approx(0.2 - 0.015), "straight out of a wall"
 
 
-def test_both_ways_to_arrays_have_the_radius() -> None:
+def test_stacked_designs_and_arms_have_equal_radii() -> None:
     space = paper_space(5)
     designs = space.sample(20, 0)
     one, other = stack_designs(space, space.matrix(designs)), stack_arms([space.arm(design) for design in designs])
@@ -317,7 +317,7 @@ def test_both_ways_to_arrays_have_the_radius() -> None:
     assert one[3:5].radius.shape == (2, 5)
 
 
-def test_an_evaluation_measures_only_when_asked() -> None:
+def test_clearance_is_computed_on_demand() -> None:
     arms = moving_arms(4, 4, 0)
     targets = np.random.default_rng(0).uniform(-0.5, 0.5, (3, 3))
     ground = (Ground(kind="ground", z=-1.0),)
@@ -332,7 +332,7 @@ def test_an_evaluation_measures_only_when_asked() -> None:
     assert np.all(np.isinf(plain.obstacle_clearance))
 
 
-def test_many_arms_in_threads_are_as_one_by_one() -> None:
+def test_threads_do_not_change_clearance() -> None:
     arms = moving_arms(700, 4, 9)
     q = random_postures(arms, 8, 2)
     obstacles = [random_obstacle(np.random.default_rng(1), kind) for kind in SHAPES]
@@ -342,7 +342,7 @@ def test_many_arms_in_threads_are_as_one_by_one() -> None:
         assert np.array_equal(one[:, 0], all_at_once[:, n])
 
 
-def test_arms_that_slide_or_hold_still_are_where_their_links_are() -> None:
+def test_prismatic_and_fixed_joints_place_their_links() -> None:
     content = {"joints": [2, 5], "joint_types": ["P", "O", "F", "X", "S"], "link_directions": ["+z", "+x"]}
     space = DesignSpace.model_validate({**content, "mount": ["ceiling"], "tool": [0.1, 0.0, 0.0]})
     designs = [d for d in space.sample(60, 4) if d.joints[0] == "P"]
@@ -367,7 +367,7 @@ def segment_distance(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> f
     return float(np.linalg.norm(point - start - share * along))
 
 
-def test_what_is_rigidly_connected_cannot_hit_itself() -> None:
+def test_rigidly_connected_links_are_ignored() -> None:
     """A hook of three links, of which the last two hold still."""
     links = [uniform_link(offset, 0.1, 0.02) for offset in ((0.0, 0.0, 0.1), (0.05, 0.0, 0.0), (0.0, 0.0, -0.1))]
     hinge, fixed = Joint("revolute", "y", -2.0, 2.0), Joint("fixed", "z")

@@ -72,14 +72,14 @@ def test_a_forked_child_solves_too() -> None:
 # Devices
 
 
-def test_auto_is_cuda_only_where_it_is_and_for_much_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_selects_cuda_for_many_designs_on_a_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
     for there, many, expected in ((True, True, "cuda"), (True, False, "cpu"), (False, True, "cpu")):
         monkeypatch.setattr(devices, "_has_cuda", lambda there=there: there)
         assert devices.resolve_device("auto", many) == expected
         assert devices.resolve_device("cpu", many) == "cpu"
 
 
-def test_devices_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unavailable_devices_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(devices, "_has_cuda", lambda: False)
     with pytest.raises(SettingsError, match=r'device = "cuda": no NVIDIA GPU with its driver found; try .*"cpu"'):
         devices.resolve_device("cuda", many=True)
@@ -95,7 +95,7 @@ def test_devices_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
         asking.evaluate_matrix(asking.space.matrix(designs))
 
 
-def test_auto_is_settled_when_the_problem_is_made() -> None:
+def test_problem_resolves_auto_device_once() -> None:
     assert Problem(load_task("target-1"), device="auto").device in ("cpu", "cuda")  # type: ignore[arg-type]
 
 
@@ -168,7 +168,7 @@ def test_chunks_do_not_change_the_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     assert asked.evaluate_matrix(matrix[:0]).values.shape == (0, 2)
 
 
-def test_many_targets_are_a_question_of_memory_alone() -> None:
+def test_many_targets_are_solved_in_chunks() -> None:
     asked = Problem(load_task("target-1"))
     arms = problem.stack_designs(asked.space, asked.space.matrix(asked.space.sample(3, 4)))
     targets = np.random.default_rng(4).uniform(-0.7, 0.7, (2000, 3))
@@ -178,13 +178,13 @@ def test_many_targets_are_a_question_of_memory_alone() -> None:
 
 
 @pytest.mark.parametrize(("said", "most"), [("1", 1), ("3,1", 3), ("", 8), ("many", 8), ("0", 8), ("99", 8)])
-def test_threads_are_no_more_than_openmp_s(monkeypatch: pytest.MonkeyPatch, said: str, most: int) -> None:
+def test_omp_num_threads_limits_cores(monkeypatch: pytest.MonkeyPatch, said: str, most: int) -> None:
     monkeypatch.setattr(devices.os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", said)
     assert devices.cores() == most
 
 
-def test_threads_that_solve_other_numbers_of_arms_at_other_tasks_get_the_same_bits() -> None:
+def test_concurrent_threads_get_the_same_bits() -> None:
     problems = [Problem(load_task(name)) for name in ("target-1", "target-2", "autodesign-1")]
     known = [(rows := p.space.matrix(p.space.sample(700, 0)), p.evaluate_matrix(rows).values) for p in problems]
     wrong: list[tuple[int, int]] = []

@@ -85,7 +85,7 @@ def loaded(arm: Arm, payload: float) -> Arm:
 # Inverse dynamics
 
 
-def test_inertia_is_that_of_the_files_in_float64() -> None:
+def test_inertia_equals_exported_files() -> None:
     arms = any_arms(60, 0)
     for precision in ("float32", "float64"):
         inertia = stack_arms(arms, precision).bodies.inertia
@@ -95,7 +95,7 @@ def test_inertia_is_that_of_the_files_in_float64() -> None:
             assert not inertia[row, len(arm.links) :].any()
 
 
-def test_torques_are_pinocchio_s() -> None:
+def test_torques_agree_with_pinocchio() -> None:
     arms = any_arms(120, 1)
     arrays, q, v, a = motions(arms, 4, 2)
     payload = np.array([0.0, 0.5, 1.0, 2.0])
@@ -114,7 +114,7 @@ def test_torques_are_pinocchio_s() -> None:
             assert not mine[~moving].any()
 
 
-def test_torques_are_mujoco_s() -> None:
+def test_torques_agree_with_mujoco() -> None:
     arms = any_arms(30, 3)
     arrays, q, v, a = motions(arms, 1, 4)
     ours = inverse_dynamics(arrays, q, v, a, np.array([0.7]))
@@ -129,7 +129,7 @@ def test_torques_are_mujoco_s() -> None:
         assert mine == pytest.approx(data.qfrc_inverse, rel=1e-7, abs=1e-7 * max(1.0, np.abs(mine).max()))
 
 
-def test_power_is_the_change_of_energy() -> None:
+def test_power_equals_change_of_energy() -> None:
     """Along any motion: v · torque = d(kinetic + potential)/dt, the energies by hand from the links' own motions."""
     arms = any_arms(20, 5)
     arrays, q, v, a = motions(arms, 1, 6)
@@ -152,7 +152,7 @@ def test_power_is_the_change_of_energy() -> None:
     assert power == pytest.approx(change, rel=1e-6, abs=1e-5)
 
 
-def test_the_jacobian_s_rate_is_its_difference() -> None:
+def test_jacobian_rate_agrees_with_finite_differences() -> None:
     arrays, q, v, _ = motions(any_arms(60, 7), 3, 8)
     h = 1e-6
     difference = (jacobians(arrays, q + h * v) - jacobians(arrays, q - h * v)) / (2 * h)
@@ -174,7 +174,7 @@ def test_a_move_begins_and_ends_at_rest_and_covers_its_line() -> None:
     assert acceleration.max() == pytest.approx(10 / np.sqrt(3), rel=1e-5)
 
 
-def test_short_moves_are_looked_at_between_their_samples() -> None:
+def test_short_moves_are_checked_between_samples() -> None:
     moves = Moves(((0, 1), (1, 2)), 0.02, (2.0, 0.5))
     targets = np.array([[0.0, 0, 0], [0.01, 0, 0], [1.01, 0, 0]])
     lines = sample_moves(moves, targets)
@@ -222,7 +222,7 @@ def test_without_joints_to_spare_torques_are_those_of_the_samples_differences() 
         assert np.abs(theirs - ours).max() < 0.005 * np.abs(theirs).max()
 
 
-def test_a_finer_step_finds_the_same() -> None:
+def test_finer_step_gives_the_same_torques() -> None:
     """With joints to spare, too, whose samples drift: what is sought is of each posture by itself."""
     space = paper_space(6)
     arms = [space.arm(design) for design in space.sample(200, 1)]
@@ -253,7 +253,7 @@ def test_a_slow_move_takes_what_gravity_takes_and_twice_the_speed_four_times_the
     assert np.all(dynamic(faster) > still), "of arms that move at all, some joint is driven at full weight"
 
 
-def test_one_arm_is_as_one_of_many() -> None:
+def test_batch_does_not_change_drives() -> None:
     space = paper_space(4)
     arms = [space.arm(design) for design in space.sample(300, 0)]
     many = timed(arms, 1.0, 0.4).drives
@@ -263,7 +263,7 @@ def test_one_arm_is_as_one_of_many() -> None:
         assert np.array_equal(one.speeds[0], many.speeds[i])
 
 
-def test_arms_that_cannot_move_need_no_more_than_to_be_held() -> None:
+def test_immobile_arms_need_static_torque_only() -> None:
     stiff = Arm((0.1, 0.0, 0.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.0, 0.0), 1.0, 0.01),))
     spinning = Arm((0.0, 0.0, 0.0), (Joint("revolute", "z", -2.0, 2.0),), (uniform_link((0.0, 0.0, 0.3), 1.0, 0.01),))
     drives = timed([stiff, spinning], 1.0, 1.0).drives
@@ -285,7 +285,7 @@ def test_each_move_has_its_own_time() -> None:
     assert np.array_equal(shares[:, 2], most[:, first:].max(axis=1))
 
 
-def test_a_joint_at_its_limit_is_not_driven_beyond() -> None:
+def test_joint_at_its_limit_stays_there() -> None:
     """A slide at the end of its way stays there, though it alone could go on along the line."""
     arm = Arm(
         (0.0, 0.0, 0.0),
@@ -303,7 +303,7 @@ def test_a_joint_at_its_limit_is_not_driven_beyond() -> None:
 # Actuators
 
 
-def test_uses_are_of_what_actuators_can() -> None:
+def test_utilisation_is_relative_to_actuator_limits() -> None:
     """A slide of 0.02 m a radian: force and way at its motor."""
     motor, other = Actuator("a", 0.1, 4.0, 5.0), Actuator("b", 0.1, 9.0, 2.0)
     motors = (motor, other, other, motor)
@@ -325,7 +325,7 @@ def test_uses_are_of_what_actuators_can() -> None:
     assert np.isfinite(use(timed([unknown], 0.5, 0.5))).all()
 
 
-def test_constraints_bound_them() -> None:
+def test_constraints_on_dynamic_quantities() -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"]})
     names = ("dynamic_torque", "dynamic_utilisation", "speed_utilisation")
     designs = space.sample(30, 0)
@@ -340,7 +340,7 @@ def test_constraints_bound_them() -> None:
 
 
 @pytest.mark.parametrize("objective", [objective.name for objective in OF_TIME])
-def test_they_need_moves_that_take_time(objective: str) -> None:
+def test_dynamic_objectives_require_timed_moves(objective: str) -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"]})
     with pytest.raises(SettingsError, match=r"move_time: 1\.5"):
         Problem(task(objectives=[objective]), space).evaluate(space.sample(1, 0))
@@ -351,7 +351,7 @@ def test_they_need_moves_that_take_time(objective: str) -> None:
 # From the file on
 
 
-def test_a_task_says_one_time_or_each() -> None:
+def test_move_time_is_one_value_or_one_per_move() -> None:
     assert task(move_time=2).straight_moves.times == (2.0, 2.0)
     assert task(move_time=[2, 0.5]).straight_moves.times == (2.0, 0.5)
     assert task().straight_moves.times == ()
@@ -368,7 +368,7 @@ def test_a_task_says_one_time_or_each() -> None:
         "{move_time: soon}": "move_time",
     }.items(),
 )
-def test_times_that_cannot_be_are_refused(in_folder: Path, how: str, words: str) -> None:
+def test_invalid_move_times_are_refused(in_folder: Path, how: str, words: str) -> None:
     content = {"name": "x", "targets": [list(point) for point in CORNERS], "moves": "in_order", **yaml.safe_load(how)}
     (in_folder / "it.yaml").write_text(yaml.safe_dump(content))
     told = CliRunner().invoke(app, ["tasks", "it.yaml"])
@@ -378,7 +378,7 @@ def test_times_that_cannot_be_are_refused(in_folder: Path, how: str, words: str)
 
 
 @pytest.mark.slow
-def test_a_run_with_times_from_the_command_line(in_folder: Path) -> None:
+def test_move_time_on_the_command_line(in_folder: Path) -> None:
     text = f"name: line\ntargets: {[list(point) for point in CORNERS]}\nmoves: in_order\n"
     text += "objectives: [position_error, dynamic_torque]\n"
     (in_folder / "line.yaml").write_text(f"{text}move_time: 1.5\n")

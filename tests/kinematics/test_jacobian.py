@@ -37,7 +37,7 @@ def postures(arms: list[Arm], t: int, dof: int, seed: int = 0) -> Array:
 @pytest.mark.parametrize(
     "arms", [general_arms(25, 5, 3), moving_arms(25, 1, 0), [SLIDING.arm(design) for design in SLIDING.sample(40, 1)]]
 )
-def test_the_jacobian_is_pinocchio_s(arms: list[Arm]) -> None:
+def test_jacobian_agrees_with_pinocchio(arms: list[Arm]) -> None:
     stacked = stack_arms(arms, "float64")
     q = postures(arms, 3, stacked.dof)
     ours, frames = jacobians(stacked, q), forward_kinematics(stacked, q)
@@ -55,7 +55,7 @@ def test_the_jacobian_is_pinocchio_s(arms: list[Arm]) -> None:
             assert frames.tip[i, t] == pytest.approx(data.oMf[tip].translation, abs=1e-9)
 
 
-def test_manipulability_and_dexterity_are_those_of_the_singular_values() -> None:
+def test_manipulability_and_dexterity_follow_from_singular_values() -> None:
     arms = moving_arms(30, 6, 5)
     evaluation = evaluate(arms, np.random.default_rng(0).uniform(-0.6, 0.6, (4, 3)))
     for i, arm in enumerate(arms):
@@ -68,13 +68,13 @@ def test_manipulability_and_dexterity_are_those_of_the_singular_values() -> None
             assert evaluation.dexterity[i, t] == pytest.approx(1.0 / np.linalg.cond(j), rel=1e-3, abs=1e-6)
 
 
-def test_manipulability_is_scikit_robot_s() -> None:
+def test_manipulability_agrees_with_scikit_robot() -> None:
     evaluation = evaluate(moving_arms(20, 5, 2), [[0.3, 0.2, 0.1]])
     theirs = manipulability(jacobians(evaluation.arms, evaluation.q)[:, 0])
     assert evaluation.manipulability[:, 0] == pytest.approx(theirs, rel=1e-6, abs=1e-9)
 
 
-def test_two_links_in_a_plane_have_a_closed_form_and_cannot_leave_it() -> None:
+def test_planar_arm_has_the_closed_form_manipulability() -> None:
     """With a joint about z below them: w = a b |sin elbow| times the tip's distance from that axis."""
     a, b = 0.3, 0.2
     links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (0.1, a, b))
@@ -89,7 +89,7 @@ def test_two_links_in_a_plane_have_a_closed_form_and_cannot_leave_it() -> None:
     assert anisotropy(evaluate([planar], [[0.2, 0.0, 0.3]]))[0] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_three_rails_are_as_dexterous_as_can_be() -> None:
+def test_three_orthogonal_rails_have_dexterity_one() -> None:
     rails = tuple(Joint("prismatic", axis, -0.5, 0.5) for axis in ("x", "y", "z"))
     links = tuple(uniform_link((0.0, 0.0, 0.05), 0.1, 0.01) for _ in rails)
     evaluation = evaluate([Arm((0.0, 0.0, 0.0), rails, links)], [[0.1, 0.2, 0.3]])
@@ -113,7 +113,7 @@ def test_a_larger_arm_is_as_dexterous_and_moves_more() -> None:
     assert other == pytest.approx(3.0 * one)
 
 
-def test_clumsiness_is_of_the_worst_target_and_costs_nothing_where_nobody_asks() -> None:
+def test_anisotropy_is_of_the_worst_target_and_computed_on_demand() -> None:
     space, task = paper_space(5), load_task("shelf").model_copy(update={"reference_point": None})
     problem = Problem(task, space, objectives=named_objectives(["anisotropy", "position_error"]))
     designs = space.sample(20, 3)

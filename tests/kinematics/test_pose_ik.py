@@ -72,7 +72,7 @@ def test_reference_agrees_with_pinocchio(dof: int) -> None:
 
 
 @KINDS
-def test_angles_left_agree_with_pinocchio(rows: int) -> None:
+def test_angle_errors_agree_with_pinocchio(rows: int) -> None:
     """What is left to turn, and the angle that the kernels report, from Pinocchio's logarithm and arc cosine."""
     arms, asked = tooled_arms(100, 5, 2), target_arrays([rows] * 2, 3)
     points = np.array([[0.3, -0.2, 0.4], [0.1, 0.3, -0.2]])
@@ -150,7 +150,7 @@ def states(chains: reference.Chains, seed: int) -> tuple[Array, Array, Array]:
 
 
 @pytest.mark.parametrize("dof", [3, 6, 7])
-def test_targets_of_all_kinds_side_by_side(dof: int) -> None:
+def test_mixed_target_kinds_agree_with_the_reference(dof: int) -> None:
     """Points, axes and orientations in one kernel, 8 updates from a posture of their own: as the reference's."""
     arms = tooled_arms(200, dof, 7)
     moving = [j for j, joint in enumerate(arms[0].joints) if joint.kind != "fixed"]
@@ -170,7 +170,7 @@ def test_targets_of_all_kinds_side_by_side(dof: int) -> None:
     assert np.all(ours.angle[:, [1, 3]] == 0.0)
 
 
-def test_a_point_beside_others_is_solved_as_alone() -> None:
+def test_point_target_does_not_depend_on_other_targets() -> None:
     """To rounding: after 5 updates in float64 the tips agree, after 100 as many are reached."""
     arms, points = stack_arms(paper_arms(400, 5, 3), "float64"), np.array([[0.3, 0.2, 0.4], [-0.2, 0.4, 0.1]])
     asked = target_arrays([0, 2])
@@ -182,7 +182,7 @@ def test_a_point_beside_others_is_solved_as_alone() -> None:
         assert abs(reached[0].mean() - reached[1].mean()) < 5e-3
 
 
-def test_points_alone_take_the_kernels_for_points() -> None:
+def test_point_targets_use_position_kernels() -> None:
     arms, points = stack_arms(paper_arms(50, 4, 3)), np.array([[0.3, 0.2, 0.4]] * 3)
     plain, asked = solve_postures(arms, points), solve_postures(arms, points, target_arrays=position_targets(3))
     assert np.array_equal(plain.q, asked.q)
@@ -191,7 +191,7 @@ def test_points_alone_take_the_kernels_for_points() -> None:
 
 
 @KINDS
-def test_what_an_arm_can_do_is_found(rows: int) -> None:
+def test_reachable_poses_are_reached(rows: int) -> None:
     """Six joints with a wrist at postures of their own: from 20 starts nearly all of these are reached again."""
     space = DesignSpace(
         name="wrist", joints=6, joint_types=("Y", "P"), origin_x=(0, 0), origin_y=(0, 0), origin_z=(0, 0)
@@ -231,7 +231,7 @@ def test_result_does_not_depend_on_the_batch() -> None:
 
 
 @KINDS
-def test_kept_posture_does_not_get_worse_and_keeps_the_limits(rows: int) -> None:
+def test_best_posture_never_gets_worse_within_limits(rows: int) -> None:
     arms, asked = stack_arms(tooled_arms(300, 6, 13)), target_arrays([rows] * 2, 5)
     points = np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     off = [
@@ -246,7 +246,7 @@ def test_kept_posture_does_not_get_worse_and_keeps_the_limits(rows: int) -> None
 
 
 @KINDS
-def test_world_turned_about_the_vertical(rows: int) -> None:
+def test_result_rotates_with_the_world(rows: int) -> None:
     """A quarter turn of base, tool and targets turns the result: x becomes y, and joints about y turn the other way."""
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     arms, points, asked = (
@@ -320,7 +320,7 @@ def _mirrored(arm: Arm) -> Arm:
 
 @KINDS
 @pytest.mark.parametrize("precision", ["float32", "float64"])
-def test_half_a_turn_is_defined(rows: int, precision: str) -> None:
+def test_rotation_by_pi_is_defined(rows: int, precision: str) -> None:
     """A tool that stands the wrong way round, exactly: about its own y for an axis, and finite for any frame."""
     pitch = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -3.1, 3.1),) * 3, (uniform_link((0, 0, 0.2), 0.1, 0.01),) * 3)
     points = np.array([[0.2, 0.0, 0.1]])
@@ -341,7 +341,7 @@ def test_half_a_turn_is_defined(rows: int, precision: str) -> None:
     assert found.angle[0, 0] < np.pi - 0.1
 
 
-def test_tools_of_mounted_arms_point_where_the_arm_says() -> None:
+def test_stacked_designs_and_arms_have_equal_tools() -> None:
     """`stack_designs` and `stack_arms` agree to the bit, for all mounts."""
     space = DesignSpace(name="any", joints=4, mount=tuple(MOUNTS))
     designs = space.sample(50, 0)
@@ -355,7 +355,7 @@ def test_tools_of_mounted_arms_point_where_the_arm_says() -> None:
 # Restarts
 
 
-def test_restarts_never_make_it_worse_and_begin_with_the_usual_start() -> None:
+def test_restarts_never_increase_the_error() -> None:
     arms, points = stack_arms(general_arms(100, 5, 3)), np.random.default_rng(3).uniform(-0.6, 0.6, (4, 3))
     least = evaluate_arrays(arms, points).position_error
     for restarts in (1, 3):

@@ -178,7 +178,7 @@ def test_single_updates_in_float64_agree_with_the_reference(dof: int, arms_of: A
     assert np.abs((h_after - expected_h[:, 0]) / (1.0 + expected_h[:, 0])).max() < 1e-12
 
 
-def test_joint_that_stays_at_its_limit_is_held_back() -> None:
+def test_weights_depend_on_the_rising_limit_gradient() -> None:
     """H equal to H before counts as not falling, so w = 1/(1+H): as if H before had been 0."""
     arms = paper_arms(200, 4, 5)
     arrays = stack_arms(arms)
@@ -212,7 +212,7 @@ def least_root(chains: Chains, q: Array, h_before: Array) -> Array:
     return np.sqrt(np.linalg.eigvalsh((J * w[..., None, :]) @ np.swapaxes(J, -1, -2))[..., 0] + k)
 
 
-def test_float32_products_would_not_do() -> None:
+def test_float32_products_are_not_accurate_enough() -> None:
     """Two long links (10 m): J Jᵀ is singular, and only in float64 is its determinant seen to be 0."""
     joints = (Joint("revolute", "x", -2.4, 2.4), Joint("revolute", "y", -2.4, 2.4))
     arms = [Arm((0.0, 0.0, 0.0), joints, (uniform_link((0, 0, 10.0), 1.0, 0.1),) * 2)] * 500
@@ -296,7 +296,7 @@ def test_position_errors_agree_with_scikit_robot() -> None:
     assert (np.abs(ours - theirs) < 0.01 * theirs + 1e-3).mean() > 0.9
 
 
-def test_kept_posture_keeps_its_promises() -> None:
+def test_best_posture_respects_limits_and_its_torque() -> None:
     """reached = FK(q); limits kept; never farther than the straight start; the torque is that of the posture."""
     for arms in (paper_arms(2000, 4, 9), general_arms(2000, 6, 9)):
         targets = np.random.default_rng(9).uniform(-0.8, 0.8, (3, 3))
@@ -310,7 +310,7 @@ def test_kept_posture_keeps_its_promises() -> None:
         assert np.abs((reference.gravity_torque(chains, q) - postures.torque) / scale).max() < 1e-5
 
 
-def test_no_update_is_the_straight_start_and_more_never_hurt() -> None:
+def test_more_updates_never_increase_the_error() -> None:
     arms, targets = stack_arms(general_arms(300, 4, 10)), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     assert not solve_postures(arms, targets, updates=0).q.any()
     errors = [error_of(solve_postures(arms, targets, updates=n), targets) for n in (0, 1, 2, 5, 20, 100)]
@@ -376,7 +376,7 @@ def same_bits(whole: Postures, part: Postures, rows: object) -> None:
 # Starts
 
 
-def test_start_at_zero_is_the_straight_one_and_any_start_is_kept_if_best() -> None:
+def test_initial_posture_is_kept_if_best() -> None:
     """Of the start and all results the nearest is kept, so from the kept posture nothing gets worse."""
     arms, targets = stack_arms(general_arms(200, 4, 17)), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     straight = solve_postures(arms, targets)
@@ -388,7 +388,7 @@ def test_start_at_zero_is_the_straight_one_and_any_start_is_kept_if_best() -> No
     assert error_of(again, targets).mean() < error_of(straight, targets).mean()
 
 
-def test_starts_broadcast_and_are_moved_into_the_limits() -> None:
+def test_initial_q_broadcasts_and_is_clipped_to_limits() -> None:
     arms, targets = stack_arms(general_arms(50, 3, 18)), np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1]])
     own = moving(arms)
     low, high = (np.broadcast_to(limits[:, None, own], (50, 2, 3)) for limits in (arms.lower, arms.upper))
@@ -400,7 +400,7 @@ def test_starts_broadcast_and_are_moved_into_the_limits() -> None:
         assert np.array_equal(q, np.broadcast_to(start, q.shape).astype(np.float32))
 
 
-def test_start_in_float64() -> None:
+def test_initial_q_in_float64() -> None:
     arms, targets = general_arms(50, 3, 19), np.array([[0.4, 0.1, 0.3]])
     start = np.random.default_rng(19).uniform(-0.2, 0.2, (50, 1, 3))
     kept = solve_postures(stack_arms(arms, "float64"), targets, 0, initial_q=start, precision="float64")
@@ -446,7 +446,7 @@ def turned_points(points: Array) -> Array:
     return np.stack([-points[..., 1], points[..., 0], points[..., 2]], axis=-1)
 
 
-def test_problem_turned_about_the_vertical() -> None:
+def test_result_rotates_with_the_world() -> None:
     """Turned by 90°, R and P change places: single updates within 1e-4 rad, whole solves in distribution."""
     space = paper_space()
     designs = space.sample(2000, 14)
@@ -506,7 +506,7 @@ def test_refused_settings_are_named() -> None:
     assert same_arms.q.dtype == same_arms.reached.dtype == same_arms.torque.dtype == np.float64
 
 
-def test_a_start_at_zero_that_limits_exclude_is_moved_to_the_nearest() -> None:
+def test_zero_outside_the_limits_is_clipped() -> None:
     link = uniform_link((0.0, 0.0, 0.2), 0.1, 0.015)
     joints = (Joint("revolute", "x", 0.5, 1.0), Joint("revolute", "y", -1.0, -0.25), Joint("prismatic", "z", 0.1, 0.3))
     arrays = stack_arms([Arm((0.0, 0.0, 0.0), joints, (link,) * 3)])
@@ -521,7 +521,7 @@ def test_sixteen_joints_and_limits_of_a_full_turn_are_taken() -> None:
     assert np.isfinite(solve_postures(arrays, np.array([[0.3, 0.0, 0.3]])).torque).all()
 
 
-def test_limits_are_never_wider_in_float32() -> None:
+def test_float32_limits_are_never_wider() -> None:
     """float32(2.4) is 1e-7 more than 2.4: rounded to the inside, so that no kept angle is beyond its limit."""
     for arms in (paper_arms(1, 4, 15), general_arms(100, 5, 15)):
         arrays, chains = stack_arms(arms), reference.chains(arms)
@@ -533,7 +533,7 @@ def test_limits_are_never_wider_in_float32() -> None:
         assert np.array_equal(wide.upper, chains.upper[:, 0])
 
 
-def test_fixed_joints_join_their_links() -> None:
+def test_fixed_joints_merge_their_links() -> None:
     """An arm cut into pieces by fixed joints moves and weighs the same; what stands before joint 1 only lifts it."""
     joint = Joint("revolute", "y", -2.0, 2.0)
     fixed = Joint("fixed", "z")

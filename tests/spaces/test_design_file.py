@@ -19,7 +19,7 @@ PROBLEM = Problem(load_task("target-1"))
 GIVEN = PROBLEM.space.sample(2, 77)
 
 
-def test_the_first_trials_are_theirs(tmp_path: Path) -> None:
+def test_initial_designs_are_the_first_trials(tmp_path: Path) -> None:
     run = optimize(PROBLEM, proposer=None, n_init=5, n_total=10, initial_designs=GIVEN, out=tmp_path / "run")
     assert [trial.source for trial in run.trials] == ["initial_design"] * 2 + ["random"] * 3 + ["bbo"] * 10
     assert [trial.design for trial in run.trials[:2]] == GIVEN
@@ -35,14 +35,14 @@ def test_the_first_trials_are_theirs(tmp_path: Path) -> None:
         optimize(PROBLEM, proposer=None, n_init=5, n_total=14, out=tmp_path / "run")
 
 
-def test_what_cannot_start_is_refused() -> None:
+def test_invalid_initial_designs_are_refused() -> None:
     with pytest.raises(SettingsError, match="2 initial designs do not fit into the n_init = 1 first trials"):
         optimize(PROBLEM, n_init=1, initial_designs=GIVEN)
     with pytest.raises(DesignError, match="joint_5"):
         optimize(PROBLEM, initial_designs=paper_space(5).sample(1, 0))
 
 
-def test_from_a_run_of_before(tmp_path: Path) -> None:
+def test_initial_design_from_an_earlier_run(tmp_path: Path) -> None:
     begun = CliRunner().invoke(
         app, ["optimize", "target-1", "--n-total", "10", "--no-figures", "--out", str(tmp_path / "a")]
     )
@@ -57,7 +57,7 @@ def test_from_a_run_of_before(tmp_path: Path) -> None:
     assert "initial_designs:" in config
 
 
-def test_files_that_hold_no_design_are_refused(tmp_path: Path) -> None:
+def test_files_without_a_design_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(json.dumps({"params": {**GIVEN[0].params, "link_1": 3.0}}))
     with pytest.raises(DesignError, match=r"mine.yaml: link_1 = 3 m is outside"):

@@ -25,7 +25,7 @@ from armwright.tasks.catalogue import load_task
 GOOD = paper_space().sample(1, 0)[0].params
 
 
-def test_the_papers_space() -> None:
+def test_paper_space_has_the_parameters_of_the_paper() -> None:
     space = paper_space(joints=4)
     names = [parameter.name for parameter in space.parameters]
     joints = [f"joint_{j}" for j in (1, 2, 3, 4)]
@@ -36,7 +36,7 @@ def test_the_papers_space() -> None:
 
 
 @pytest.mark.parametrize("joints", range(1, 9))
-def test_there_are_2d_plus_3_parameters(joints: int) -> None:
+def test_paper_space_has_2d_plus_3_parameters(joints: int) -> None:
     assert len(paper_space(joints).parameters) == 2 * joints + 3
 
 
@@ -54,7 +54,7 @@ def test_a_design_builds_the_arm_of_its_values() -> None:
     assert (design.origin, design.joints, design.links) == ((0.1, -0.2, 0.3), "YPRP", (0.1, 0.2, 0.05, 0.3))
 
 
-def test_the_mass_model_is_a_switch() -> None:
+def test_mass_model_sets_link_masses() -> None:
     design = paper_space().clipped((0, 0, 0), "YPRP", (0.1, 0.2, 0.05, 0.3))
     per_link = paper_space().model_copy(update={"mass": MassPerLink(kind="per_link")})
     assert [link.mass for link in per_link.arm(design).links] == [0.002] * 4
@@ -71,7 +71,7 @@ def test_samples_lie_in_the_space(seed: int, joints: int) -> None:
         assert space.design(design.params) == design
 
 
-def test_samples_depend_on_the_seed_alone() -> None:
+def test_samples_depend_on_the_seed_only() -> None:
     assert paper_space().sample(5, 1) == paper_space().sample(5, 1) != paper_space().sample(5, 2)
 
 
@@ -94,7 +94,7 @@ def test_clipped_is_always_in_the_space(values: list[float]) -> None:
         ({"orgin_x": 0.0}, 'unknown parameter "orgin_x".*Did you mean "origin_x"?'),
     ],
 )
-def test_what_a_space_refuses_it_names(change: dict[str, object], message: str) -> None:
+def test_invalid_values_are_named(change: dict[str, object], message: str) -> None:
     with pytest.raises(DesignError) as refusal:
         paper_space().design({**GOOD, **change})
     for part in message.split(".*"):
@@ -106,7 +106,7 @@ def test_missing_parameters_are_named() -> None:
         paper_space().design({name: value for name, value in GOOD.items() if name != "link_4"})
 
 
-def test_a_file_changes_what_it_names_and_keeps_the_rest(tmp_path: Path) -> None:
+def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
     file = tmp_path / "space.yaml"
     file.write_text(
         "name: six\njoints: 6\nlink: [0.1, 0.5]\norigin_z: [0, 0]\n"
@@ -144,7 +144,7 @@ def test_a_file_changes_what_it_names_and_keeps_the_rest(tmp_path: Path) -> None
         ("joints: 4\njoints: 5", "twice"),
     ],
 )
-def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+def test_invalid_space_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "space.yaml"
     file.write_text(text)
     with pytest.raises(SpaceError) as refusal:
@@ -154,13 +154,13 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str
     assert "\n" not in str(refusal.value)
 
 
-def test_a_copy_with_other_ranges_has_its_own_parameters() -> None:
+def test_copied_space_has_its_own_parameters() -> None:
     space = paper_space()
     assert len(space.parameters) == 11
     assert len(space.model_copy(update={"joints": 2}).parameters) == 7
 
 
-def test_the_order_of_the_parameters_means_nothing() -> None:
+def test_order_of_parameter_values_is_irrelevant() -> None:
     turned = Design(dict(reversed(GOOD.items())))
     assert turned == Design(GOOD)
     assert hash(turned) == hash(Design(GOOD))
@@ -174,7 +174,7 @@ def test_a_design_of_another_space_builds_no_arm() -> None:
         paper_space(9)
 
 
-def test_designs_are_values() -> None:
+def test_equal_designs_have_equal_hashes() -> None:
     assert Design(GOOD) == Design(dict(GOOD))
     assert len({Design(GOOD), Design(dict(GOOD))}) == 1
 
@@ -182,7 +182,7 @@ def test_designs_are_values() -> None:
 RESTRICTED = {"joint_1": "Y", "joint_2": ["P", "R"], "origin_z": 0.0, "link_1": [0.1, 0.2]}
 
 
-def test_single_parameters_can_be_fixed_or_narrower(tmp_path: Path) -> None:
+def test_restrict_fixes_or_narrows_parameters(tmp_path: Path) -> None:
     (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": RESTRICTED}))
     space = load_space(tmp_path / "space.yaml")
     designs = space.sample(200, 1)
@@ -200,7 +200,7 @@ def test_single_parameters_can_be_fixed_or_narrower(tmp_path: Path) -> None:
     assert (moved.joints, moved.origin[2], moved.links[0]) == ("YRPY", 0.0, 0.2)
 
 
-def test_a_restricted_space_goes_through_a_run(tmp_path: Path) -> None:
+def test_restricted_space_is_respected_by_a_run(tmp_path: Path) -> None:
     space = DesignSpace.model_validate({"restrict": RESTRICTED})
     problem = Problem(load_task("target-1"), space)
     run = optimize(problem, proposer="rules", n_init=4, n_step=2, n_total=12, out=tmp_path / "run")
@@ -225,7 +225,7 @@ def test_a_restricted_space_goes_through_a_run(tmp_path: Path) -> None:
         ("joint_1", "restrict"),
     ],
 )
-def test_what_is_no_part_of_a_parameter_is_refused(tmp_path: Path, restrict: object, words: str) -> None:
+def test_restriction_outside_a_parameter_is_refused(tmp_path: Path, restrict: object, words: str) -> None:
     (tmp_path / "space.yaml").write_text(yaml.safe_dump({"restrict": restrict}))
     with pytest.raises(SpaceError, match=words):
         load_space(tmp_path / "space.yaml")

@@ -50,7 +50,7 @@ def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 @pytest.mark.parametrize("space", [MIXED, *map(load_space, builtin_spaces())], ids=lambda space: space.name)
-def test_designs_as_rows_build_the_same_arms_to_the_bit(space: DesignSpace, precision: Any) -> None:
+def test_stacked_designs_equal_stacked_arms_to_the_bit(space: DesignSpace, precision: Any) -> None:
     designs = space.sample(300, 7)
     one = stack_designs(space, space.matrix(designs), precision)
     other = stack_arms([space.arm(design) for design in designs], precision)
@@ -82,7 +82,7 @@ def pinned(arm: Arm) -> tuple[Any, Any]:
     return model, model.createData()
 
 
-def test_postures_and_torques_are_pinocchios_and_mujocos() -> None:
+def test_postures_and_torques_agree_with_pinocchio_and_mujoco() -> None:
     arms = moving_arms(MIXED, 60, 3)
     arrays = stack_arms(arms, "float64")
     solved = solve_postures(arrays, TARGETS, precision="float64")
@@ -126,7 +126,7 @@ def test_a_slide_ends_at_its_target_and_starts_within_its_limits() -> None:
     assert solved.torque[0, 0, 2] == pytest.approx(9.81 * arm.links[2].mass)
 
 
-def test_arms_beside_each_other_get_the_same_bits_as_alone() -> None:
+def test_batch_does_not_change_the_bits() -> None:
     turning = moving_arms(paper_space(), 20, 1)
     together = solve_postures(stack_arms([*turning, *moving_arms(MIXED, 20, 2)]), TARGETS)
     alone = solve_postures(stack_arms(turning), TARGETS)
@@ -136,7 +136,7 @@ def test_arms_beside_each_other_get_the_same_bits_as_alone() -> None:
 
 
 @pytest.mark.parametrize("mount", list(MOUNTS))
-def test_a_mounted_arm_is_the_standing_one_turned(mount: Any) -> None:
+def test_mounted_arm_is_the_floor_arm_rotated(mount: Any) -> None:
     content = {"joint_types": ["R", "P", "Y", "O", "X", "T", "S"], "joints": 5, "link_directions": ["+z", "+x"]}
     content |= {"tool": [0.03, 0.0, 0.05], **{f"origin_{axis}": [0.0, 0.0] for axis in "xyz"}}
     floor = DesignSpace.model_validate(content)
@@ -164,7 +164,7 @@ def way_of(mount: Any, axis: Any) -> float:
 
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=50, deadline=None)
-def test_designs_keep_what_matters_through_rows_and_files(seed: int) -> None:
+def test_designs_round_trip_through_matrix_and_files(seed: int) -> None:
     (design,) = MIXED.sample(1, seed)
     assert MIXED.designs(MIXED.matrix([design])) == [design]
     assert MIXED.design(design.params) == design
@@ -180,7 +180,7 @@ def test_designs_keep_what_matters_through_rows_and_files(seed: int) -> None:
     assert MIXED.design(filled) == design  # what does not matter may be given, and is left out
 
 
-def test_what_a_sampler_draws_is_what_matters() -> None:
+def test_sampler_draws_active_parameters_only() -> None:
     box = BlackBox(MIXED, "tpe", 0)
     for number in range(25):
         trial, design = box.draw(number, "random" if number < 10 else "bbo")
@@ -193,7 +193,7 @@ def test_what_a_sampler_draws_is_what_matters() -> None:
     assert trial.params == MIXED.free_values(design)
 
 
-def test_ties_and_grids() -> None:
+def test_samples_respect_ties_and_grids() -> None:
     content = {"tie": {"link_3": "link_2", "joint_4": "joint_1"}, "grid": {"link": 0.01, "origin_z": 0.25}}
     space = DesignSpace.model_validate(content)
     for design in space.sample(50, 0):
@@ -237,7 +237,7 @@ def test_ties_and_grids() -> None:
         ({"grid": {"link": 0.0}}, "above 0"),
     ],
 )
-def test_spaces_that_cannot_be_are_refused(content: dict[str, Any], words: str, tmp_path: Path) -> None:
+def test_invalid_spaces_are_refused(content: dict[str, Any], words: str, tmp_path: Path) -> None:
     import yaml
 
     file = tmp_path / "space.yaml"
@@ -246,14 +246,14 @@ def test_spaces_that_cannot_be_are_refused(content: dict[str, Any], words: str, 
         load_space(file)
 
 
-def test_a_built_in_space_goes_by_its_name() -> None:
+def test_built_in_spaces_load_by_name() -> None:
     assert builtin_spaces() == ["paper", "autodesign", "slideopt"]
     assert load_space("paper") == paper_space()
     with pytest.raises(SpaceError, match='Did you mean "slideopt"'):
         load_space("slidopt")
 
 
-def test_all_of_it_is_searched() -> None:
+def test_slideopt_designs_evaluate_equally_as_matrix() -> None:
     problem = Problem(load_task("slideopt-arm"), load_space("slideopt"))
     rows = problem.space.matrix(problem.space.sample(200, 0))
     values = problem.evaluate_matrix(rows).values
@@ -261,7 +261,7 @@ def test_all_of_it_is_searched() -> None:
     assert values[:, 0].min() < 1.0
 
 
-def test_an_empty_matrix_gives_no_arms() -> None:
+def test_empty_matrix_gives_no_arms() -> None:
     for space in (paper_space(), MIXED):
         assert space.designs(space.matrix([])) == []
         assert len(stack_designs(space, space.matrix([])).base) == 0

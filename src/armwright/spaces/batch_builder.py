@@ -1,7 +1,7 @@
 """Batches of designs, built into stacked arms without building the arms one by one.
 
-N designs of up to M modules. A module has up to K joints at one place, K = 2 where the space has a module of two, else
-1; its link follows the last of them. The D = M K places of an arm are compacted, so that its joints come first.
+There are N designs of up to M modules. A module has up to K joints at one place, K = 2 if the space has a module of two
+joints, else 1; its link follows the last joint. The D = M K joint slots of an arm are compacted: its joints come first.
 """
 
 from dataclasses import dataclass, fields
@@ -21,12 +21,14 @@ from armwright.spaces.parameters import CategoricalParameter
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
-_ABSENT = -1  # no joint at this place of a module
-_PLANS = np.full((len(MODULES), 2), _ABSENT)  # local motions of each module's joints; a single joint stands last
+_ABSENT = -1  # no joint in this slot of a module
+_PLANS = np.full(
+    (len(MODULES), 2), _ABSENT
+)  # local motions of each module's joints; a single joint is in the last slot
 for _row, _module in zip(_PLANS, MODULES.values(), strict=True):
-    for _place, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
-        _row[_place] = {"revolute": 0, "prismatic": PRISMATIC, "fixed": FIXED}[_kind]
-        _row[_place] += 0 if _kind == "fixed" else AXES.index(_axis)
+    for _slot, (_kind, _axis) in enumerate(_module.joints, start=2 - len(_module.joints)):
+        _row[_slot] = {"revolute": 0, "prismatic": PRISMATIC, "fixed": FIXED}[_kind]
+        _row[_slot] += 0 if _kind == "fixed" else AXES.index(_axis)
 # (mounts, 3) the world axis that each local axis lies along, and 1 if it points the same way, else -1
 _WORLD_AXES = np.array([[AXES.index(world[1]) for world in row] for row in MOUNTS.values()])  # pyright: ignore[reportArgumentType]
 _SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row in MOUNTS.values()])
@@ -39,24 +41,24 @@ def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "flo
     Equal to the bit to `stack_arms` of the arms built one by one.
 
     Args:
-        space: the design space.
-        matrix: (N, P) designs, as of `DesignSpace.matrix`; values beyond the space's ranges are built, too.
-        precision: of the arrays that the kernels read.
+        space: The design space.
+        matrix: (N, P) designs, as from `DesignSpace.matrix`; values outside the ranges of the space are allowed.
+        precision: The precision of the arrays that the kernels read.
     """
     columns = _Columns(space, matrix)
     joints, present = _joints(space, columns)
-    places = joints.plan.shape[2]
+    n_slots = joints.plan.shape[2]
     carried, actuation = _carried(space, columns, joints)
     bodies, com = _bodies(space, columns, joints, carried)
     per_joint = {
         "motion": joints.motion,
         "lower": joints.lower,
         "upper": joints.upper,
-        "travel": np.where(joints.slides, space.travel, 1.0),
-        "offset": _at_last(bodies.offset, places),
-        "com": _at_last(com, places),
-        "mass": _at_last(bodies.total_mass, places),
-        "radius": _at_last(np.where(columns.links > 0.0, space.link_radius, 0.0), places),
+        "travel": np.where(joints.prismatic, space.travel, 1.0),
+        "offset": _in_last_slot(bodies.offset, n_slots),
+        "com": _in_last_slot(com, n_slots),
+        "mass": _in_last_slot(bodies.total_mass, n_slots),
+        "radius": _in_last_slot(np.where(columns.links > 0.0, space.link_radius, 0.0), n_slots),
     }
     if actuation is not None:
         per_joint |= {"effort": actuation.effort, "speed": actuation.speed}
@@ -81,18 +83,18 @@ def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "flo
         travel=flat["travel"],
         length=np.cumsum(columns.links, axis=1)[:, -1],
         base_mass=carried.mass[:, 0],
-        bodies=_spread(bodies, present, places),
+        bodies=_spread(bodies, present, n_slots),
         actuation=None if actuation is None else Actuation(flat["effort"], flat["speed"], actuation.price),
     )
 
 
 class _Columns:
-    """Read a matrix of designs module by module.
+    """Reader of a matrix of designs, module by module.
 
     Attributes:
         present: (N, M) True for the modules that a design has.
-        mount: (N,) index of its mount.
-        links: (N, M) link lengths, 0 where there is no module [m].
+        mount: (N,) index of the mount.
+        links: (N, M) link lengths, 0 for absent modules [m].
     """
 
     def __init__(self, space: DesignSpace, matrix: Array) -> None:
@@ -110,12 +112,12 @@ class _Columns:
         self.links = np.where(self.present, self.reals("link"), 0.0)
 
     def _indices(self, name: str, index: Any) -> Any:
-        """(N,) `index` of each design's choice."""
+        """Return the (N,) `index` of each design's choice."""
         choices = cast("CategoricalParameter", self._space.parameters[self._column[name]]).choices
         return np.array([index(choice) for choice in choices])[self._matrix[:, self._column[name]].astype(np.intp)]
 
     def choices(self, kind: str, index: Any, default: str) -> Indices:
-        """(N, M) indices of the choices kind_1, kind_2, …; of `default` if the space has no such parameters."""
+        """Return the (N, M) indices of the choices kind_1, kind_2, …; of `default` without such parameters."""
         names = [f"{kind}_{j}" for j in range(1, self.modules + 1)]
         columns = [
             self._indices(name, index) if name in self._column else np.full(self.n, index(default)) for name in names
@@ -123,7 +125,7 @@ class _Columns:
         return np.stack(columns, axis=1)
 
     def reals(self, kind: str, default: float = 0.0) -> Array:
-        """(N, M) values of kind_1, kind_2, …; `default` if the space has no such parameters."""
+        """Return the (N, M) values of kind_1, kind_2, …; `default` without such parameters."""
         names = [f"{kind}_{j}" for j in range(1, self.modules + 1)]
         if all(name in self._column for name in names):
             first = self._column[names[0]]
@@ -133,18 +135,18 @@ class _Columns:
 
 @dataclass(frozen=True)
 class _Joints:
-    """What the joints of N designs do, (N, M, K) each."""
+    """Joints of N designs, (N, M, K) each."""
 
-    plan: Indices  # motion in the base's own axes
-    motion: Indices  # motion in the world's axes
+    plan: Indices  # motion in the axes of the base
+    motion: Indices  # motion in world axes
     lower: Array  # [rad] or [m]
     upper: Array  # [rad] or [m]
-    slides: Bools  # True for prismatic joints
+    prismatic: Bools  # True for prismatic joints
 
 
 @dataclass(frozen=True)
 class _Carried:
-    """What modules put at the end of the link before, (N, M) each [kg]; the first module's stands with the base."""
+    """Masses that modules add to the end of the link before, the first one to the base, (N, M) each [kg]."""
 
     mass: Array  # rail and actuators
     rails: Array  # rails alone
@@ -165,7 +167,7 @@ def _joints(space: DesignSpace, columns: _Columns) -> tuple[_Joints, Bools]:
 
 
 def _limits(space: DesignSpace, columns: _Columns, plan: Indices) -> tuple[Array, Array]:
-    """(N, M, K) lower and upper limits in the base's own axes [rad] or [m]."""
+    """Return (N, M, K) lower and upper limits in the axes of the base [rad] or [m]."""
     low, high = space.joint_range
     if space.limit is not None:
         upper = columns.reals("limit", space.limit[0])[..., None]
@@ -179,9 +181,9 @@ def _limits(space: DesignSpace, columns: _Columns, plan: Indices) -> tuple[Array
 
 
 def _carried(space: DesignSpace, columns: _Columns, joints: _Joints) -> tuple[_Carried, Actuation | None]:
-    """Return the masses of rails and actuators, and (N, M, K) what the actuators can do."""
+    """Return the masses of rails and actuators, and the (N, M, K) capabilities of the actuators."""
     stroke = columns.reals("stroke", space.min_stroke)
-    rails = np.where(joints.slides[..., -1], space.mass.mass(stroke), 0.0)
+    rails = np.where(joints.prismatic[..., -1], space.mass.mass(stroke), 0.0)
     if not space.actuators:
         return _Carried(rails, rails), None
     moving = (joints.plan < FIXED).sum(axis=2)  # (N, M) joints that need an actuator
@@ -215,16 +217,16 @@ def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Ca
     offset = direction * links[..., None]
     end_mass_position = offset + _end_shift(space, columns, joints.plan, carried)
     total = mass + end_mass
-    both = (mass[..., None] * middle + end_mass[..., None] * end_mass_position) / np.where(total > 0.0, total, 1.0)[
-        ..., None
-    ]
+    carried_com = (mass[..., None] * middle + end_mass[..., None] * end_mass_position) / np.where(
+        total > 0.0, total, 1.0
+    )[..., None]
     radius = np.where(columns.present, space.link_radius, 0.0)
-    com = np.where(end_mass[..., None] > 0.0, both, middle)
+    com = np.where(end_mass[..., None] > 0.0, carried_com, middle)
     return Bodies(mass, middle, offset, radius, end_mass, end_mass_position), com
 
 
 def _end_shift(space: DesignSpace, columns: _Columns, plan: Indices, carried: _Carried) -> Array | float:
-    """(N, M, 3) from the end of each link to the centre of what it carries there [m]."""
+    """Return the (N, M, 3) vectors from the end of each link to the centre of the mass carried there [m]."""
     rails = carried.rails
     if not rails.any():
         return 0.0
@@ -237,7 +239,7 @@ def _end_shift(space: DesignSpace, columns: _Columns, plan: Indices, carried: _C
 
 
 def _world_axes(columns: _Columns, plan: Indices) -> tuple[Indices, Array]:
-    """(N, M, K) the world axis of each joint, and 1 if it points the same way as the base's own axis, else -1."""
+    """Return the (N, M, K) world axis of each joint, and its sign (1 or -1) relative to the axis of the base."""
     own = plan % PRISMATIC
     if not columns.mount.any():
         return own, np.ones(own.shape)
@@ -246,8 +248,8 @@ def _world_axes(columns: _Columns, plan: Indices) -> tuple[Indices, Array]:
 
 
 def _rotate(vectors: Array, mount: Indices) -> Array:
-    """(N, M, 3) vectors in the base's own axes, rotated into the world's."""
-    if not mount.any():  # all stand on a floor
+    """Rotate (N, M, 3) vectors from base axes into world axes."""
+    if not mount.any():  # all on a floor
         return np.array(vectors)
     rotated = np.zeros(vectors.shape)
     for axis in range(3):
@@ -258,22 +260,22 @@ def _rotate(vectors: Array, mount: Indices) -> Array:
 
 
 def _rotate_one(vector: Array, columns: _Columns) -> Array:
-    """(N, 3) the same vector (3,) of every base, rotated into the world's axes."""
+    """Rotate the same vector (3,) of every base into world axes (N, 3)."""
     return _rotate(np.broadcast_to(vector, (columns.n, 1, 3)), columns.mount)[:, 0]
 
 
-def _at_last(values: Array, places: int) -> Array:
-    """(N, M, K, ...) values of modules (N, M, ...) at the last of K places of each; 0 elsewhere."""
+def _in_last_slot(values: Array, n_slots: int) -> Array:
+    """Return values of modules (N, M, ...) in the last of K slots of each (N, M, K, ...); 0 in the others."""
     n, modules, *size = values.shape
-    placed = np.zeros((n, modules, places, *size))
-    placed[:, :, -1] = values
-    return placed
+    slots = np.zeros((n, modules, n_slots, *size))
+    slots[:, :, -1] = values
+    return slots
 
 
 def _flatten(values: Any) -> Any:
-    """(N, M K, ...) from (N, M, K, ...)."""
-    n, modules, places, *size = values.shape
-    return values.reshape(n, modules * places, *size)
+    """Return (N, M, K, ...) as (N, M K, ...)."""
+    n, modules, n_slots, *size = values.shape
+    return values.reshape(n, modules * n_slots, *size)
 
 
 def _compact(arrays: dict[str, Any], present: Bools) -> dict[str, Any]:
@@ -285,9 +287,9 @@ def _compact(arrays: dict[str, Any], present: Bools) -> dict[str, Any]:
     return {name: values[rows, order] for name, values in arrays.items()}
 
 
-def _spread(bodies: Bodies, present: Bools, places: int) -> Bodies:
+def _spread(bodies: Bodies, present: Bools, n_slots: int) -> Bodies:
     """Return the bodies of joints (N, D, ...), from those of modules (N, M, ...)."""
     spread = {field.name: getattr(bodies, field.name) for field in fields(Bodies)}
-    if places > 1:
-        spread = {name: _flatten(_at_last(values, places)) for name, values in spread.items()}
+    if n_slots > 1:
+        spread = {name: _flatten(_in_last_slot(values, n_slots)) for name, values in spread.items()}
     return Bodies(**_compact(spread, present))

@@ -1,4 +1,4 @@
-"""Design files: an existing arm or a design of another run, to start a search with."""
+"""Design files: initial designs of a search, from an existing arm or another run."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from armwright.yaml_documents import read_document
 
 
 class DesignFile(BaseModel, frozen=True, extra="forbid"):
-    """A design as a run writes it into designs/NNNN/design.json; a file written by hand only needs `params`."""
+    """A design in the format of designs/NNNN/design.json; only `params` is required."""
 
     params: dict[str, float | str]  # a value for each parameter of the space, by its name
     number: Any = None
@@ -34,5 +34,5 @@ def read_design(path: str | Path, space: DesignSpace) -> Design:
     content = read_document(Path(path), DesignFile, DesignError)
     try:
         return space.design(content.params)
-    except DesignError as refusal:
-        raise DesignError(f"{path}: {refusal}") from refusal
+    except DesignError as error:
+        raise DesignError(f"{path}: {error}") from error

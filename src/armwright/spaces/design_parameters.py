@@ -1,7 +1,7 @@
 """The parameters of a design space, and the conditions under which they are active.
 
-A parameter of module j is inactive if the arm has fewer modules, or if the module is of a type that has no use for it:
-a roll joint has no stroke.
+A parameter of module j is inactive if the arm has fewer modules, or if its type does not have the
+parameter: a roll joint has no stroke.
 """
 
 import math
@@ -76,21 +76,21 @@ def _unrestricted(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
     """Return the parameters without restrictions and grids."""
     revolute = tuple(letter for letter, module in MODULES.items() if module.is_revolute)
     prismatic = tuple(letter for letter, module in MODULES.items() if module.is_prismatic)
-    found = [*_of_arm(space), *_per_module(space, "joint", space.joint_types)]
-    found += _per_module(space, "link", space.link, "m")
+    entries = [*_arm_parameters(space), *_per_module(space, "joint", space.joint_types)]
+    entries += _per_module(space, "link", space.link, "m")
     if len(space.link_directions) > 1:
-        found += _per_module(space, "direction", space.link_directions)
+        entries += _per_module(space, "direction", space.link_directions)
     if len(space.actuators) > 1:
         names = tuple(record.name for record in space.actuators)
-        found += _per_module(space, "motor", names, types=revolute + prismatic)
+        entries += _per_module(space, "motor", names, types=revolute + prismatic)
     if not isinstance(space.stroke, (int, float)):
-        found += _per_module(space, "stroke", space.stroke, "m", prismatic)
+        entries += _per_module(space, "stroke", space.stroke, "m", prismatic)
     if space.limit is not None:
-        found += _per_module(space, "limit", space.limit, "rad", revolute)
-    return tuple(found)
+        entries += _per_module(space, "limit", space.limit, "rad", revolute)
+    return tuple(entries)
 
 
-def _of_arm(space: SpaceSchema) -> Iterator[ConditionalParameter]:
+def _arm_parameters(space: SpaceSchema) -> Iterator[ConditionalParameter]:
     """Yield the parameters of the whole arm: base position, mount and number of modules."""
     for axis, (low, high) in zip("xyz", (space.origin_x, space.origin_y, space.origin_z), strict=True):
         yield ConditionalParameter(FloatParameter(f"origin_{axis}", low, high, "m"))
@@ -136,18 +136,18 @@ def _restrict(parameter: Parameter, to: Restriction) -> Parameter:
     Raises:
         ValueError: If the restriction is not a part of the parameter.
     """
-    wanted: tuple[float | str, ...] = (to,) if isinstance(to, (str, float, int)) else to
+    values: tuple[float | str, ...] = (to,) if isinstance(to, (str, float, int)) else to
     if isinstance(parameter, CategoricalParameter):
-        for choice in wanted:
+        for choice in values:
             if choice not in parameter.choices:
                 raise ValueError(
                     f"restrict: {parameter.name} = {choice!r} is not one of {', '.join(parameter.choices)}"
                 )
-        if not wanted:
+        if not values:
             raise ValueError(f"restrict: {parameter.name} has no choice left")
-        return CategoricalParameter(parameter.name, tuple(c for c in parameter.choices if c in wanted))
-    numbers = [value for value in wanted if not isinstance(value, str)]
-    if not 1 <= len(numbers) == len(wanted) <= 2:
+        return CategoricalParameter(parameter.name, tuple(c for c in parameter.choices if c in values))
+    numbers = [value for value in values if not isinstance(value, str)]
+    if not 1 <= len(numbers) == len(values) <= 2:
         raise ValueError(f"restrict: {parameter.name} = {to!r} is neither a number nor a range [{parameter.unit}]")
     low, high = numbers[0], numbers[-1]
     if not parameter.low <= low <= high <= parameter.high:

@@ -18,11 +18,11 @@ Mount = Literal["floor", "ceiling", "wall+x", "wall-x", "wall+y", "wall-y"]
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """Joints at one place, followed by a link.
+    """Joints at one position, followed by a link.
 
     Attributes:
         joints: Kind and local axis of each joint. The link follows the last one.
-        description: What the module is, for a reader who does not know this program.
+        description: A description for readers who do not know this program.
     """
 
     joints: tuple[tuple[JointKind, Axis], ...]
@@ -99,8 +99,8 @@ def mounted(axis: Axis, mount: Mount) -> tuple[Axis, float]:
 
 def mounted_vector(vector: Vector, mount: Mount) -> Vector:
     """Return a vector of the base frame in world axes."""
-    found = [0.0, 0.0, 0.0]
+    rotated = [0.0, 0.0, 0.0]
     for axis, value in zip(AXES, vector, strict=True):
         world, sign = mounted(axis, mount)
-        found[AXES.index(world)] = sign * value
-    return found[0], found[1], found[2]
+        rotated[AXES.index(world)] = sign * value
+    return rotated[0], rotated[1], rotated[2]

@@ -1,4 +1,4 @@
-"""A design space as Optuna's distributions."""
+"""Optuna distributions of a design space."""
 
 import threading
 from collections.abc import Generator
@@ -10,11 +10,11 @@ from optuna.distributions import BaseDistribution, CategoricalDistribution, Floa
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import FloatParameter, Parameter
 
-_verbosity = threading.Lock()  # of the process; else two threads would put back each other's
+_verbosity = threading.Lock()  # global to the process: two threads would restore each other's level
 
 
 def distributions(space: DesignSpace) -> dict[str, BaseDistribution]:
-    """Return the space as Optuna's distributions, without tied parameters."""
+    """Return the distribution of each parameter that is not tied."""
     free = [p for p in space.parameters if p.name not in dict(space.tie)]
     return {p.name: _distribution(p) for p in free}
 
@@ -27,7 +27,7 @@ def _distribution(parameter: Parameter) -> BaseDistribution:
 
 @contextmanager
 def quietly() -> Generator[None, None, None]:
-    """Silence Optuna's messages about each study; restores the user's verbosity afterwards."""
+    """Silence Optuna's messages about each study, and restore the user's verbosity afterwards."""
     with _verbosity:
         verbosity = optuna.logging.get_verbosity()
         optuna.logging.set_verbosity(max(verbosity, optuna.logging.WARNING))
