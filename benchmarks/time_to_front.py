@@ -96,7 +96,7 @@ METHODS = {
     "TPE + rules": study(proposer="rules"),
     "Optuna's NSGA-II": study(proposer="none", sampler="nsga2"),
     "pymoo's NSGA-II": pymoo,
-    "armwright front": ours,
+    "armwright design": ours,
 }
 
 

@@ -111,13 +111,13 @@ def main(folder: Path) -> None:
     assert all(ET.parse(urdf).getroot().tag == "robot" for urdf in urdfs)
     assert "is finished" in armwright("optimize", "target-1", "--seed", "0", "--out", "run").stdout
     armwright("report", "run")
-    armwright("verify", "run")
-    armwright("polish", "run", "--evaluations", "100")
+    armwright("refine", "run", "--evaluations", "100")
     armwright("pick", "run", "--by", "torque")
     for kind in FORMATS:
         armwright("export", "run", "--format", kind, "--out", f"out/{kind}")
 
-    armwright("front", "target-1", "--budget", "100000", "--out", "front")
+    armwright("design", "target-1", "--budget", "100000", "--out", "front")
+    armwright("check", "target-1")
     Path("two-methods.yaml").write_text(EXPERIMENT)
     told = json.loads(armwright("experiment", "two-methods.yaml", "--out", "cells", "--json").stdout)
     assert told

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from rich.console import Console
 
-from armwright.cli import app as commands
+from armwright.cli import search_commands
 from armwright.cli.progress import study_progress
 from armwright.cli.show_results import show_result
 from armwright.llm import client as chat
@@ -158,7 +158,7 @@ def test_init_writes_a_file_to_edit_and_overwrites_none(in_folder: Path) -> None
     assert "3 targets" in armwright("init", "my-task.yaml").stdout
     text = (in_folder / "my-task.yaml").read_text()
     assert "# " in text
-    assert "exists already" in refused(2, "init", "my-task.yaml")
+    assert "already exists" in refused(2, "init", "my-task.yaml")
     assert (in_folder / "my-task.yaml").read_text() == text
     assert "ends in .yaml" in refused(2, "init", "my-task.txt")
     assert "cannot read" in refused(2, "init", "other.yaml", "--from", "nothing.csv")
@@ -177,7 +177,21 @@ def test_tasks_are_listed_and_told() -> None:
 
 def test_version_and_help() -> None:
     assert armwright("--version").stdout.strip() == "0.1.0"
-    assert "optimize" in armwright("--help").stdout
+    shown = armwright("--help", COLUMNS="120").stdout
+    assert re.findall(r"^╭─ ([\w ]+) ─", shown, re.MULTILINE) == [
+        "Options",
+        "Before a run",
+        "Search",
+        "After a run",
+        "Show",
+    ]
+    commands = re.findall(r"^│ ([a-z]+(?:-[a-z]+)*) ", shown, re.MULTILINE)
+    assert commands == [
+        *("init", "check", "tasks", "actuators", "draft"),
+        *("design", "optimize", "refine", "experiment"),
+        *("pick", "export", "compare", "compare-arms", "runs"),
+        *("report", "live", "prompt", "doctor"),
+    ]
     assert "--n-step" in armwright("optimize", "--help").stdout
 
 
@@ -187,7 +201,7 @@ def test_optimize_shows_its_options_in_groups() -> None:
     groups = ["Arguments", "Options", "Task", "Search", "Language model", "Evaluation", "Output"]
     assert re.findall(r"^╭─ ([\w ]+) ─", shown, re.MULTILINE) == groups
     assert 15 <= len(re.findall(r"^│ +--", shown, re.MULTILINE)) <= 25
-    assert len(inspect.signature(commands.optimize).parameters) <= 25
+    assert len(inspect.signature(search_commands.optimize).parameters) <= 25
 
 
 @pytest.mark.parametrize(
@@ -374,7 +388,7 @@ def test_ctrl_c_leaves_a_folder_that_can_be_resumed(in_folder: Path) -> None:
     settings += ["--no-figures", "--evaluator", "mine.py:measure", "--out", "run"]
     stopped = armwright(*settings)
     assert (stopped.returncode, stopped.stderr) == (130, "")
-    assert f"Go on with:\n  python -m armwright {' '.join(settings)}" in stopped.stdout
+    assert f"Resume with:\n  python -m armwright {' '.join(settings)}" in stopped.stdout
     kept = (in_folder / "run" / "trials.jsonl").read_text()
     assert len(kept.splitlines()) == 14
     done = armwright(*settings)
@@ -405,7 +419,7 @@ def test_ctrl_c_ends_the_calls_under_way(
     )
     released.set()
     assert (done.returncode, done.stderr) == (130, "")
-    assert "Go on with:" in done.stdout
+    assert "Resume with:" in done.stdout
     transcript = (in_folder / "runs" / "target-1-seed0" / "transcripts.jsonl").read_text().splitlines()
     kept = [(call["step"], call["requests"], call["fault"]) for call in map(json.loads, transcript)]
     assert kept == [("check", 1, None), ("reasoning", 1, None), ("parameters", 1, "cancelled")][: 2 + refused]

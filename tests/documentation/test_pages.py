@@ -124,7 +124,7 @@ def test_what_is_not_run_is_there_to_be_excused() -> None:
 
 
 def test_what_is_said_in_passing_exists() -> None:
-    """`armwright front`, `--budget` and the like within sentences."""
+    """`armwright design`, `--budget` and the like within sentences."""
     options = {
         name: {o for p in command.params for o in (*p.opts, *p.secondary_opts)} for name, command in cli().items()
     }

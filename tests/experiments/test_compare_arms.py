@@ -304,7 +304,7 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
     assert told["designs"][0]["values"] == list(read_run(run)[1].front[0].values)
     (run / EXISTING_ARMS).unlink()
     for args, words in (
-        (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": three numbers with commas'),
+        (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": expected three numbers with commas'),
         (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
         (("target-1", UR5, "--run", run), "with other targets or payloads"),
     ):

@@ -697,13 +697,13 @@ def argument_seeds() -> list[bytes]:
         ["prompt", "target-1", "--model-options", "{memory: own}", "--n-init", "3"],
         ["prompt", "--after", run, "--number", "3"],
         ["prompt", "--template"], ["prompt", "--variables"], ["prompt", "target-1", "--schema"],
-        ["front", "target-1", "--budget", "100", "--no-stall", "--seed", "1"],
+        ["design", "target-1", "--budget", "100", "--no-stall", "--seed", "1"],
         ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print-commands"],
         ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["runs", run, "--json"],
         ["compare-arms", "target-1", "arm.urdf", "--base", "0,0,0.5", "--tip", "tip", "--base-link", "base"],
         ["pick", run, "--where", "torque<=9", "--by", "mass", "-n", "2"], ["pick", run, "--weights", "torque=1"],
         ["export", run, "--design", "2", "--format", "sdf", "--out", "x/y.sdf"], ["report", run],
-        ["actuators"], ["doctor", "--model", "openai-chat:x"], ["verify", run, "--json"], ["polish", run],
+        ["actuators"], ["doctor", "--model", "openai-chat:x"], ["check", "target-1", "--json"], ["refine", run],
         ["draft", "words", "--print-prompt"], ["init", "new.yaml", "--from", "points.csv", "--unit", "mm"],
         ["init", "new.yaml", "--offset", "0", "0", "1"], ["--version"], ["--help"],
     )  # fmt: skip
@@ -724,14 +724,14 @@ def run_arguments(data: bytes) -> None:
     listed = content if isinstance(content, list) else [content]
     given = [_argument(one) for one in listed][:40]
     if any(one.partition("=")[0] in NEVER or "--figures".startswith(one) for one in given if one) or (
-        given and given[0] in ("report", "verify", "polish")
+        given and given[0] in ("report", "refine")
     ):
         return
-    if given and given[0] in ("optimize", "front", "experiment", "compare", "compare-arms"):
+    if given and given[0] in ("optimize", "design", "experiment", "compare", "compare-arms"):
         given[1:1] = ["--no-figures"]
-    if given and given[0] in ("optimize", "front", "experiment"):
+    if given and given[0] in ("optimize", "design", "experiment"):
         given += (
-            {"optimize": ["--n-init=1", "--n-total=2"], "front": ["--budget=50"], "experiment": ["--print-commands"]}[
+            {"optimize": ["--n-init=1", "--n-total=2"], "design": ["--budget=50"], "experiment": ["--print-commands"]}[
                 given[0]
             ]
             if len(data) % 4

@@ -64,7 +64,7 @@ def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> N
 
     done = go()
     first, last = f"ask{os.sep}004-prompt.md", f"ask{os.sep}004-answer.md"
-    assert f"{first} waits for your answer in {last}; then go on with:\n  python -m armwright optimize" in done.stdout
+    assert f"{first} waits for your answer in {last}; then resume with:\n  python -m armwright optimize" in done.stdout
     assert names() == {"004-prompt.md"}
     question = (in_folder / first).read_text(encoding="utf-8")
     assert "REASON: the main reason" in question
@@ -74,7 +74,7 @@ def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> N
     done = go("--json")
     refusal = "link_4 = 2.5 m is outside 0.03 <= link_4 <= 0.3 m"
     assert json.loads(done.stdout) == {"folder": "run", "question": first, "answer": last, "refusal": refusal}
-    assert f"the answer was refused: {refusal}" in done.stderr
+    assert f"answer rejected: {refusal}" in done.stderr
     assert names() == {"004-prompt.md", "004-refused-1.md", "004-refused.md"}
     words = (in_folder / "ask" / "004-refused.md").read_text(encoding="utf-8")
     assert words == f"004-refused-1.md was refused:\n\n{refusal}\n\nGive another 004-answer.md.\n"

@@ -370,7 +370,7 @@ def test_a_search_for_the_whole_front(tmp_path: Path, tab: Tab) -> None:
     assert "3,000" in tab.text("#facts")
     assert tab.page.locator("#iterations").is_hidden()
     assert tab.page.locator("#table tbody tr").count() == len(run.front)
-    assert tab.text("#repeat code") == "armwright front target-3 --budget 3000 --seed 0"
+    assert tab.text("#repeat code") == "armwright design target-3 --budget 3000 --seed 0"
     assert tab.faults == []
 
 

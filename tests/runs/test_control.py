@@ -245,7 +245,7 @@ def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in
     settings += ["--out", "run"]
     done = armwright(*settings)
     assert (done.returncode, done.stderr) == (130, "")
-    assert f"stopped; every finished trial is in run/. Go on with:\n  python -m armwright {shlex.join(settings)}" in (
+    assert f"stopped; every finished trial is in run/. Resume with:\n  python -m armwright {shlex.join(settings)}" in (
         done.stdout
     )
     assert len(lines(out)) == 11  # the present design was evaluated

@@ -337,7 +337,7 @@ def test_refusals_of_an_export(plain: Path, tmp_path: Path) -> None:
     (tmp_path / "empty" / "config.yaml").write_bytes((plain / "config.yaml").read_bytes())
     with pytest.raises(SettingsError, match="has no finished trial yet"):
         export_study(tmp_path / "empty")
-    assert "--design 3 goes with the other formats" in str(exported(plain, "--design", "3").exception)
+    assert "--design 3 does not go with --format optuna" in str(exported(plain, "--design", "3").exception)
     assert "not a run folder" in str(exported(tmp_path / "nothing").exception)
     assert not (tmp_path / "nothing").exists()
     unknown = CliRunner().invoke(app, ["export", str(plain), "--format", "optunaa"])

@@ -218,7 +218,7 @@ def test_local_workers_are_killed_then_the_search_then_ctrl_c(tmp_path: Path, be
     search.send_signal(signal.SIGINT)
     said, complained = search.communicate()
     assert (search.returncode, complained) == (130, "")
-    assert "Go on with:" in said
+    assert "Resume with:" in said
     assert all_ended(started)
     bench.release("hold")
 
@@ -427,6 +427,6 @@ def test_ctrl_c_ends_an_experiment_with_its_local_workers(tmp_path: Path) -> Non
     process.send_signal(signal.SIGINT)
     said, complained = process.communicate()
     assert (process.returncode, complained) == (130, "")
-    assert "Go on with:" in said
+    assert "Resume with:" in said
     assert len(started) >= 3
     assert all_ended(started)

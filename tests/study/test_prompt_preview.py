@@ -187,9 +187,9 @@ def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Pa
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        ([], "armwright prompt needs a TASK"),
+        ([], "expected a TASK"),
         (["target-9"], 'unknown task "target-9"'),
-        (["target-1", "--number", "4"], "--number 4 goes with --after RUN"),
+        (["target-1", "--number", "4"], "--number 4 needs --after RUN"),
         (["target-1", "--prompt", "pluss"], 'unknown prompt "pluss". Did you mean "plus"?'),
         (["target-1", "--prompt", "."], "prompt . is a folder, not a template file"),
         (["target-1", *model_options(memory="onw")], 'unknown memory "onw". Did you mean "own"?'),
@@ -198,8 +198,8 @@ def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Pa
         (["target-1", "--after", "nowhere"], "nowhere is not a run folder"),
         (["target-2", "--after", "run"], "run is a run of another task: target-1"),
         (["--after", "run", "--space", "space.yaml"], "run is a run of another space: paper"),
-        (["--after", "run", "--seed", "1"], "--seed 1 goes with a new run; run has its own"),
-        (["--after", "run", "--n-init", "4"], "--n-init 4 goes with a new run; run has its own"),
+        (["--after", "run", "--seed", "1"], "--seed 1 is for a new run; run has its own"),
+        (["--after", "run", "--n-init", "4"], "--n-init 4 is for a new run; run has its own"),
         (["--after", "run", "--number", "5"], "--number 5: the proposals of run were asked for trials 4"),
         (["--after", "run", "--number", "-1"], "--number -1: the proposals of run were asked for trials 4"),
         (["--after", "run", *model_options(memory="all")], 'unknown memory "all"'),

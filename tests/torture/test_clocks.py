@@ -76,13 +76,13 @@ def test_a_run_of_the_future_is_resumed(tmp_path: Path, whole: Path, clock: dict
 def test_a_search_and_an_experiment_under_a_clock_that_jumps(
     tmp_path: Path, clock: dict[str, str], record_property: Tell
 ) -> None:
-    asked = ("front", "target-1", "--budget", "5000", "--out")
+    asked = ("design", "target-1", "--budget", "5000", "--out")
     done = armwright(*asked, tmp_path / "whole", "--no-figures")
     assert (done.returncode, done.stderr) == (0, "")
     done = armwright(*asked, tmp_path / "run", environment=clock)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "run/trials.jsonl").read_bytes() == (tmp_path / "whole/trials.jsonl").read_bytes()
-    timed = ("front", "target-1", "--budget", "1s", "--no-figures", "--out", tmp_path / "timed")
+    timed = ("design", "target-1", "--budget", "1s", "--no-figures", "--out", tmp_path / "timed")
     done = armwright(*timed, environment=clock)
     assert (done.returncode, done.stderr) == (0, "")
     plan = tmp_path / "small.yaml"

@@ -41,7 +41,7 @@ def test_a_second_process_is_refused_and_the_first_is_as_if_alone(tmp_path: Path
     def second() -> None:
         assert is_held(folder)
         refusals.append(one_line(study(folder)))
-        refusals.append(one_line(armwright("front", "target-1", "--out", folder)))
+        refusals.append(one_line(armwright("design", "target-1", "--out", folder)))
 
     optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, second))
     assert len(refusals) == 2

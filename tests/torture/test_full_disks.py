@@ -92,7 +92,7 @@ def test_a_disk_runs_full(disk: Path, whole: Path, kills: int, record_property: 
 
 
 def test_no_room_for_a_search(tmp_path: Path) -> None:
-    asked = ("front", "target-1", "--budget", "5000", "--no-figures", "--out")
+    asked = ("design", "target-1", "--budget", "5000", "--no-figures", "--out")
     assert armwright(*asked, tmp_path / "whole").returncode == 0
     for n in (1000, 20_000):
         folder = tmp_path / f"run{n}"

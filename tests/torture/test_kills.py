@@ -214,7 +214,7 @@ def is_same_front(folder: Path, whole: Path) -> None:
 
 def searching(folder: Path) -> list[str]:
     settings = ["--budget", str(BUDGET), "--no-stall", "--seed", "3", "--no-figures"]
-    return ["front", "target-1", *settings, "--out", str(folder)]
+    return ["design", "target-1", *settings, "--out", str(folder)]
 
 
 SEARCH = Scenario(

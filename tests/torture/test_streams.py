@@ -24,7 +24,7 @@ def test_nobody_reads_the_output(tmp_path: Path, whole: Path) -> None:
         process.stdout.close()
         said = process.stderr.read()
     assert process.returncode == 1
-    assert said == "armwright: nobody reads the output any more; the same command goes on with a run\n"
+    assert said == "armwright: output pipe closed; rerun the same command to resume\n"
     is_beginning(folder, whole)
     assert study(folder).returncode == 0
     is_same_run(folder, whole)

@@ -91,16 +91,16 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     _show_files(console, run.folder, figures)
 
 
-def show_polish(console: Console, polished: RefinedRun) -> None:
+def show_refined(console: Console, refined: RefinedRun) -> None:
     """Print what refinement added to a run."""
-    show_front(console, polished.history, polished.summary)
-    final = polished.summary["hypervolume"]["final"]
-    before = polished.before.hypervolume
+    show_front(console, refined.history, refined.summary)
+    final = refined.summary["hypervolume"]["final"]
+    before = refined.before.hypervolume
     console.print(
-        f"refined {polished.tried} designs in {polished.evaluations:,} evaluations: added {polished.added} improved "
+        f"refined {refined.tried} designs in {refined.evaluations:,} evaluations: added {refined.added} improved "
         f"designs; hypervolume {before[-1]:.3f} -> {final:.3f}"
     )
-    _show_best_known(console, polished.summary["best_known"])
+    _show_best_known(console, refined.summary["best_known"])
 
 
 def _show_empty_front(console: Console, history: History, hypervolume: float, more: str) -> None:

@@ -1,7 +1,10 @@
 """Consoles and formats that all commands share."""
 
 import json
+import shlex
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -41,3 +44,10 @@ def plain_table(*names: str, right: Sequence[str] = ()) -> Table:
 def format_point(point: Sequence[float]) -> str:
     """Return a point as (x, y, z)."""
     return "(" + ", ".join(f"{value:g}" for value in point) + ")"
+
+
+def repeat_command() -> str:
+    """Return the command that was given, quoted for a shell."""
+    program, *arguments = sys.argv
+    called = ["python", "-m", "armwright"] if Path(program).name == "__main__.py" else [program]
+    return shlex.join([*called, *arguments])

@@ -49,7 +49,7 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     if isinstance(config.method, FrontMethod):
         first = config.method.initial_designs or {}
         settings |= {"budget": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
-        command = "front"
+        command = "design"
     else:
         command = "optimize"
         if not _is_known(config.method):

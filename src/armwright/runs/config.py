@@ -130,7 +130,7 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
         if isinstance(self.method, FrontMethod):
             raise RunFolderError(
                 "this run is a search for the whole front, not a study: its front needs no refinement, and "
-                "`armwright front` with a larger --budget goes on with it"
+                "`armwright design` with a larger --budget continues it"
             )
         return self.method
 

@@ -141,7 +141,7 @@ def pick_from(
     if robust and history.front:
         verification = (read_summary(run) or {}).get("verification")
         if verification is None:
-            raise FailureError(f"{run} is not verified; armwright verify {run} does it")
+            raise FailureError(f'{run} is not verified; armwright.verify_run("{run}") in Python verifies it')
         numbers = verification["robust_numbers"]
     return history, pick(history, where, by, weights, numbers)
 

@@ -1,0 +1,213 @@
+"""Commands over several runs: experiment, compare, compare-arms, runs."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from armwright.cli.options import (
+    Figures,
+    Json,
+    ModelName,
+    ModelOptionsFile,
+    Scheduler,
+    SpaceFile,
+    TaskName,
+    select_workers,
+)
+from armwright.cli.signals import INTERRUPTED
+from armwright.cli.streams import print_json, repeat_command, stderr_console, stdout_console
+from armwright.exceptions import FailureError, SettingsError
+
+
+def experiment(
+    name: Annotated[str, typer.Argument(help="A built-in experiment (paper, rules, suite), or a YAML file.")],
+    seeds: Annotated[int | None, typer.Option(help="Number of seeds, from 0, instead of the file's.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Only this method of the file (may be repeated).")] = None,
+    task: Annotated[list[str] | None, typer.Option(help="Only this task of the file (may be repeated).")] = None,
+    model: ModelName = None,
+    model_options: ModelOptionsFile = None,
+    replay: Annotated[
+        Path | None,
+        typer.Option(help="Replay the recorded calls of this experiment folder."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            help="Local processes that run the cells; 0: this process.",
+            show_default="one per core with the extra distributed, else 0",
+        ),
+    ] = None,
+    scheduler: Scheduler = None,
+    print_commands: Annotated[
+        bool, typer.Option("--print-commands", help="Print one command per cell to run, and exit.")
+    ] = False,
+    print_: Annotated[bool, typer.Option("--print", help="Print the file of a built-in experiment, and exit.")] = False,
+    figures: Figures = True,
+    out: Annotated[Path | None, typer.Option(help="Folder.", show_default="experiments/NAME")] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print a summary as JSON alone to stdout.")] = False,
+) -> None:
+    """Run methods on tasks with several seeds, and compare them.
+
+    The same command resumes; finished runs are kept.
+    """
+    from armwright.cli.show_comparisons import notes_on_cells, show_comparison, show_outcome, show_plan
+    from armwright.experiments import outcome, plan
+    from armwright.experiments import runner as running
+    from armwright.experiments.cells import plan_cells
+    from armwright.llm.configuration import load_model_options
+    from armwright.report.experiment import write_experiment_figures, write_experiment_tables
+
+    if print_:
+        print(plan.builtin_text(name), end="")
+        return
+    console = stderr_console() if json_ or print_commands else stdout_console()
+    whole, beside = plan.load_experiment(name)
+    chosen = plan.with_model(
+        plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds),
+        load_model_options(model_options, model=model),
+    )
+    out = out or Path("experiments") / chosen.name
+    cells, skipped = plan_cells(chosen, beside, out, replay)
+    before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
+    finished = {done.cell for done in before}
+    due = [cell for cell in cells if cell not in finished]
+    default = workers is None and scheduler is None
+    placed = running.default_workers(len(due)) if default else select_workers(workers, scheduler)
+    show_plan(console, due, len(before), skipped, placed)
+    if print_commands:
+        print("\n".join(cell.command for cell in due))
+        return
+    failed: list[running.CellOutcome] = []
+    try:
+        outcome.write_plan(chosen, out)
+        ended = running.run_cells(due, placed, console.print)
+        for number, done in enumerate(ended, start=1):
+            show_outcome(console, done, number, len(due))
+            failed += [done] if done.fault else []
+        found = outcome.collect(chosen, cells)
+        tables = write_experiment_tables(out, chosen, found, notes_on_cells(skipped, failed))
+        if figures:
+            console.print("drawing the figures")
+        drawn = write_experiment_figures(out, chosen, found) if figures else []
+    except KeyboardInterrupt:
+        console.print(f"\nstopped; every finished trial is in {out}/. Resume with:\n  {repeat_command()}")
+        sys.exit(INTERRUPTED)
+    if json_:
+        record = {"folder": str(out), "cells": len(cells), "skipped": len(skipped), "failed": len(failed)}
+        print_json({**record, "tables": [str(path) for path in tables], "figures": [str(path) for path in drawn]})
+    else:
+        show_comparison(console, tables, drawn)
+    if failed:
+        sys.exit(FailureError.exit_code)
+
+
+def compare(
+    folders: Annotated[list[Path], typer.Argument(help="Run folders, or folders that contain them.")],
+    baseline: Annotated[
+        str | None, typer.Option(help="The method that the others are compared with.", show_default="of the first run")
+    ] = None,
+    figures: Figures = True,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for tables and figures.", show_default="none are written")
+    ] = None,
+) -> None:
+    """Compare finished runs by method, task and seed: tables, intervals, tests."""
+    from armwright.cli.show_comparisons import show_files
+    from armwright.experiments.compare_runs import compare_summaries
+    from armwright.experiments.run_list import read_finished_runs
+    from armwright.report.tables import markdown, write_tables
+
+    console = stdout_console()
+    finished, unfinished = read_finished_runs(folders)
+    notes = [f"{folder} is not finished and is left out" for folder in unfinished]
+    comparison = compare_summaries(finished, baseline)
+    title = "Comparison of runs"
+    console.print(markdown(comparison, title, notes=notes), end="")
+    if out is not None:
+        tables = write_tables(out, comparison, title, notes=notes)
+        drawn: list[Path] = []
+        if figures:
+            from armwright.report.comparison_figures import write_comparison_figures
+
+            drawn = write_comparison_figures(out, comparison)
+        show_files(console, tables, drawn)
+
+
+def compare_arms(
+    task: TaskName,
+    arms: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ARM...", help="URDF files, or names such as ur5e or panda (robot_descriptions; extra arms)."
+        ),
+    ],
+    run: Annotated[
+        Path | None,
+        typer.Option(help="A run of the task to compare with; its figures then show the arms."),
+    ] = None,
+    base: Annotated[
+        str | None, typer.Option(help="Position x,y,z of the base links [m].", show_default="searched")
+    ] = None,
+    tip: Annotated[
+        str | None,
+        typer.Option(help="Link of the URDFs that reaches the targets.", show_default="the last one"),
+    ] = None,
+    base_link: Annotated[
+        str | None, typer.Option(help="Link of the URDFs at the base.", show_default="the root")
+    ] = None,
+    space: SpaceFile = None,
+    figures: Figures = True,
+    seed: Annotated[int, typer.Option(help="Seed of the base search.")] = 0,
+    json_: Json = False,
+) -> None:
+    """Evaluate existing arms on TASK, and compare them with the designs of a run."""
+    from armwright.cli.show_comparisons import show_arms
+    from armwright.experiments.compare_arms import compare_arms, comparison_record
+    from armwright.spaces.design_space import load_space
+
+    compared = compare_arms(
+        task,
+        arms,
+        run,
+        space=None if space is None else load_space(space),
+        base=None if base is None else _parse_point(base),
+        tip=tip,
+        base_link=base_link,
+        seed=seed,
+    )
+    drawn: list[Path] = []
+    if run is not None and figures:
+        from armwright.report.figures import write_figures
+        from armwright.report.page import write_report
+
+        drawn = [write_report(run), *(path for path in write_figures(run) if path.stem == "front")]
+    if json_:
+        print_json(comparison_record(compared))
+    else:
+        show_arms(stdout_console(), compared, drawn)
+
+
+def _parse_point(text: str) -> tuple[float, float, float]:
+    """Parse `0.1,0,0.3` into a point [m]."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise SettingsError(f'--base "{text}": expected three numbers with commas, such as 0,0,0.5 [m]') from None
+    return x, y, z
+
+
+def runs(
+    folders: Annotated[list[Path] | None, typer.Argument(help="Folders to search.", show_default="runs")] = None,
+    json_: Json = False,
+) -> None:
+    """List the runs in folders and their progress."""
+    from armwright.cli.show_results import show_runs
+    from armwright.experiments.run_list import find_runs, list_runs
+
+    listed = list_runs(find_runs(folders or [Path("runs")]))
+    if json_:
+        print_json(listed)
+    else:
+        show_runs(stdout_console(), listed)

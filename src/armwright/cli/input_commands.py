@@ -1,0 +1,154 @@
+"""Commands before a run: init, check, tasks, actuators, draft."""
+
+import os
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from armwright.cli.options import (
+    Json,
+    MaxCost,
+    ModelName,
+    ModelOptionsFile,
+    Objectives,
+    SpaceFile,
+    TaskName,
+    load_problem,
+)
+from armwright.cli.signals import INTERRUPTED
+from armwright.cli.streams import print_json, stderr_console, stdout_console
+from armwright.exceptions import FailureError, TaskError
+
+
+def init(
+    file: Annotated[Path, typer.Argument(help="The task file to write, such as my-task.yaml.")],
+    points: Annotated[
+        Path | None, typer.Option("--from", help="CSV file with x, y, z in its first three columns.")
+    ] = None,
+    unit: Annotated[str, typer.Option(help="Unit of the CSV file: m or mm.")] = "m",
+    offset: Annotated[tuple[float, float, float], typer.Option(help="Offset X Y Z added to every point [m].")] = (
+        0,
+        0,
+        0,
+    ),
+) -> None:
+    """Write a commented task file to edit."""
+    from armwright.tasks.points_file import read_points
+    from armwright.tasks.task import Task
+    from armwright.tasks.task_template import task_template
+    from armwright.yaml_documents import parse_document
+
+    if file.suffix not in (".yaml", ".yml"):
+        raise TaskError(f"{file}: expected a name that ends in .yaml, such as {file.stem}.yaml")
+    if os.path.lexists(file):
+        raise TaskError(f"{file} already exists; use another name, or delete it first")
+    text = task_template(file) if points is None else task_template(file, read_points(points, unit, offset))
+    task = parse_document(text, Task, TaskError, str(file))
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as fault:
+        raise FailureError(f"cannot write {file}: {fault.strerror or fault}") from fault
+    print(
+        f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
+    )
+
+
+def check(
+    task: TaskName,
+    space: SpaceFile = None,
+    objectives: Objectives = None,
+    json_: Json = False,
+) -> None:
+    """Validate TASK and a design space, and describe what they mean."""
+    from armwright.cli.check import check_problem, show_check
+
+    problem = load_problem(task, space, objectives=objectives)
+    if json_:
+        print_json(check_problem(problem))
+    else:
+        show_check(stdout_console(), problem)
+
+
+def tasks(
+    names: Annotated[list[str] | None, typer.Argument(help="Describe these tasks (built-in, random-N, files).")] = None,
+    json_: Json = False,
+) -> None:
+    """List the built-in tasks, or describe the tasks given."""
+    from armwright.cli.show_inputs import show_task, show_tasks
+    from armwright.experiments.baselines import baselines_of
+    from armwright.runs.best_known import best_known_hypervolume
+    from armwright.tasks.catalogue import builtin_tasks, load_task
+
+    listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())
+    known = {task.name: best_known_hypervolume(task) for task in listed} if names or json_ else {}
+    stored = {name: baselines_of(name) if known[name] is not None else [] for name in known}
+    if json_:
+        print_json(
+            [
+                task.model_dump(mode="json")
+                | {"best_known_hypervolume": known[task.name], "baselines": [asdict(b) for b in stored[task.name]]}
+                for task in listed
+            ]
+        )
+        return
+    console = stdout_console()
+    if not names:
+        show_tasks(console, listed)
+    for task in listed if names else ():
+        show_task(console, task, known[task.name], stored[task.name])
+
+
+def actuators(json_: Json = False) -> None:
+    """List the catalogue of actuators that a space file may name."""
+    from armwright.cli.show_inputs import show_actuators
+    from armwright.robot.actuators import catalogue
+
+    records = list(catalogue().values())
+    if json_:
+        print_json([record.model_dump(exclude_none=True) for record in records])
+    else:
+        show_actuators(stdout_console(), records)
+
+
+def draft(
+    words: Annotated[list[str], typer.Argument(metavar="WORDS...", help="The task of the arm, in any language.")],
+    model: ModelName = None,
+    max_cost: MaxCost = None,
+    model_options: ModelOptionsFile = None,
+    out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("."),
+    force: Annotated[bool, typer.Option("--force", help="Replace files of the same name.")] = False,
+    print_prompt: Annotated[
+        bool, typer.Option("--print-prompt", help="Print exactly what would be sent, and exit.")
+    ] = False,
+    json_: Annotated[bool, typer.Option("--json", help="Print only a JSON record to stdout.")] = False,
+) -> None:
+    """Have a language model draft a task file, and a space file if needed, from WORDS.
+
+    Nothing is run.
+    """
+    from armwright.cli.show_inputs import show_draft
+    from armwright.llm.configuration import load_model_options
+    from armwright.llm.draft import Drafter, drafting_model
+    from armwright.llm.draft_prompt import draft_prompt
+
+    request = " ".join(words)
+    if print_prompt:
+        print(draft_prompt(request), end="")
+        return
+    console = stderr_console() if json_ else stdout_console()
+    options = load_model_options(model_options, model=model, max_cost=max_cost)
+    drafter = Drafter(drafting_model(options), out, force)
+    console.print(drafter.forecast(request))
+    try:
+        drafted = drafter.draft(request)
+    except KeyboardInterrupt:
+        console.print("\nstopped; no task was written")
+        sys.exit(INTERRUPTED)
+    if json_:
+        print_json(drafted.record())
+        return
+    show_draft(console, drafted)

@@ -1,0 +1,140 @@
+"""Options that several commands share, and the objects that they describe."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.problem.problem import Problem
+    from armwright.study.cluster import Workers
+
+# Groups of options in `--help`
+TASK, SEARCH, MODEL = "Task", "Search", "Language model"
+EVALUATION, OUTPUT = "Evaluation", "Output"
+
+# Options
+TaskName = Annotated[
+    str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`) or a YAML file.")
+]
+SpaceFile = Annotated[
+    Path | None, typer.Option(help="Design space as a YAML file.", show_default="the paper's", rich_help_panel=TASK)
+]
+Objectives = Annotated[
+    str | None,
+    typer.Option(
+        help="Objectives to minimise instead of the task's: names with commas, see docs/method.md, 3.",
+        rich_help_panel=TASK,
+    ),
+]
+EvaluatorName = Annotated[
+    str | None,
+    typer.Option(
+        help="A custom Python function that evaluates arms, FILE.py:FUNCTION or MODULE:FUNCTION; its code is run.",
+        rich_help_panel=TASK,
+    ),
+]
+Robust = Annotated[
+    bool,
+    typer.Option(
+        "--robust", help="Count a design by its worst case with the base or a link 1 mm off.", rich_help_panel=TASK
+    ),
+]
+Seed = Annotated[int, typer.Option(help="Seed of everything random.", rich_help_panel=SEARCH)]
+ModelName = Annotated[
+    str | None, typer.Option(help="Language model, such as openai-chat:gpt-4o.", rich_help_panel=MODEL)
+]
+PromptName = Annotated[
+    str | None,
+    typer.Option(
+        help="Prompt: plus (with analysis instructions), minus, or a template file.",
+        show_default="plus",
+        rich_help_panel=MODEL,
+    ),
+]
+MaxCost = Annotated[float | None, typer.Option(help="Stop asking the model after so many USD.", rich_help_panel=MODEL)]
+ModelOptionsFile = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE",
+        help="All other settings of the model (base_url, temperature, in_flight, ...): a YAML file, or a mapping in "
+        "place such as '{temperature: 0}'; see docs/language-models.md.",
+        rich_help_panel=MODEL,
+    ),
+]
+DeviceName = Annotated[str, typer.Option(help="Evaluate arms on: auto, cpu or cuda.", rich_help_panel=EVALUATION)]
+Figures = Annotated[
+    bool,
+    typer.Option(
+        "--figures/--no-figures",
+        help="Make the page (report.html) and the figures of a finished run.",
+        rich_help_panel=OUTPUT,
+    ),
+]
+SummaryJson = Annotated[bool, typer.Option("--json", help="Print only summary.json to stdout.", rich_help_panel=OUTPUT)]
+Json = Annotated[bool, typer.Option("--json", help="Print as JSON.", rich_help_panel=OUTPUT)]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        help="Use the Dask cluster at this address (tcp://HOST:PORT); --workers then limits tasks in flight.",
+        rich_help_panel=EVALUATION,
+    ),
+]
+
+
+def load_problem(
+    task: str,
+    space: Path | None,
+    robust: bool = False,
+    device: str = "cpu",
+    many: bool = False,
+    objectives: str | None = None,
+    evaluator: str | None = None,
+) -> "Problem":
+    """Load the task, space and evaluator that the options name.
+
+    Args:
+        task: A built-in task or a task file.
+        space: A space file; None for the paper's space.
+        robust: Whether a design counts by its worst case within the build tolerance.
+        device: "auto", "cpu" or "cuda".
+        many: Whether many designs are evaluated at once, which makes "auto" prefer a GPU.
+        objectives: Names with commas, in place of the task's.
+        evaluator: FILE.py:FUNCTION or MODULE:FUNCTION.
+    """
+    from armwright.kinematics.devices import resolve_device
+    from armwright.problem.evaluators import load_evaluator
+    from armwright.problem.objectives import PAPER_OBJECTIVES, named_objectives
+    from armwright.problem.problem import Problem
+    from armwright.spaces.design_space import load_space, paper_space
+    from armwright.spaces.tolerance import TOLERANCE
+    from armwright.tasks.catalogue import load_task
+
+    loaded = load_task(task)
+    measured = None if evaluator is None else load_evaluator(evaluator)
+    names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))
+    chosen = ()
+    if measured is not None:
+        # the task's objectives and reference point do not apply to an evaluator's objectives
+        loaded = loaded.model_copy(update={"objectives": None, "reference_point": None})
+        chosen = named_objectives(names, measured.objectives) if names else measured.objectives
+    elif objectives is not None and names != (loaded.objectives or tuple(o.name for o in PAPER_OBJECTIVES)):
+        # the task's reference point is for its own objectives
+        loaded = loaded.model_copy(update={"objectives": names, "reference_point": None})
+    return Problem(
+        loaded,
+        paper_space() if space is None else load_space(space),
+        tolerance=TOLERANCE if robust else 0.0,
+        device=resolve_device(device, many),
+        objectives=chosen,
+        evaluator=measured,
+    )
+
+
+def select_workers(n_workers: int | None, scheduler: str | None) -> "Workers | None":
+    """Return the workers of --workers and --scheduler; None to evaluate in this process."""
+    from armwright.study.cluster import Workers
+
+    if not n_workers and not scheduler:
+        return None
+    return Workers(n_workers or None, scheduler)

@@ -1,0 +1,207 @@
+"""Commands that show and export what a run holds: pick, export, report, live, prompt, doctor."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from armwright.cli.options import Json, ModelName, ModelOptionsFile, SpaceFile, load_problem
+from armwright.cli.streams import print_json, stdout_console
+from armwright.exceptions import FailureError, SettingsError
+
+
+def pick(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    where: Annotated[
+        list[str] | None, typer.Option(help='A condition such as "position_error<=0.05" (may be repeated).')
+    ] = None,
+    by: Annotated[str | None, typer.Option(help="The quantity to minimise: torque, mass, link_1, …")] = None,
+    weights: Annotated[
+        str | None,
+        typer.Option(help="Weights of objectives relative to the reference point: position_error=2,torque=1."),
+    ] = None,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Only designs that stay good with the base or a link 1 mm off.")
+    ] = False,
+    n: Annotated[int, typer.Option("-n", help="Number of designs, the best first.")] = 1,
+    json_: Json = False,
+) -> None:
+    """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee."""
+    from armwright.cli.show_results import show_picked
+    from armwright.runs.selection import numbers_of, pick_from, read_condition, read_weights
+
+    if n < 1:
+        raise SettingsError(f"-n {n}: expected a whole number from 1")
+    conditions = [read_condition(text) for text in where or ()]
+    weighed = None if weights is None else read_weights(weights)
+    history, picked = pick_from(run, conditions, by, weighed, robust)
+    if json_:
+        print_json(
+            [
+                {"number": m.number, "source": m.source, "joints": m.design.joints, **numbers_of(history, m)}
+                for m in picked[:n]
+            ]
+        )
+        return
+    show_picked(stdout_console(), run, history, picked, n)
+
+
+def export(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    design: Annotated[
+        int | None, typer.Option(help="Number of the design.", show_default="the knee of the front")
+    ] = None,
+    format_: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            help="urdf, xacro, srdf, ros2_control, sdf, mjcf, sheet (Markdown) or sheet-csv; "
+            "optuna: the whole run as a study.",
+        ),
+    ] = "urdf",
+    out: Annotated[
+        Path | None, typer.Option(help="Output file.", show_default="stdout; for optuna, study.db in the run folder")
+    ] = None,
+) -> None:
+    """Write a design of RUN for a simulator or a workshop, or all of RUN for Optuna.
+
+    Any design of the run can be exported, not only those of the front.
+    """
+    from armwright.runs.export import OPTUNA, export_design
+
+    if format_ == OPTUNA:
+        from armwright.runs.optuna_export import export_study
+
+        if design is not None:
+            raise SettingsError(f"--design {design} does not go with --format optuna, which exports the whole run")
+        study = export_study(run, out)
+        print(f"{study.database}; to view it in a browser (pip install optuna-dashboard):\n  {study.dashboard_command}")
+        return
+    text = export_design(run, design, format_)
+    if out is None:
+        print(text, end="")
+        return
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(text, encoding="utf-8")
+
+
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
+) -> None:
+    """Write report.html into each RUN: one file for any browser, without a network."""
+    from armwright.report.page import write_report
+
+    for run in runs:
+        print(write_report(run))
+
+
+def live(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run that is in progress or finished.")],
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; any other than the default opens the page to a network.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on; 0: any free port.")] = 0,
+    follow: Annotated[bool, typer.Option("--follow", hidden=True)] = False,
+) -> None:
+    """Serve the live page of RUN to browsers on this machine until Ctrl-C."""
+    from armwright.report.live_server import serve
+    from armwright.runs.folder import read_config
+
+    if not follow:
+        read_config(run)  # report a folder without a run at once
+    serve(run, lambda address: print(address, flush=True), host, port, sys.stdin.buffer if follow else None)
+
+
+def prompt(
+    task: Annotated[str | None, typer.Argument(metavar="TASK", help="A built-in task, or a YAML file.")] = None,
+    after: Annotated[
+        Path | None,
+        typer.Option(help="Print the prompt for the next proposal of this run.", show_default="of a new run"),
+    ] = None,
+    number: Annotated[
+        int | None, typer.Option(help="With --after: print the prompt of this trial as it was sent.")
+    ] = None,
+    space: SpaceFile = None,
+    prompt: Annotated[
+        str | None, typer.Option(help="Prompt: plus, minus, or a template file.", show_default="the run's, else plus")
+    ] = None,
+    model_options: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="memory, answer and proposals, in a YAML file or in place, such as '{memory: own}'.",
+            show_default="the run's",
+        ),
+    ] = None,
+    n_init: Annotated[int | None, typer.Option(help="Random trials of the new run.", show_default="10")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the new run.", show_default="0")] = None,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the answer's JSON schema instead.")] = False,
+    template: Annotated[
+        bool, typer.Option("--template", help="Print the template of --prompt instead, as a basis for a custom one.")
+    ] = False,
+    variables: Annotated[bool, typer.Option("--variables", help="Print the variables of templates instead.")] = False,
+) -> None:
+    """Print exactly what would be sent to a model for TASK, or what a custom prompt needs."""
+    from armwright.llm.configuration import load_model_options
+    from armwright.llm.prompt import whole_template
+    from armwright.llm.prompt_values import VARIABLES
+    from armwright.spaces.design_space import load_space
+    from armwright.study.prompt_preview import preview, preview_after
+    from armwright.tasks.catalogue import load_task
+
+    if variables:
+        print("\n".join(f"{name}: {description}" for name, description in VARIABLES.items()))
+        return
+    if template:
+        print(whole_template(prompt or "plus"), end="")
+        return
+    options = load_model_options(model_options, prompt=prompt)
+    if after is None:
+        if task is None:
+            raise SettingsError("expected a TASK, --after RUN, --template or --variables")
+        if number is not None:
+            raise SettingsError(f"--number {number} needs --after RUN")
+        n_init = 10 if n_init is None else n_init
+        shown = preview(load_problem(task, space), options, n_init=n_init, seed=seed or 0)
+    else:
+        for option, value in (("--n-init", n_init), ("--seed", seed)):
+            if value is not None:
+                raise SettingsError(f"{option} {value} is for a new run; {after} has its own")
+        shown = preview_after(
+            after,
+            options,
+            task=None if task is None else load_task(task),
+            space=None if space is None else load_space(space),
+            number=number,
+        )
+    if schema:
+        print_json(shown.schema)
+        return
+    print(shown.prompt, end="")
+    note = f"; {shown.note}" if shown.note else ""
+    print(f"about {shown.tokens:,} tokens; for trial {shown.number}{note}", file=sys.stderr)
+
+
+def doctor(
+    model: ModelName = None,
+    model_options: ModelOptionsFile = None,
+    call: Annotated[bool, typer.Option("--call", help="Make one small call to the configured model.")] = False,
+) -> None:
+    """Show what is installed and which models are configured.
+
+    Nothing is sent unless --call is given.
+    """
+    from armwright.cli.doctor import WRONG, examine, try_model
+    from armwright.llm.configuration import load_model_options
+
+    console = stdout_console()
+    options = load_model_options(model_options, model=model)
+    wrong = False
+    for finding in examine(options):
+        console.print(f"{finding.mark} {finding.subject}: {finding.words}")
+        wrong = wrong or finding.mark == WRONG
+    if wrong:
+        sys.exit(FailureError.exit_code)
+    if call:
+        console.print(try_model(options))

@@ -1,0 +1,267 @@
+"""Commands that search designs: design, optimize, refine."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from armwright.cli.options import (
+    EVALUATION,
+    OUTPUT,
+    SEARCH,
+    DeviceName,
+    EvaluatorName,
+    Figures,
+    MaxCost,
+    ModelName,
+    ModelOptionsFile,
+    Objectives,
+    PromptName,
+    Robust,
+    Scheduler,
+    Seed,
+    SpaceFile,
+    SummaryJson,
+    TaskName,
+    load_problem,
+    select_workers,
+)
+from armwright.cli.signals import INTERRUPTED
+from armwright.cli.streams import print_json, repeat_command, stderr_console, stdout_console
+from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
+
+
+def design(
+    task: TaskName,
+    budget: Annotated[
+        str, typer.Option(help="Budget of the search: a time (5s, 2min, 1h) or evaluations (100000, 1e6).")
+    ] = "5s",
+    space: SpaceFile = None,
+    objectives: Objectives = None,
+    from_: Annotated[
+        Path | None, typer.Option("--from", help="Use all designs of this run as initial designs.")
+    ] = None,
+    proposer: Annotated[
+        str | None, typer.Option(help="Proposer of the initial designs: rules, or a configured model (llm).")
+    ] = None,
+    robust: Robust = False,
+    device: DeviceName = "auto",
+    figures: Figures = True,
+    stall: Annotated[bool, typer.Option("--stall/--no-stall", help="Stop early if the hypervolume stalls.")] = True,
+    seed: Seed = 0,
+    out: Annotated[Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-front-seedSEED")] = None,
+    json_: SummaryJson = False,
+) -> None:
+    """Find the whole Pareto front of TASK by direct search in batches.
+
+    The same command with a larger --budget continues the search.
+    """
+    from armwright.cli.progress import search_progress
+    from armwright.cli.show_results import show_search
+    from armwright.proposers.factory import choose_proposer
+    from armwright.study.front_run import find_front
+
+    if from_ is not None and proposer is not None:
+        raise SettingsError("--from and --proposer both set the initial designs; use one of them")
+    console = stderr_console() if json_ else stdout_console()
+    problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
+    initial_designs = from_
+    if proposer is not None:
+        choice = choose_proposer(proposer)
+        if choice.proposer is None:
+            raise SettingsError(f"--proposer {proposer} proposes no initial designs; leave it out")
+        console.print(choice.reason)
+        initial_designs = choice.proposer
+    folder = out or Path("runs") / f"{problem.task.name}-front-seed{seed}"
+    try:
+        with search_progress(console) as watch:
+            run = find_front(
+                problem,
+                budget=budget,
+                seed=seed,
+                initial_designs=initial_designs,
+                stop_at_stall=stall,
+                out=folder,
+                watch=watch,
+            )
+        drawn = _draw(folder) if figures else []
+    except KeyboardInterrupt:
+        console.print(f"\nstopped; the search is saved in {folder}/. Resume with:\n  {repeat_command()}")
+        sys.exit(INTERRUPTED)
+    if json_:
+        print_json({"folder": str(folder), **run.summary})
+        return
+    if run.resumed:
+        search = run.summary["search"]
+        option = "a larger --budget" if search["ended_by"] == "budget" else "--no-stall"
+        console.print(
+            f"resumed at {run.resumed:,} evaluations"
+            if search["evaluations"] > run.resumed
+            else f"{folder}/ is finished; nothing was computed again. Use {option} to continue."
+        )
+    show_search(console, run, drawn)
+
+
+def optimize(
+    task: TaskName,
+    space: SpaceFile = None,
+    objectives: Objectives = None,
+    evaluator: EvaluatorName = None,
+    robust: Robust = False,
+    proposer: Annotated[
+        str,
+        typer.Option(
+            help="Proposer of every n-step-th design: auto (a configured model, else rules), none, rules, llm, "
+            "replay:RUN (a recorded run), manual:DIR (a person, by files).",
+            rich_help_panel=SEARCH,
+        ),
+    ] = "auto",
+    sampler: Annotated[
+        str,
+        typer.Option(
+            help="Black-box sampler: tpe, tpe-multivariate, nsga2, gp (needs the extra gp) or random.",
+            rich_help_panel=SEARCH,
+        ),
+    ] = "tpe",
+    n_total: Annotated[int, typer.Option(help="Counted trials.", rich_help_panel=SEARCH)] = 200,
+    n_init: Annotated[int, typer.Option(help="Random trials before the counted ones.", rich_help_panel=SEARCH)] = 10,
+    n_step: Annotated[
+        int, typer.Option(help="Trials in a block; the first is the proposer's.", rich_help_panel=SEARCH)
+    ] = 10,
+    initial_design: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="An initial design, such as designs/0042/design.json of a run (may be repeated).",
+            rich_help_panel=SEARCH,
+        ),
+    ] = None,
+    refine_every: Annotated[
+        int | None,
+        typer.Option(
+            help="Refine a design of the front by 1000 evaluations after every N counted trials.",
+            rich_help_panel=SEARCH,
+        ),
+    ] = None,
+    seed: Seed = 0,
+    model: ModelName = None,
+    prompt: PromptName = None,
+    max_cost: MaxCost = None,
+    model_options: ModelOptionsFile = None,
+    device: DeviceName = "auto",
+    workers: Annotated[
+        int,
+        typer.Option(
+            help="Local processes that evaluate designs; 0: this process (extra distributed).",
+            rich_help_panel=EVALUATION,
+        ),
+    ] = 0,
+    scheduler: Scheduler = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-seedSEED", rich_help_panel=OUTPUT)
+    ] = None,
+    figures: Figures = True,
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live", help="Serve the page of the run on 127.0.0.1 while it runs (extra live).", rich_help_panel=OUTPUT
+        ),
+    ] = False,
+    json_: SummaryJson = False,
+) -> None:
+    """Search designs for TASK by black-box trials and proposals.
+
+    The same command resumes or shows the run; a larger --n-total extends it.
+    """
+    from armwright.cli.progress import study_progress
+    from armwright.cli.show_results import show_result
+    from armwright.llm.configuration import load_model_options
+    from armwright.proposers.factory import choose_proposer
+    from armwright.spaces.design_file import read_design
+    from armwright.study.study import optimize as run_study
+
+    console = stderr_console() if json_ else stdout_console()
+    problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
+    initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
+    choice = choose_proposer(proposer, load_model_options(model_options, model=model, prompt=prompt, max_cost=max_cost))
+    folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
+    console.print(choice.reason)
+    if live:
+        from armwright.report.live_server import begin_server
+
+        console.print(f"live: {begin_server(folder)}")
+    try:
+        with study_progress(console) as watch:
+            run = run_study(
+                problem,
+                proposer=choice.proposer or "none",
+                sampler=sampler,
+                n_init=n_init,
+                n_step=n_step,
+                n_total=n_total,
+                in_flight=choice.options.in_flight,
+                refine_every=refine_every,
+                initial_designs=initial_designs,
+                on_model_failure=choice.options.on_failure,
+                workers=select_workers(workers, scheduler),
+                seed=seed,
+                out=folder,
+                watch=watch,
+            )
+        finished_before = run.resumed == len(run.trials)
+        if figures and not finished_before:
+            console.print("drawing the page and the figures")
+        drawn = _draw(folder) if figures else []
+    except (KeyboardInterrupt, StoppedError):
+        kept = f"every finished trial is in {folder}/" if folder.exists() else "nothing was started"
+        console.print(f"\nstopped; {kept}. Resume with:\n  {repeat_command()}")
+        sys.exit(INTERRUPTED)
+    except AnswerPendingError as pending:
+        if pending.refusal:
+            console.print(f"answer rejected: {pending.refusal}")
+        console.print(
+            f"{pending.question} waits for your answer in {pending.answer}; then resume with:\n  {repeat_command()}"
+        )
+        if json_:
+            where = {"folder": str(folder), "question": str(pending.question), "answer": str(pending.answer)}
+            print_json({**where, "refusal": pending.refusal})
+        return
+    if json_:
+        print_json({"folder": str(folder), **run.summary})
+        return
+    if finished_before:
+        console.print(f"{folder}/ is finished; nothing was computed again. A larger --n-total extends it.")
+    elif run.resumed:
+        console.print(f"resumed at trial {run.resumed} of {len(run.trials)}")
+    show_result(console, run, drawn)
+
+
+def refine(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a finished run.")],
+    evaluations: Annotated[int, typer.Option(help="Evaluations per design of the front.")] = 1000,
+    json_: SummaryJson = False,
+) -> None:
+    """Refine base and link lengths of RUN's Pareto designs, and add the improved designs to the run."""
+    from armwright.cli.show_results import show_refined
+    from armwright.study.refine_run import refine_run
+
+    refined = refine_run(run, evaluations)
+    _draw(run)
+    if json_:
+        print_json({"folder": str(run), **refined.summary})
+        return
+    show_refined(stdout_console(), refined)
+
+
+def _draw(folder: Path) -> list[Path]:
+    """Return the figures of a finished run; draw them and the page if they are missing."""
+    from armwright.report.figures import write_figures
+    from armwright.report.page import write_report
+    from armwright.runs.folder import RunFolder
+    from armwright.runs.results import FIGURES, REPORT
+
+    with RunFolder(folder):
+        existing = sorted((folder / FIGURES).glob("*.png"))
+        if not (folder / REPORT).is_file():
+            write_report(folder)
+        return existing or write_figures(folder)

@@ -1,0 +1,91 @@
+"""`design`, `refine` and `optimize --refine-every` on the command line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_cli import SHORT
+from tests.support.command_line import armwright, refused
+
+
+def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> None:
+    done = armwright("design", "target-1", "--budget", "3000", "--seed", "4", "--no-figures")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    for words in ("of the best known hypervolume", "robust", "sensitive", "budget spent", "a toy"):
+        assert words in done.stdout
+    assert (in_folder / "runs" / "target-1-front-seed4" / "summary.json").is_file()
+    more = armwright("design", "target-1", "--budget", "4000", "--seed", "4", "--no-figures", "--json")
+    summary = json.loads(more.stdout)
+    assert summary["search"]["evaluations"] >= 4000
+    assert summary["folder"] == "runs/target-1-front-seed4"
+
+    armwright("optimize", "target-1", *SHORT, "--out", "mine")
+    refined = armwright("refine", "mine", "--evaluations", "120")
+    assert refined.returncode == 0, refined.stderr
+    assert "improved designs" in refined.stdout
+    assert " refine " in refined.stdout
+    assert "from other initial postures" in refined.stdout
+    refined_summary = json.loads((in_folder / "mine" / "summary.json").read_text())
+    record = refined_summary["verification"]
+    assert record["robust"] + record["sensitive"] == refined_summary["front_size"]
+    again = armwright("optimize", "target-1", *SHORT, "--out", "mine")
+    assert "is finished; nothing was computed again" in again.stdout
+
+    from_run = armwright("design", "target-1", "--budget", "500", "--from", "mine", "--no-figures", "--out", "from-run")
+    assert from_run.returncode == 0, from_run.stderr
+
+
+@pytest.mark.slow
+def test_design_and_refine_draw_their_figures(in_folder: Path) -> None:
+    armwright("design", "target-1", "--budget", "1000", "--out", "front")
+    armwright("optimize", "target-1", *SHORT, "--out", "mine")
+    armwright("refine", "mine", "--evaluations", "60")
+    for folder in ("front", "mine"):
+        drawn = {path.name for path in (in_folder / folder / "figures").iterdir()}
+        assert {"hypervolume.png", "front.png", "arms.pdf"} <= drawn
+
+
+def test_robust_and_refine_every(in_folder: Path) -> None:
+    done = armwright(
+        "optimize", "target-1", *SHORT, "--robust", "--refine-every", "3", "--proposer", "none", "--out", "r", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["evaluations"] > summary["n_trials"]
+    assert summary["best_known"] is None
+    config = (in_folder / "r" / "config.yaml").read_text()
+    assert "tolerance: 0.001" in config
+    assert "refine_every: 3" in config
+    line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--refine-every", "3", "--out", "r")
+    assert "tolerance: 0.001 there, 0.0 asked" in line
+
+
+@pytest.mark.parametrize(
+    ("code", "args", "words"),
+    [
+        (2, ("design", "target-1", "--budget", "0"), 'budget = "0" is neither a time above 0'),
+        (2, ("design", "target-1", "--budget", "5 bananas"), 'budget = "5 bananas"'),
+        (2, ("design", "target-1", "--budget", "-1s"), 'budget = "-1s"'),
+        (2, ("design", "target-9"), 'unknown task "target-9"'),
+        (2, ("design", "target-1", "--device", "cuda"), "no NVIDIA GPU"),
+        (2, ("design", "target-1", "--device", "tpu"), 'device = "tpu" is not one of'),
+        (2, ("design", "target-1", "--proposer", "none"), "proposes no initial designs"),
+        (2, ("design", "target-1", "--proposer", "rules", "--from", "x"), "use one of them"),
+        (1, ("design", "target-1", "--from", "nothing"), "not a run folder"),
+        (2, ("optimize", "target-1", "--refine-every", "0"), "refine_every = 0"),
+        (1, ("refine", "nothing"), "not a run folder"),
+    ],
+)
+def test_wrong_arguments_end_in_one_line(in_folder: Path, code: int, args: tuple[str, ...], words: str) -> None:
+    assert words in refused(code, *args)
+    assert not list(in_folder.glob("runs/*"))
+
+
+def test_a_design_run_is_not_refined_or_continued_by_optimize(in_folder: Path) -> None:
+    armwright("design", "target-1", "--budget", "300", "--no-figures", "--out", "run")
+    assert "not a study" in refused(1, "refine", "run")
+    assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")
+    assert "not a study" in refused(1, "prompt", "--after", "run")
+    assert "to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:run", "--out", "other")
