@@ -55,6 +55,16 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
         return value
 
     @property
+    def form(self) -> Form:
+        """Form of the answer in the prompt."""
+        return ANSWERS[self.answer]
+
+    @property
+    def expects(self) -> bool:
+        """True if answers state the expected objectives, from which memory lets a model learn."""
+        return self.memory == "own"
+
+    @property
     def given(self) -> dict[str, Any]:
         """The fields that were set, in the order of their declaration."""
         return {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
@@ -93,6 +103,11 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
     origin: str = "model"
     replay_strict: bool = False
     wait: bool = True
+
+    @property
+    def source(self) -> str:
+        """Source of the trials; a stand-in has its own, since its trials must not count as a model's."""
+        return "llm" if self.origin == "model" else self.origin
 
     @classmethod
     def of(cls, options: "ModelOptions | str | None") -> "ModelOptions":

@@ -13,8 +13,8 @@ from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
 from armwright.runs.history import History
 
-TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, by what prompts came to
-THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # that a model is taken to write, for an estimate
+TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, measured on prompts
+THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # of an answer, for estimates
 
 
 class LlmProposer(PromptedProposer):
@@ -30,10 +30,8 @@ class LlmProposer(PromptedProposer):
         options = ModelOptions.of(options)
         if options.answer == "text":
             raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
-        # The designs of a stand-in have a source of their own: they must not count as a model's.
-        name = "llm" if options.origin == "model" else options.origin
         budget = CallBudget(options.max_calls, options.max_cost)
-        super().__init__(ModelClient(options), options, name, budget=budget)
+        super().__init__(ModelClient(options), options, options.source, budget=budget)
         self.options = options
 
     def settings(self) -> Mapping[str, Any]:
@@ -42,12 +40,12 @@ class LlmProposer(PromptedProposer):
         return {"model": self.options.model, "base_url": self.options.base_url, **super().settings(), **sent}
 
     def forecast(self, problem: Problem, n: int) -> str:
-        """About what `n` proposals will take, before any is asked for."""
+        """Estimate the calls, tokens and cost of `n` proposals."""
         from armwright.llm.client import describe_cost
 
         calls = -(-n // self.options.proposals)
         given, written = self._tokens_each(problem)
-        steps = 2 if self._form == "then-schema" else 1
+        steps = 2 if self.options.form == "then-schema" else 1
         words = (
             f"{n} proposals: about {steps * calls + 1} calls, {_thousands(calls * given)} tokens in, "
             f"{_thousands(calls * written)} out"
@@ -55,24 +53,24 @@ class LlmProposer(PromptedProposer):
         return f"{words}; {describe_cost(self.options, calls * given, calls * written)}"
 
     def _tokens_each(self, problem: Problem) -> tuple[int, int]:
-        """Tokens in and out of one proposal: as those so far in this run, else as a full prompt has."""
-        said = [call for call in self._transcript.calls if call.proposal and call.fault is None]
-        asked = {call.proposal for call in said}
+        """Return input and output tokens per proposal: the mean so far, or the estimate for a full prompt."""
+        calls = [call for call in self._transcript.calls if call.proposal and call.fault is None]
+        asked = {call.proposal for call in calls}
         if asked:
             return tuple(
-                sum(n) // len(asked) for n in zip(*((c.input_tokens, c.output_tokens) for c in said), strict=True)
+                sum(n) // len(asked) for n in zip(*((c.input_tokens, c.output_tokens) for c in calls), strict=True)
             )  # pyright: ignore[reportReturnType]
         given = min(
             MOST_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + _feedback_tokens(problem)
         )
         written = self.options.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
-        if self._form == "then-schema":
+        if self.options.form == "then-schema":
             given += estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS
         return given, written
 
 
 def _feedback_tokens(problem: Problem) -> int:
-    """Of the feedback in a full prompt, without evaluating anything: an evaluator can be slow."""
+    """Estimate the tokens of a full prompt's feedback without evaluating designs, which may be slow."""
     joints, targets = problem.space.max_joints, min(len(problem.task.targets), MOST_TARGETS)
     numbers = targets * (len(problem.objectives) + 3 + joints) + 2 * joints + len(problem.objectives) + 3
     return (N_PARETO + N_RANDOM) * (TOKENS_A_NUMBER * numbers + TOKENS_A_DESIGN)

@@ -1,4 +1,4 @@
-"""A proposer that asks: what the language model, a recording of one, and people in its place have in common."""
+"""The base class of proposers that ask a language model, a recording of one, or a person."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -9,8 +9,8 @@ from armwright.exceptions import DesignError, ModelError, ProposalError
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
 from armwright.llm.backend import CHECK, LlmBackend, Question, Reply
 from armwright.llm.budget import CallBudget
-from armwright.llm.model_options import ANSWERS, PromptOptions
-from armwright.llm.prompt import Form, Prompt, load_prompt, parameters_prompt
+from armwright.llm.model_options import PromptOptions
+from armwright.llm.prompt import Prompt, load_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import TRANSCRIPTS, Transcript, hints_of
 from armwright.problem.problem import Problem
@@ -46,11 +46,10 @@ class PromptedProposer(LlmSession, Proposer):
         self.options = options
         self.per_call = options.proposals
         self.prompt = prompt or load_prompt(options.prompt)
-        self._form: Form = ANSWERS[options.answer]
         self._hints = Hints(None)
 
     def settings(self) -> Mapping[str, Any]:
-        """Prompt, memory and form of the answer; of a prompt of one's own the whole template."""
+        """Return prompt, memory and form of the answer; for a custom prompt also its template."""
         own = {} if self.prompt.name in ("plus", "minus") else {"template": self.prompt.template}
         return {
             "prompt": self.prompt.name,
@@ -61,22 +60,26 @@ class PromptedProposer(LlmSession, Proposer):
         }
 
     def open(self, folder: Path | None) -> None:
-        """Reads what was said before in this run."""
+        """Open the run's transcript and hints."""
         self._begin(None if folder is None else folder / TRANSCRIPTS)
         self._hints = Hints(folder)
 
     def look(self, folder: Path) -> None:
-        """Reads what was said before in a run, and changes nothing there."""
+        """Open the transcript and hints of a run without changing them."""
         self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
         self._hints = Hints(folder)
 
     def asked(self) -> Mapping[int, int]:
-        """The trials that were asked for so far, and how many finished trials were known then."""
+        """Return the requested trials, each with the number of finished trials known at the time."""
         calls = [call for call in self._transcript.calls if call.proposal]
         return {int(call.proposal.rpartition("-")[2]): call.known for call in calls}
 
     def check(self) -> None:
-        """Makes sure that answers are to be had; a budget that is used up is said at the first question."""
+        """Ask a test question; an exhausted budget is reported at the first real question instead.
+
+        Raises:
+            ModelError: The backend gives no answers.
+        """
         try:
             self._call(CHECK, self.backend.check, self._over)
         except ProposalError as fault:
@@ -93,18 +96,18 @@ class PromptedProposer(LlmSession, Proposer):
             )
 
     def unused(self, history: History) -> Sequence[Proposal]:
-        """Designs that were answered in a run that was killed, and that no trial has used: they were paid for."""
+        """Return recorded designs of a killed run that no trial has used yet."""
         used = {trial.proposal for trial in history}
-        found: dict[str, Proposal] = {}
+        recorded: dict[str, Proposal] = {}
         for call in self._transcript.calls:
             if call.step in LAST_STEPS and call.fault is None:
-                with suppress(DesignError):  # a transcript that was changed by hand: asked again
+                with suppress(DesignError):  # a transcript edited by hand: asked again
                     answers = read_text(call.answer, history.problem, self.options.proposals)
-                    found.update({p.id: p for p in self._proposals(call.proposal, answers, call.known)})
-        return [proposal for proposal in found.values() if proposal.id not in used]
+                    recorded.update({p.id: p for p in self._proposals(call.proposal, answers, call.known)})
+        return [proposal for proposal in recorded.values() if proposal.id not in used]
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
-        """The next designs. An answer that was paid for in a run that was killed is used, not asked again."""
+        """Propose the next designs; recorded thoughts of a killed run are used rather than asked for again."""
         question = self.question(history, seed, number)
         try:
             return self._answered(question, history.problem)
@@ -112,11 +115,11 @@ class PromptedProposer(LlmSession, Proposer):
             self._hints.give_back(question.hints)
 
     def _answered(self, question: Question, problem: Problem) -> Sequence[Proposal]:
-        over = self._over
+        over = self._over  # of this session, even if another one begins meanwhile
         try:
             if question.step == "reasoning":
-                said = self._call(question, self.backend.ask, over)
-                question = self._extracting(problem, question.proposal, said, question.known)
+                thoughts = self._call(question, self.backend.ask, over)
+                question = self._extraction(problem, question.proposal, thoughts, question.known)
             text = self._call(question, lambda asked: self.ask_designs(asked, problem), over)
         except ProposalError as fault:
             fault.known = question.known
@@ -125,68 +128,64 @@ class PromptedProposer(LlmSession, Proposer):
         return self._proposals(question.proposal, answers, question.known)
 
     def question(self, history: History, seed: int, number: int) -> Question:
-        """What is asked first for trial `number`; where free thoughts have come already, for their parameters."""
+        """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
         identity = self.identity(number)
-        in_steps = self._form == "then-schema"
+        in_steps = self.options.form == "then-schema"
         thoughts = self._transcript.answered(identity, "reasoning") if in_steps else None
         if thoughts is not None:
-            return self._extracting(history.problem, identity, thoughts.answer, thoughts.known)
+            return self._extraction(history.problem, identity, thoughts.answer, thoughts.known)
         hints = self.next_hints(number)
         prompt = self.prompt_for(history, seed, hints)
         return Question(identity, "reasoning" if in_steps else "answer", prompt, len(history), hints=hints)
 
     def identity(self, number: int) -> str:
-        """Of the question for trial `number`, and of the proposal that comes of it."""
+        """Return the id of the question for trial `number` and of its proposal."""
         return f"{self.name}-{number:04d}"
 
     def next_hints(self, number: int) -> tuple[Hint, ...]:
-        """Those that go with a question for trial `number` if it is asked now.
+        """Return the hints for a question about trial `number` that is asked now.
 
-        People who answer by files get none: their question has to stay the same until it is answered.
+        Manual answers get none: their question has to stay the same until it is answered.
         """
-        return () if self._form == "text" else self._hints.take(self._transcript)
+        return () if self.options.form == "text" else self._hints.take(self._transcript)
 
     def past_hints(self, number: int) -> tuple[Hint, ...]:
-        """Those that the question for trial `number` went with."""
+        """Return the hints that the question for trial `number` contained."""
         return hints_of(self._transcript.calls, self.identity(number))
 
-    def _extracting(self, problem: Problem, identity: str, said: str, known: int) -> Question:
-        prompt = parameters_prompt(problem, said, proposals=self.options.proposals, expected=self._expects)
+    def _extraction(self, problem: Problem, identity: str, thoughts: str, known: int) -> Question:
+        prompt = parameters_prompt(problem, thoughts, proposals=self.options.proposals, expected=self.options.expects)
         return Question(identity, "parameters", prompt, known)
 
     def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
-        """What is asked after `history`."""
+        """Return the prompt for the next designs."""
         return self.prompt.render(
             history,
             seed,
             memory=self.options.memory,
             name=self.name,
             proposals=self.options.proposals,
-            form=self._form,
+            form=self.options.form,
             hints=[hint.text for hint in hints],
         )
 
     def schema(self, problem: Problem) -> dict[str, Any]:
-        """JSON schema of the answer that holds the designs."""
+        """Return the JSON schema of the answer that holds the designs."""
         return answer_schema(
             problem,
-            reasoning=self._form == "schema",
-            expected=self._expects,
+            reasoning=self.options.form == "schema",
+            expected=self.options.expects,
             proposals=self.options.proposals,
         )
 
     def ask_designs(self, question: Question, problem: Problem) -> Reply:
-        """The answer that holds the designs, as JSON that `read_text` reads."""
+        """Ask for the designs; the answer is JSON that `read_text` reads."""
 
         def read(content: Mapping[str, Any]) -> str:
             answers = read_answers(content, problem, self.options.proposals)
             return written_answers(answers, problem, str(content.get("reasoning", "")))
 
         return self.backend.ask_for(question, self.schema(problem), read)
-
-    @property
-    def _expects(self) -> bool:
-        return self.options.memory == "own"
 
     def _proposals(self, identity: str, answers: Sequence[Answer], known: int) -> list[Proposal]:
         ids = [identity] if len(answers) == 1 else [f"{identity}.{i}" for i in range(1, len(answers) + 1)]

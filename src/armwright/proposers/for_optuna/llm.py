@@ -10,17 +10,16 @@ import optuna
 from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm.backend import CHECK, Question, Reply
 from armwright.llm.budget import CallBudget
-from armwright.llm.model_options import ANSWERS, ModelOptions
-from armwright.llm.prompt import Form
+from armwright.llm.model_options import ModelOptions
 from armwright.llm.session import LlmSession
 from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
-from armwright.proposers.for_optuna.parameters import Parameter, Space, stated_space, study_parameters
+from armwright.proposers.for_optuna.parameters import Parameter, Space, study_parameters
 from armwright.proposers.for_optuna.prompt import StudyObjective, parameters_prompt, study_objectives, study_prompt
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
 
 
 class StudyLlmProposer(LlmSession, StudyProposer):
-    """Asks a language model for each proposal, from the study's trials and a description in words.
+    """Ask a language model for each proposal, from the study's trials and a description of the problem.
 
     Args:
         options: Which model, how it is called, what it may spend; or a model's name. Of the prompt options, memory
@@ -43,33 +42,30 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         options = ModelOptions.of(options)
         if options.answer == "text":
             raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
-        # The trials of a stand-in have a source of their own: they must not count as a model's.
-        name = "llm" if options.origin == "model" else options.origin
-        super().__init__(ModelClient(options), name, CallBudget(options.max_calls, options.max_cost))
+        super().__init__(ModelClient(options), options.source, CallBudget(options.max_calls, options.max_cost))
         self.description = description
-        self.memory = options.memory
-        self._form: Form = ANSWERS[options.answer]
-        self._space = dict(space or {})
+        self.options = options
+        self.given_space = dict(space or {})
         path = None if transcript is None else Path(transcript)
         if path is not None and not path.parent.is_dir():
             raise SettingsError(f"transcript {path}: there is no folder {path.parent}; make it first")
         self._begin(path)
 
-    def space(self, study: optuna.Study) -> Space:
-        """What was given, and what the trials have shown besides."""
-        return stated_space(study, self._space)
-
     def check(self) -> None:
-        """Makes sure that answers are to be had, before any trial; ModelError where not."""
+        """Ask a test question before any trial.
+
+        Raises:
+            ModelError: The model gives no answers, or its price is unknown under a cost limit.
+        """
         try:
-            self._call(CHECK, lambda question: self.backend.check(), self._over)
-        except ProposalError as fault:
-            raise ModelError(f"{fault}. Check the model, its key and base_url") from fault
+            self._call(CHECK, lambda _: self.backend.check(), self._over)
+        except ProposalError as error:
+            raise ModelError(f"{error}. Check the model, its key and base_url") from error
         if self._budget.price_is_missing:
             raise ModelError(f"the price of {self.backend.model} is not known, so max_cost cannot hold; use max_calls")
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
-        """The next trial, from what the study has found."""
+        """Ask the model for the next trial, from the trials so far."""
         trials = study.get_trials(deepcopy=False)
         parameters = study_parameters(self.space(study), trials)
         if not parameters:
@@ -82,15 +78,15 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             parameters,
             self.description,
             seed,
-            memory=self.memory,
+            memory=self.options.memory,
             source=self.name,
-            form=self._form,
+            form=self.options.form,
         )
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
         step = "answer"
-        if self._form == "then-schema":
+        if self.options.form == "then-schema":
             thoughts = self._call(Question(identity, "reasoning", prompt, known), self.backend.ask, self._over)
-            prompt, step = parameters_prompt(parameters, objectives, thoughts, self._expects), "parameters"
+            prompt, step = parameters_prompt(parameters, objectives, thoughts, self.options.expects), "parameters"
         question = Question(identity, step, prompt, known)
         text = self._call(question, lambda asked: self._ask_for(asked, parameters, objectives), self._over)
         answer = read_answer(json.loads(text), parameters, objectives)
@@ -103,10 +99,6 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             answer: StudyAnswer = read_answer(content, parameters, objectives)
             return written_answer(answer, parameters, objectives, str(content.get("reasoning") or ""))
 
-        reasoning = self._form == "schema"
-        schema = answer_schema(parameters, objectives, reasoning=reasoning, expected=self._expects)
+        reasoning = self.options.form == "schema"
+        schema = answer_schema(parameters, objectives, reasoning=reasoning, expected=self.options.expects)
         return self.backend.ask_for(question, schema, read)
-
-    @property
-    def _expects(self) -> bool:
-        return self.memory == "own"

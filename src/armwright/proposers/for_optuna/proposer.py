@@ -7,6 +7,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol
 from weakref import WeakValueDictionary
 
@@ -16,7 +17,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from armwright.exceptions import DesignError, RunFolderError, SettingsError
 from armwright.problem.problem import Problem
-from armwright.proposers.for_optuna.parameters import Space, observed_space
+from armwright.proposers.for_optuna.parameters import Space, stated_space
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.history import BBO, History
 from armwright.runs.trial import FinishedTrial
@@ -47,13 +48,15 @@ class StudyProposer(Protocol):
 
     Attributes:
         name: the `source` of its trials.
+        given_space: distributions that take precedence over those of the trials so far.
     """
 
     name: str
+    given_space: Space = MappingProxyType({})
 
     def space(self, study: optuna.Study) -> Space:
-        """Return the distributions of the parameters; by default those of the trials so far."""
-        return observed_space(study)
+        """Return the distributions of the parameters: the given ones, completed by those of the trials so far."""
+        return stated_space(study, self.given_space)
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """Propose the next trial. Several threads may call this at a time.

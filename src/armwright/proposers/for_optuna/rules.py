@@ -15,7 +15,7 @@ from optuna.distributions import BaseDistribution, CategoricalDistribution
 from armwright.arrays import Array
 from armwright.exceptions import ProposalError
 from armwright.proposers.for_optuna.parameter_values import from_unit, is_number, to_unit, value_text
-from armwright.proposers.for_optuna.parameters import Space, stated_space
+from armwright.proposers.for_optuna.parameters import Space
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
 from armwright.proposers.for_optuna.study_view import Params, StudyView, params_in_space
 from armwright.proposers.rule_helpers import MIDDLE, change_until_new, draw_gap, proposal_id, rule_of
@@ -41,11 +41,7 @@ class StudyRulesProposer(StudyProposer):
     name = "rules"
 
     def __init__(self, space: Space | None = None) -> None:
-        self._space = dict(space or {})
-
-    def space(self, study: optuna.Study) -> Space:
-        """Return the given space, completed by the trials so far."""
-        return stated_space(study, self._space)
+        self.given_space = dict(space or {})
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """Apply one of the rules to the study's complete trials."""
