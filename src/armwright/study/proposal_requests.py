@@ -29,6 +29,11 @@ class ProposalSlot:
     fault: str | None = None
     note: str = ""
 
+    @property
+    def fault_message(self) -> str | None:
+        """Why there is no design: empty if there is one, None if there is nothing new to report."""
+        return "" if self.proposal is not None else self.note or None
+
 
 class ProposalRequests:
     """Requests proposals, until a fault that another request cannot mend.

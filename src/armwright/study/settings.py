@@ -1,0 +1,96 @@
+"""Settings of a study, checked."""
+
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+from armwright.exceptions import SettingsError
+from armwright.problem.problem import Problem
+from armwright.proposers.factory import choose_proposer
+from armwright.proposers.proposer import Proposer
+from armwright.runs.config import Method, RunConfig, record_objectives, versions
+from armwright.search.samplers import SamplerFactory, sampler_name
+from armwright.spaces.parameters import Design
+from armwright.study.cluster import Workers
+
+LARGEST = 2**31 - 1
+ON_MODEL_FAILURE = ("stop", "continue")
+
+
+def study_method(
+    proposer: Proposer | None,
+    sampler: str | SamplerFactory,
+    n_init: int,
+    n_step: int,
+    n_total: int,
+    in_flight: int | None,
+    refine_every: int | None,
+    initial_designs: Sequence[Design] = (),
+) -> Method:
+    """Return the search settings of `optimize` with these arguments.
+
+    Raises:
+        SettingsError: an argument is out of range, or two of them exclude each other.
+    """
+    if len(initial_designs) > n_init:
+        raise SettingsError(f"{len(initial_designs)} initial designs do not fit into the n_init = {n_init} first trials")
+    if in_flight is not None and proposer is not None and not proposer.overlaps:
+        raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
+    return Method(
+        proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
+        sampler=sampler_name(sampler),
+        n_init=check_integer("n_init", n_init, 1),
+        n_step=check_integer("n_step", n_step, 1),
+        n_total=check_integer("n_total", n_total, 1),
+        in_flight=None if in_flight is None else check_integer("in_flight", in_flight, 1),
+        refine_every=None if refine_every is None else check_integer("refine_every", refine_every, 1),
+        initial_designs=tuple(dict(design.params) for design in initial_designs),
+    )
+
+
+def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
+    """Return the settings of a new run."""
+    return RunConfig(
+        task=problem.task,
+        space=problem.space,
+        tolerance=problem.tolerance,
+        device=problem.device,
+        objectives=record_objectives(problem.objectives),
+        reference_point=problem.reference_point,
+        method=method,
+        seed=check_integer("seed", seed, 0),
+        evaluator=None if problem.evaluator is None else problem.evaluator.name,
+        versions=versions(problem.evaluator),
+    )
+
+
+def check_proposer(proposer: str | Proposer | None) -> Proposer | None:
+    """Return the proposer of a name, or the given one."""
+    if isinstance(proposer, str):
+        return choose_proposer(proposer).proposer
+    if isinstance(proposer, type):
+        raise SettingsError(f"proposer = {proposer.__name__} is a class; give an instance of it: {proposer.__name__}()")
+    return proposer
+
+
+def check_settings(problem: Problem, method: Method, workers: Workers | None, on_model_failure: str) -> None:
+    """Raise a SettingsError for settings that exclude each other, or for an initial design outside the space."""
+    if on_model_failure not in ON_MODEL_FAILURE:
+        raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
+    for design in method.initial_designs:
+        problem.space.design(design)
+    if problem.evaluator is not None and method.refine_every is not None:
+        raise SettingsError("--refine-every does not go with an evaluator: a refinement takes a thousand evaluations")
+    if workers is not None and method.in_flight is not None:
+        raise SettingsError("--overlap does not go with --workers: these go on while a question is asked")
+
+
+def check_integer(name: str, value: Any, least: int) -> int:
+    """Return the value as an int; SettingsError unless it is an integer from `least` on."""
+    try:
+        number = operator.index(value)  # accepts the integers of numpy
+    except TypeError:
+        number = -1
+    if isinstance(value, bool) or not least <= number <= LARGEST:
+        raise SettingsError(f"{name} = {value!r}: a whole number from {least} to {LARGEST} is needed")
+    return number
