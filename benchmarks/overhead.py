@@ -22,7 +22,8 @@ from armwright.report.figures import write_figures
 from armwright.search.samplers import sampler_factory
 from armwright.seeding import derived_seed
 from armwright.spaces.optuna_distributions import distributions
-from armwright.study.study import Run, optimize
+from armwright.study.progress import StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
@@ -62,7 +63,7 @@ def seconds_of_bare(seed: int) -> float:
     return time.perf_counter() - started
 
 
-def bare(run: Run, seed: int) -> None:
+def bare(run: StudyResult, seed: int) -> None:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = optuna.create_study(directions=["minimize", "minimize"])
     space = distributions(PROBLEM.space)

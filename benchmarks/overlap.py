@@ -17,7 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from armwright.problem.problem import Outcomes, Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.spaces.parameters import Design
-from armwright.study.study import Run, optimize
+from armwright.study.progress import StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request
 
@@ -48,13 +49,13 @@ def slow_designer(problem: Problem) -> ChatServer:
     return server
 
 
-def timed(problem: Problem, proposer: LlmProposer | str, n_total: int, **settings: int) -> tuple[float, Run]:
+def timed(problem: Problem, proposer: LlmProposer | str, n_total: int, **settings: int) -> tuple[float, StudyResult]:
     started = time.perf_counter()
     run = optimize(problem, proposer=proposer, n_total=n_total, **settings)
     return time.perf_counter() - started, run
 
 
-def row(words: str, seconds: float, bound: float, run: Run) -> None:
+def row(words: str, seconds: float, bound: float, run: StudyResult) -> None:
     overlap = run.summary["proposer"]["overlap"]
     print(
         f"| {words} | {seconds:.1f} s | {bound:.1f} s | {seconds / bound:.2f} | {overlap['ratio']:.3f} of "

@@ -16,8 +16,10 @@ from peers import Nsga2
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.best_known import known_front
-from armwright.study.front_run import Budget, FrontProgress, find_front
-from armwright.study.study import Progress, optimize
+from armwright.study.front_run import find_front
+from armwright.study.progress import Progress
+from armwright.study.search_budget import SearchBudget, SearchProgress
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
 TASKS = ("target-1", "target-2", "target-3")
@@ -78,10 +80,10 @@ def study(**settings: object) -> Callable[[Problem, int], Course]:
 def ours(problem: Problem, seed: int) -> Course:
     course: Course = []
 
-    def watch(progress: FrontProgress) -> None:
+    def watch(progress: SearchProgress) -> None:
         course.append((progress.evaluations, progress.seconds, progress.hypervolume))
 
-    find_front(problem, budget=Budget(seconds=LONGEST), seed=seed, watch=watch)
+    find_front(problem, budget=SearchBudget(seconds=LONGEST), seed=seed, watch=watch)
     return course
 
 

@@ -47,8 +47,9 @@ if TYPE_CHECKING:
     from armwright.spaces.parameters import Design
     from armwright.study.cluster import Workers
     from armwright.study.front_run import FrontRun, find_front
+    from armwright.study.progress import StudyResult
     from armwright.study.refine_run import refine_run
-    from armwright.study.study import Run, optimize
+    from armwright.study.study import optimize
     from armwright.tasks.catalogue import builtin_tasks, load_task, random_task
     from armwright.tasks.task import Task
 
@@ -83,7 +84,7 @@ _PLACES = {
     "Proposer": "proposers.proposer",
     "ReplayProposer": "proposers.replay",
     "RulesProposer": "proposers.rules",
-    "Run": "study.study",
+    "StudyResult": "study.progress",
     "StudyLlmProposer": "proposers.for_optuna.llm",
     "StudyProposal": "proposers.for_optuna.proposer",
     "StudyProposer": "proposers.for_optuna.proposer",
@@ -150,10 +151,10 @@ __all__ = [
     "Proposer",
     "ReplayProposer",
     "RulesProposer",
-    "Run",
     "StudyLlmProposer",
     "StudyProposal",
     "StudyProposer",
+    "StudyResult",
     "StudyRulesProposer",
     "Task",
     "UrdfArm",

@@ -572,10 +572,10 @@ def run_words(data: bytes) -> None:
     """Sentences of options and of task files: nothing of them is evaluated."""
     from armwright.problem.constraints import read_constraints
     from armwright.runs.selection import read_condition, read_weights
-    from armwright.study.front_run import Budget
+    from armwright.study.search_budget import SearchBudget
 
     text = data.decode("utf-8", "replace")
-    reads = (read_condition, read_weights, Budget.of, lambda words: read_constraints(words.split("\n")))
+    reads = (read_condition, read_weights, SearchBudget.parse, lambda words: read_constraints(words.split("\n")))
     any_of((lambda read=read: read(text)) for read in reads)
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
-from armwright.study.study import Run, optimize
+from armwright.study.progress import StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, wants_design
 from tests.support.wire_formats import OUTPUTS, proposer
@@ -64,10 +65,10 @@ def spread(cases: Iterable[str], outputs: Sequence[str] = OUTPUTS) -> pytest.Mar
 
 
 @pytest.fixture
-def ask(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Run]:
+def ask(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., StudyResult]:
     """One proposal."""
 
-    def run(wire: str, **settings: Any) -> Run:
+    def run(wire: str, **settings: Any) -> StudyResult:
         asked = proposer(wire, chat_server, monkeypatch, **settings)
         return optimize(PROBLEM, proposer=asked, n_init=4, n_step=3, n_total=1, out=tmp_path / "run")
 
@@ -81,7 +82,7 @@ def giving(answer: Answer) -> Callable[[Request], Answer]:
 
 @spread(IN_ANY_FORM)
 def test_answers_are_read_in_any_form(
-    chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, case: str
+    chat_server: ChatServer, ask: Callable[..., StudyResult], wire: str, output: str, case: str
 ) -> None:
     chat_server.answer = giving(IN_ANY_FORM[case])
     run = ask(wire, output=output)
@@ -91,7 +92,7 @@ def test_answers_are_read_in_any_form(
 
 @spread(IN_TEXT, ("native", "prompted"))
 def test_text_around_an_answer_is_ignored(
-    chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str, case: str
+    chat_server: ChatServer, ask: Callable[..., StudyResult], wire: str, output: str, case: str
 ) -> None:
     chat_server.answer = giving(IN_TEXT[case])
     run = ask(wire, output=output)
@@ -102,7 +103,7 @@ def test_text_around_an_answer_is_ignored(
 @every_output
 @both_formats
 def test_one_step_answers_hold_reasoning_and_design(
-    chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str
+    chat_server: ChatServer, ask: Callable[..., StudyResult], tmp_path: Path, wire: str, output: str
 ) -> None:
     chat_server.answer = giving(json.dumps({"reasoning": "Step 1: {think}.", **GOOD_DESIGN}))
     run = ask(wire, output=output, answer="one-step")
@@ -114,7 +115,7 @@ def test_one_step_answers_hold_reasoning_and_design(
 
 @spread(REFUSED)
 def test_refused_values_are_asked_again_with_the_reason(
-    chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str, case: str
+    chat_server: ChatServer, ask: Callable[..., StudyResult], tmp_path: Path, wire: str, output: str, case: str
 ) -> None:
     refused, words = REFUSED[case]
     chat_server.answer = giving(json.dumps(refused))
@@ -132,7 +133,7 @@ def test_refused_values_are_asked_again_with_the_reason(
 @pytest.mark.parametrize("output", ["native", "prompted"])
 @both_formats
 def test_refused_answers_are_recorded_with_the_text_around_them(
-    chat_server: ChatServer, ask: Callable[..., Run], tmp_path: Path, wire: str, output: str
+    chat_server: ChatServer, ask: Callable[..., StudyResult], tmp_path: Path, wire: str, output: str
 ) -> None:
     written = f"Here it is:\n{json.dumps({**GOOD_DESIGN, 'joint_1': 'Z'})}\nI hope this helps."
     chat_server.answer = giving(written)
@@ -143,14 +144,18 @@ def test_refused_answers_are_recorded_with_the_text_around_them(
 
 @every_output
 @both_formats
-def test_corrected_answers_are_taken(chat_server: ChatServer, ask: Callable[..., Run], wire: str, output: str) -> None:
+def test_corrected_answers_are_taken(
+    chat_server: ChatServer, ask: Callable[..., StudyResult], wire: str, output: str
+) -> None:
     answers = iter([REFUSED["missing link"][0], REFUSED["NaN"][0], GOOD_DESIGN])
     chat_server.answer = lambda request: json.dumps(next(answers)) if wants_design(request) else designer(request)
     assert dict(ask(wire, output=output).trials[4].design.params) == EXPECTED
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
-def test_numbers_outside_json_are_refused(chat_server: ChatServer, ask: Callable[..., Run], number: str) -> None:
+def test_numbers_outside_json_are_refused(
+    chat_server: ChatServer, ask: Callable[..., StudyResult], number: str
+) -> None:
     chat_server.answer = giving(json.dumps(GOOD_DESIGN).replace("0.01", number))
     run = ask("openai", output="prompted")
     assert (run.trials[4].source, run.trials[4].fault) == ("bbo", "answer")

@@ -18,7 +18,8 @@ from armwright.llm.model_options import ModelOptions
 from armwright.llm.session import LlmSession
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support import wire_formats as wires
 from tests.support.chat_server import Answer, ChatServer, Request, designer
@@ -33,7 +34,7 @@ def run(
     n_total: int = 12,
     seen: list[Progress] | None = None,
     **settings: Any,
-) -> Run:
+) -> StudyResult:
     watch = None if seen is None else seen.append
     return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch, **settings)
 

@@ -11,7 +11,8 @@ from armwright.llm import client as chat
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
-from armwright.study.study import Run, optimize
+from armwright.study.progress import StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer
@@ -19,7 +20,7 @@ from tests.support.wire_formats import llm_proposer
 PROBLEM = Problem(load_task("target-1"))
 
 
-def run(server: ChatServer, out: Path | None = None, n_total: int = 6, prompt: str = "plus") -> Run:
+def run(server: ChatServer, out: Path | None = None, n_total: int = 6, prompt: str = "plus") -> StudyResult:
     proposer = llm_proposer(server.url, prompt=prompt)
     return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=0, out=out)
 

@@ -15,7 +15,8 @@ from armwright.llm import client as chat
 from armwright.llm.backend import FINAL, CallError, Question
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import (
     GOOD_DESIGN,
@@ -49,12 +50,12 @@ def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def ask(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> Callable[..., tuple[Run, list[Progress]]]:
+) -> Callable[..., tuple[StudyResult, list[Progress]]]:
     """A short run in tmp_path/run, and all that it reported."""
 
     def run(
         wire: str, n_total: int = 6, n_step: int = 3, slow_at: int | None = None, timeout: float = 120.0, **how: Any
-    ) -> tuple[Run, list[Progress]]:
+    ) -> tuple[StudyResult, list[Progress]]:
         shown: list[Progress] = []
         asked = proposer(wire, chat_server, monkeypatch, timeout=timeout)
 
@@ -86,7 +87,7 @@ def after(n: int, fault: Answer, last: int | None = None) -> Callable[[Request],
     return answer
 
 
-def sources(run: Run) -> Sequence[str]:
+def sources(run: StudyResult) -> Sequence[str]:
     return [trial.source for trial in run.trials[4:]]
 
 

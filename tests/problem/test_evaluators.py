@@ -193,7 +193,7 @@ def test_a_run_is_resumed_with_its_evaluator_alone(file: Path) -> None:
     """The file may be mended; that is noted. The run folder names it, and never loads it."""
     task = WHOLE
 
-    def run(n_total: int, evaluator: aw.Evaluator | None) -> aw.Run:
+    def run(n_total: int, evaluator: aw.Evaluator | None) -> aw.StudyResult:
         problem = aw.Problem(task, SPACE, evaluator=evaluator)
         return aw.optimize(problem, proposer="rules", n_init=5, n_total=n_total, out="runs/own")
 

@@ -30,7 +30,8 @@ from armwright.runs.folder import read_run
 from armwright.runs.results import verify_run
 from armwright.spaces.design_space import paper_space
 from armwright.study.front_run import find_front
-from armwright.study.study import Run, optimize
+from armwright.study.progress import StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from tests.support.arms import general_arms
@@ -78,7 +79,7 @@ def bounded(*point: float) -> Task:
 PROBLEMS = [one(OPEN), one(bounded(5.0)), three(OPEN), three(bounded(5.0, 5.0, 60.0))]
 
 
-def short(problem: Problem, n_total: int, out: Path | None = None) -> Run:
+def short(problem: Problem, n_total: int, out: Path | None = None) -> StudyResult:
     return optimize(problem, proposer="rules", n_init=5, n_step=3, n_total=n_total, out=out)
 
 

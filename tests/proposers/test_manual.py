@@ -18,8 +18,9 @@ from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.manual import ManualProposer
 from armwright.proposers.replay import ReplayProposer
+from armwright.study.progress import StudyResult
 from armwright.study.prompt_preview import preview_after
-from armwright.study.study import Run, optimize
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN
 from tests.support.command_line import armwright
@@ -38,7 +39,7 @@ JSON = json.dumps({**GOOD_DESIGN, "link_1": 0.25})
 Answering = Callable[[dict[str, tuple[str, str]]], None]
 
 
-def run(proposer: ManualProposer | ReplayProposer, out: Path | None, n_total: int = 6, **settings: Any) -> Run:
+def run(proposer: ManualProposer | ReplayProposer, out: Path | None, n_total: int = 6, **settings: Any) -> StudyResult:
     return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=2, out=out, **settings)
 
 

@@ -16,7 +16,8 @@ from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.factory import choose_proposer
 from armwright.proposers.replay import ReplayProposer
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer
@@ -41,7 +42,7 @@ def varied(chat_server: ChatServer) -> ChatServer:
     return chat_server
 
 
-def recorded(server: ChatServer, out: Path, asking: dict[str, Any] | None = None, **settings: Any) -> Run:
+def recorded(server: ChatServer, out: Path, asking: dict[str, Any] | None = None, **settings: Any) -> StudyResult:
     proposer = llm_proposer(server.url, origin="scripted", **asking or {})
     return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
 

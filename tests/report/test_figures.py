@@ -7,12 +7,13 @@ import pytest
 from armwright.exceptions import RunFolderError
 from armwright.problem.problem import Problem
 from armwright.report.figures import chosen_members, draw_attribution, draw_hypervolume, draw_samples, write_figures
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task, random_task
 from armwright.tasks.task import Task
 
 
-def short(out: Path, problem: Problem, n_total: int = 12) -> Run:
+def short(out: Path, problem: Problem, n_total: int = 12) -> StudyResult:
     return optimize(problem, proposer="rules", n_init=4, n_step=4, n_total=n_total, out=out)
 
 

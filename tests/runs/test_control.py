@@ -51,8 +51,9 @@ from armwright.runs.control import (
     stop_study,
 )
 from armwright.runs.history import History
+from armwright.study.progress import Progress, StudyResult
 from armwright.study.prompt_preview import preview_after
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
 from tests.support.command_line import armwright
@@ -66,7 +67,7 @@ NOTES = "Notes from the engineer who watches this search; take them into account
 PATIENCE = 60.0  # [s] for what another thread does
 
 
-def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -> Run:
+def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -> StudyResult:
     return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
 
 

@@ -14,33 +14,34 @@ from armwright.problem.problem import Problem
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.folder import read_run
 from armwright.runs.results import read_summary
-from armwright.study.study import Run, optimize
+from armwright.study.progress import StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
 
 
-def short(out: Path, n_total: int = 8) -> Run:
+def short(out: Path, n_total: int = 8) -> StudyResult:
     return optimize(PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Run:
+def run(tmp_path: Path) -> StudyResult:
     return short(tmp_path / "run")
 
 
-def folder(run: Run) -> Path:
+def folder(run: StudyResult) -> Path:
     assert run.folder is not None
     return run.folder
 
 
-def test_the_files_of_a_run(run: Run) -> None:
+def test_the_files_of_a_run(run: StudyResult) -> None:
     names = {path.name for path in folder(run).iterdir()} - {".lock"}
     results = {"trials.csv", "front.csv", "summary.json", "designs"}
     assert names == {"config.yaml", "trials.jsonl", "status.json", *results}
 
 
-def test_trials_are_one_json_line_each(run: Run) -> None:
+def test_trials_are_one_json_line_each(run: StudyResult) -> None:
     lines = [json.loads(line) for line in (folder(run) / "trials.jsonl").read_text().splitlines()]
     for line, trial in zip(lines, run.trials, strict=True):
         reason = ["reason"] if trial.source == "rules" else []
@@ -51,7 +52,7 @@ def test_trials_are_one_json_line_each(run: Run) -> None:
         assert set(line["seconds"]) == {"total", "sampling", "evaluation", "proposing"}
 
 
-def test_config_repeats_the_run(run: Run) -> None:
+def test_config_repeats_the_run(run: StudyResult) -> None:
     config = yaml.safe_load((folder(run) / "config.yaml").read_text())
     assert config["task"]["targets"][0] == [-0.45, -0.45, -0.45]
     assert config["method"] == {
@@ -71,7 +72,7 @@ def test_config_repeats_the_run(run: Run) -> None:
     assert list(history) == list(run.trials)
 
 
-def test_summary(run: Run) -> None:
+def test_summary(run: StudyResult) -> None:
     summary = json.loads((folder(run) / "summary.json").read_text())
     assert summary == read_summary(folder(run)) == run.summary
     assert list(summary) == [
@@ -113,7 +114,7 @@ def test_without_a_proposer_there_is_nothing_to_diagnose() -> None:
     assert list(summary["attribution"]) == ["random", "bbo"]
 
 
-def test_designs_of_the_front(run: Run) -> None:
+def test_designs_of_the_front(run: StudyResult) -> None:
     written = sorted(path.name for path in (folder(run) / "designs").iterdir())
     assert written == sorted(f"{member.number:04d}" for member in run.front)
     assert run.front
@@ -132,7 +133,7 @@ def test_designs_of_the_front(run: Run) -> None:
         assert (place / "arm.urdf").read_text() == to_urdf(member.arm, name=f"target-1-{member.number}")
 
 
-def test_tables(run: Run) -> None:
+def test_tables(run: StudyResult) -> None:
     with open(folder(run) / "trials.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 13
@@ -150,7 +151,7 @@ def test_designs_that_left_the_front_are_removed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", [1, 20, 100])
-def test_a_cut_last_line_is_dropped_and_the_trial_made_again(run: Run, tmp_path: Path, cut: int) -> None:
+def test_a_cut_last_line_is_dropped_and_the_trial_made_again(run: StudyResult, tmp_path: Path, cut: int) -> None:
     trials = folder(run) / "trials.jsonl"
     whole = trials.read_bytes()
     trials.write_bytes(whole[:-cut])
@@ -160,7 +161,7 @@ def test_a_cut_last_line_is_dropped_and_the_trial_made_again(run: Run, tmp_path:
     assert len(trials.read_bytes().splitlines()) == 13
 
 
-def test_everything_but_config_and_trials_can_be_deleted(run: Run, tmp_path: Path) -> None:
+def test_everything_but_config_and_trials_can_be_deleted(run: StudyResult, tmp_path: Path) -> None:
     summary = (folder(run) / "summary.json").read_bytes()
     for name in ("summary.json", "trials.csv", "front.csv"):
         (folder(run) / name).unlink()
@@ -186,7 +187,9 @@ def test_everything_but_config_and_trials_can_be_deleted(run: Run, tmp_path: Pat
         (lambda lines: [re.sub(rb'"seconds": .*', b'"seconds": 3}', lines[0]), *lines[1:]], "seconds"),
     ],
 )
-def test_damaged_trials_are_named_by_line_and_left_alone(run: Run, tmp_path: Path, damage: object, words: str) -> None:
+def test_damaged_trials_are_named_by_line_and_left_alone(
+    run: StudyResult, tmp_path: Path, damage: object, words: str
+) -> None:
     trials = folder(run) / "trials.jsonl"
     content = b"".join(damage(trials.read_bytes().splitlines(keepends=True)))  # type: ignore[operator]
     trials.write_bytes(content)
@@ -197,20 +200,20 @@ def test_damaged_trials_are_named_by_line_and_left_alone(run: Run, tmp_path: Pat
     assert trials.read_bytes() == content
 
 
-def test_a_damaged_config_is_named(run: Run, tmp_path: Path) -> None:
+def test_a_damaged_config_is_named(run: StudyResult, tmp_path: Path) -> None:
     (folder(run) / "config.yaml").write_text("task: [")
     with pytest.raises(RunFolderError, match=r"config.yaml is not valid YAML"):
         short(tmp_path / "run")
 
 
-def test_results_without_their_trials_are_not_taken_over(run: Run, tmp_path: Path) -> None:
+def test_results_without_their_trials_are_not_taken_over(run: StudyResult, tmp_path: Path) -> None:
     (folder(run) / "trials.jsonl").unlink()
     with pytest.raises(RunConflictError, match=r"holds results of a run .* but no trial in trials.jsonl"):
         short(tmp_path / "run")
     assert (folder(run) / "summary.json").exists()
 
 
-def test_trials_without_their_config_are_not_taken_over(run: Run, tmp_path: Path) -> None:
+def test_trials_without_their_config_are_not_taken_over(run: StudyResult, tmp_path: Path) -> None:
     (folder(run) / "config.yaml").unlink()
     with pytest.raises(RunFolderError, match=r"cannot read config.yaml"):
         short(tmp_path / "run")

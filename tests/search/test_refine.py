@@ -15,8 +15,9 @@ from armwright.runs.history import REFINE
 from armwright.runs.results import read_summary
 from armwright.search.cma_es import POPULATION, Refined, refine
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
+from armwright.study.progress import StudyResult
 from armwright.study.refine_run import refine_run
-from armwright.study.study import Run, optimize
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
 PROBLEM = Problem(load_task("target-1"))
@@ -80,11 +81,11 @@ def test_a_space_without_real_parameters_is_left_alone() -> None:
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Run:
+def run(tmp_path: Path) -> StudyResult:
     return optimize(PROBLEM, proposer="rules", n_init=5, n_step=5, n_total=30, seed=0, out=tmp_path / "run")
 
 
-def test_refine_run_adds_improved_designs(run: Run) -> None:
+def test_refine_run_adds_improved_designs(run: StudyResult) -> None:
     assert run.folder is not None
     refined = refine_run(run.folder, 240)
     new = refined.history.trials[len(run.trials) :]
@@ -108,7 +109,7 @@ def test_refine_run_adds_improved_designs(run: Run) -> None:
     assert read.trials == list(refined.history.trials)
 
 
-def test_refined_run_is_finished_and_cannot_be_extended(run: Run) -> None:
+def test_refined_run_is_finished_and_cannot_be_extended(run: StudyResult) -> None:
     assert run.folder is not None
     refine_run(run.folder, 120)
     _, before = read_run(run.folder)
@@ -121,7 +122,7 @@ def test_refined_run_is_finished_and_cannot_be_extended(run: Run) -> None:
 
 
 def test_refine_run_counts_evaluations_in_vain_and_draws_another_seed(
-    run: Run, monkeypatch: pytest.MonkeyPatch
+    run: StudyResult, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert run.folder is not None
     seeds: list[int] = []
@@ -142,7 +143,7 @@ def test_refine_run_counts_evaluations_in_vain_and_draws_another_seed(
     assert len(set(seeds)) == 2
 
 
-def test_refine_run_refuses_bad_input(run: Run, tmp_path: Path) -> None:
+def test_refine_run_refuses_bad_input(run: StudyResult, tmp_path: Path) -> None:
     assert run.folder is not None
     with pytest.raises(SettingsError, match="evaluations = 3"):
         refine_run(run.folder, 3)

@@ -21,7 +21,7 @@ from armwright.experiments.runner import _outcome_of, finished_before, run_cells
 from armwright.problem.objectives import Objective
 from armwright.runs.control import stop_study
 from armwright.study.cluster import Finished
-from armwright.study.study import Progress
+from armwright.study.progress import Progress
 from tests.support.dask_processes import (
     TASK,
     Bench,
@@ -294,7 +294,7 @@ def test_an_evaluator_s_exception_on_a_worker_arrives_with_its_traceback_and_des
 
 
 def fails_then_goes_on(run: Path, bench: Bench, problem: aw.Problem, workers: aw.Workers | None) -> None:
-    def search() -> aw.Run:
+    def search() -> aw.StudyResult:
         return aw.optimize(problem, **SHORT, out=run, workers=workers)
 
     bench.ask("fail")

@@ -22,7 +22,8 @@ from armwright.runs.folder import read_run
 from armwright.runs.results import read_summary, verify_run
 from armwright.search.front_search import FrontSearch
 from armwright.spaces.design_space import paper_space
-from armwright.study.front_run import Budget, FrontProgress, FrontRun, find_front
+from armwright.study.front_run import FrontRun, find_front
+from armwright.study.search_budget import SearchBudget, SearchProgress
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import builtin_tasks, load_task
 from armwright.tasks.task import Task
@@ -39,26 +40,26 @@ OPEN = Task(name="open", targets=((0.3, 0.0, 0.3), (0.2, 0.1, 0.4)))
 @pytest.mark.parametrize(
     ("words", "budget"),
     [
-        ("5s", Budget(seconds=5.0)),
-        ("0.5s", Budget(seconds=0.5)),
-        ("2min", Budget(seconds=120.0)),
-        ("1h", Budget(seconds=3600.0)),
-        ("100000", Budget(evaluations=100_000)),
-        ("1e6", Budget(evaluations=1_000_000)),
-        ("100_000", Budget(evaluations=100_000)),
+        ("5s", SearchBudget(seconds=5.0)),
+        ("0.5s", SearchBudget(seconds=0.5)),
+        ("2min", SearchBudget(seconds=120.0)),
+        ("1h", SearchBudget(seconds=3600.0)),
+        ("100000", SearchBudget(evaluations=100_000)),
+        ("1e6", SearchBudget(evaluations=1_000_000)),
+        ("100_000", SearchBudget(evaluations=100_000)),
     ],
 )
-def test_budgets(words: str, budget: Budget) -> None:
-    assert Budget.of(words) == budget
+def test_budgets(words: str, budget: SearchBudget) -> None:
+    assert SearchBudget.parse(words) == budget
 
 
 @pytest.mark.parametrize("words", ["0", "0s", "-5s", "5", "5 parsecs", "", "s", "1.5", "1e99", "nan", "inf s", "5m"])
 def test_budgets_that_mean_nothing(words: str) -> None:
     if words == "5":  # evaluations, if few
-        assert Budget.of(words) == Budget(evaluations=5)
+        assert SearchBudget.parse(words) == SearchBudget(evaluations=5)
         return
     with pytest.raises(SettingsError, match="budget"):
-        Budget.of(words)
+        SearchBudget.parse(words)
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +112,7 @@ def test_same_seed_same_front_and_resumed_equals_uninterrupted(done: FrontRun, t
     class StopError(Exception):
         pass
 
-    def stop(progress: FrontProgress) -> None:
+    def stop(progress: SearchProgress) -> None:
         if progress.evaluations >= 3000:
             raise StopError
 
@@ -236,7 +237,7 @@ def test_a_good_beginning_is_no_stall() -> None:
 @pytest.mark.parametrize("bounds", [{"evaluations": 0}, {"seconds": -1.0}, {"seconds": float("nan")}])
 def test_a_budget_is_above_0(bounds: dict[str, float]) -> None:
     with pytest.raises(SettingsError, match="above 0"):
-        Budget(**bounds)  # pyright: ignore[reportArgumentType]
+        SearchBudget(**bounds)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.slow

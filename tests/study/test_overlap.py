@@ -14,7 +14,8 @@ from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.history import History
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer
@@ -75,7 +76,7 @@ class Releasing(threading.Thread):
                 self.proposer.release(self.random.choice(waiting))
 
 
-def search(proposer: Proposer, n_step: int = 5, n_total: int = 20, in_flight: int = 1, **settings: Any) -> Run:
+def search(proposer: Proposer, n_step: int = 5, n_total: int = 20, in_flight: int = 1, **settings: Any) -> StudyResult:
     return optimize(
         PROBLEM,
         proposer=proposer,

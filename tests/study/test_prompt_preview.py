@@ -14,7 +14,8 @@ from armwright.llm.prompt_values import VARIABLES
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import armwright
@@ -40,7 +41,7 @@ def run(
     proposer: str | Proposer,
     problem: Problem = PROBLEM,
     in_flight: int | None = None,
-) -> Run:
+) -> StudyResult:
     return optimize(
         problem, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=5, out=out, in_flight=in_flight
     )

@@ -18,7 +18,8 @@ from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.search.samplers import SamplerFactory
 from armwright.spaces.parameters import Design
-from armwright.study.study import Progress, Run, optimize
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from tests.support.extras import NEEDS_GP
@@ -43,11 +44,11 @@ class Listed(Proposer):
 
 def short(
     out: Path | None = None, problem: Problem = PROBLEM, proposer: Proposer | str = "none", n_total: int = 8
-) -> Run:
+) -> StudyResult:
     return optimize(problem, proposer=proposer, n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
 
 
-def designs(run: Run) -> list[object]:
+def designs(run: StudyResult) -> list[object]:
     return [(trial.source, trial.design, trial.values, trial.proposal) for trial in run.trials]
 
 
@@ -297,7 +298,7 @@ def test_any_optuna_sampler_by_a_factory(tmp_path: Path) -> None:
 
 
 def test_another_factory_is_another_run(tmp_path: Path) -> None:
-    def go_on(sampler: SamplerFactory, n_total: int) -> Run:
+    def go_on(sampler: SamplerFactory, n_total: int) -> StudyResult:
         return optimize(PROBLEM, proposer="none", sampler=sampler, n_init=2, n_total=n_total, out=tmp_path / "run")
 
     go_on(lambda seed: RandomSampler(seed=seed), 2)

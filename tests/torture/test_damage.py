@@ -17,7 +17,8 @@ from armwright.report.page import write_report
 from armwright.runs.config import versions
 from armwright.runs.folder import read_config
 from armwright.study.front_run import find_front
-from armwright.study.study import Run, optimize
+from armwright.study.progress import StudyResult
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import ChatServer
 from tests.support.wire_formats import llm_proposer
@@ -30,7 +31,7 @@ OLDER = Path(__file__).parent / "older"
 Tell = Callable[[str, object], None]
 
 
-def short(folder: Path, **settings: Any) -> Run:
+def short(folder: Path, **settings: Any) -> StudyResult:
     return optimize(PROBLEM, **{"proposer": "rules", **SETTINGS, **settings}, out=folder)
 
 
@@ -175,7 +176,7 @@ def test_a_folder_where_a_file_should_be(tmp_path: Path, intact: Path, name: str
 def test_damaged_transcripts(tmp_path: Path, chat_server: ChatServer, kills: int, record_property: Tell) -> None:
     chat_server.answer = thoughtful
 
-    def ask(folder: Path) -> Run:
+    def ask(folder: Path) -> StudyResult:
         return short(folder, proposer=llm_proposer(chat_server.url, model="m"))
 
     intact = tmp_path / "intact"

@@ -16,7 +16,8 @@ from armwright.exceptions import RunFolderError
 from armwright.files import replace_folder
 from armwright.problem.problem import Problem
 from armwright.runs.folder import RunFolder, is_held
-from armwright.study.study import Progress, optimize
+from armwright.study.progress import Progress
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.torture.lives import is_beginning, is_same_run, n_lines, trials
 from tests.torture.short import N_TRIALS, armwright, as_a_plain_user, command, one_line, run, study

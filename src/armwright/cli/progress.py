@@ -10,8 +10,8 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column
 from rich.text import Text
 
-from armwright.study.front_run import FrontProgress
-from armwright.study.study import Progress as StudyProgress
+from armwright.study.progress import Progress as StudyProgress
+from armwright.study.search_budget import SearchProgress
 
 LINE_INTERVAL = 10  # counted trials between two plain lines
 
@@ -41,7 +41,7 @@ def _note(progress: StudyProgress) -> str:
 
 
 @contextmanager
-def search_progress(console: Console) -> Generator[Callable[[FrontProgress], None]]:
+def search_progress(console: Console) -> Generator[Callable[[SearchProgress], None]]:
     """Yield a callback that shows a front search: a live line in a terminal, plain lines elsewhere."""
     if not console.is_terminal:
         yield _plain_search(console)
@@ -50,16 +50,16 @@ def search_progress(console: Console) -> Generator[Callable[[FrontProgress], Non
     with Progress(*columns, console=console) as bar:
         line = bar.add_task("", total=1.0, state="starting")
 
-        def watch(progress: FrontProgress) -> None:
+        def watch(progress: SearchProgress) -> None:
             bar.update(line, completed=_spent(progress), state=_search_state(progress))
 
         yield watch
 
 
-def _plain_search(console: Console) -> Callable[[FrontProgress], None]:
+def _plain_search(console: Console) -> Callable[[SearchProgress], None]:
     due = 0.0  # share of the budget at the next line
 
-    def watch(progress: FrontProgress) -> None:
+    def watch(progress: SearchProgress) -> None:
         nonlocal due
         if _spent(progress) >= due:
             console.print(_search_state(progress))
@@ -69,14 +69,14 @@ def _plain_search(console: Console) -> Callable[[FrontProgress], None]:
     return watch
 
 
-def _spent(progress: FrontProgress) -> float:
+def _spent(progress: SearchProgress) -> float:
     """Return the spent share of the budget, at most 1."""
     budget = progress.budget
     shares = [progress.evaluations / (budget.evaluations or math.inf), progress.seconds / (budget.seconds or math.inf)]
     return min(1.0, max(shares))
 
 
-def _search_state(progress: FrontProgress) -> str:
+def _search_state(progress: SearchProgress) -> str:
     return (
         f"{progress.evaluations:9,} evaluations  {progress.seconds:6.1f} s  hypervolume {progress.hypervolume:.3f}  "
         f"front {progress.front_size}"

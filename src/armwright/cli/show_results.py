@@ -21,15 +21,15 @@ from armwright.problem.objectives import (
 from armwright.runs.history import FrontMember, History
 from armwright.runs.results import REPORT, unmet
 from armwright.study.front_run import FrontRun
+from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
-from armwright.study.study import Run
 
 SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
 MAX_ROWS = 16  # of the front; front.csv has all
 MAX_OBJECTIVES_BESIDE_GEOMETRY = 3  # more of them leave no room for base and links
 
 
-def show_result(console: Console, run: Run, figures: Sequence[Path]) -> None:
+def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> None:
     """Print the front, the hypervolume and the costs of a run."""
     history = run.history
     summary = run.summary

@@ -1,12 +1,11 @@
-"""The whole front at once: our own search over the batched kernels, kept in a run folder.
+"""Direct search for the whole front (`armwright design`), kept in a run folder.
 
-search.npz    where the search stands, written every few seconds: a killed search loses no more than these
-trials.jsonl  the designs of the final front; those that were evaluated on the way are counted only
-proposals/    the run in which a proposer gave the first designs, where one did
+search.npz    state of the search, written every few seconds; a killed search loses no more than these
+trials.jsonl  designs of the final front; the others are counted only
+proposals/    the run in which a proposer gave the initial designs, if one did
 """
 
 import io
-import re
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
@@ -30,90 +29,61 @@ from armwright.runs.results import discard_results, read_summary, results_are_th
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
 from armwright.search.front_search import FrontSearch
-from armwright.study.study import optimize, whole
+from armwright.study.search_budget import SearchBudget, SearchProgress
+from armwright.study.settings import check_integer
+from armwright.study.study import optimize
 
 SAVE_SECONDS = 5.0
-MOST_DESIGNS = 300  # of the front that become trials: those that the hypervolume would lose most without
-N_SAMPLE = 10  # random designs that give the reference point, where the task states none
-N_PROPOSED = 20  # designs of a proposer that the search begins with
-LARGEST_BUDGET = 10**12
-_BUDGET = re.compile(r"(\d+(?:\.\d+)?(?:e\d+)?)(s|min|h)?")
-_SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-
-
-@dataclass(frozen=True)
-class Budget:
-    """How much a search may spend, over all its sessions; None where there is no bound."""
-
-    evaluations: int | None = None
-    seconds: float | None = None
-
-    def __post_init__(self) -> None:
-        """SettingsError for a budget that nothing can be done with."""
-        for name, bound in (("evaluations", self.evaluations), ("seconds", self.seconds)):
-            if bound is not None and not 0.0 < bound <= LARGEST_BUDGET:
-                raise SettingsError(f"a budget of {bound} {name}: above 0 and at most {LARGEST_BUDGET:g}")
-
-    @classmethod
-    def of(cls, words: str) -> "Budget":
-        """`5s`, `2min`, `1h`, or a number of evaluations such as `100000` or `1e6`."""
-        match = _BUDGET.fullmatch(words.strip().replace("_", ""))
-        amount = float(match[1]) if match else 0.0
-        if match is None or not 0.0 < amount <= LARGEST_BUDGET or (match[2] is None and amount != int(amount)):
-            raise SettingsError(
-                f'budget = "{words}" is neither a time above 0 (5s, 2min, 1h) nor a number of evaluations (100000, 1e6)'
-            )
-        return cls(evaluations=int(amount)) if match[2] is None else cls(seconds=amount * _SECONDS[match[2]])
-
-    def is_spent(self, evaluations: int, seconds: float) -> bool:
-        """Whether that much is all, or more."""
-        bounds = ((evaluations, self.evaluations), (seconds, self.seconds))
-        return any(bound is not None and spent >= bound for spent, bound in bounds)
-
-
-@dataclass(frozen=True)
-class FrontProgress:
-    """What a search has come to so far; seconds: of all its sessions."""
-
-    evaluations: int
-    seconds: float
-    hypervolume: float
-    front_size: int
-    budget: Budget
+MOST_DESIGNS = 300  # of the front that become trials: those with the largest hypervolume contributions
+N_SAMPLE = 10  # random designs that give the reference point, if the task states none
+N_PROPOSED = 20  # initial designs requested from a proposer
 
 
 @dataclass(frozen=True)
 class FrontRun:
-    """A search's result: its history holds the designs of the front alone."""
+    """Result of a direct search.
+
+    Attributes:
+        history: the designs of the front only.
+        config: settings of the run.
+        summary: content of summary.json.
+        folder: the run folder, if there is one.
+        resumed: number of evaluations of earlier sessions.
+    """
 
     history: History
     config: RunConfig
     summary: dict[str, Any]
     folder: Path | None
-    resumed: int  # evaluations of earlier sessions
+    resumed: int
 
     @property
     def front(self) -> list[FrontMember]:
-        """The Pareto set, by rising position error."""
+        """Pareto set, sorted by the first objective."""
         return self.history.front
 
 
 def find_front(
     problem: Problem,
     *,
-    budget: str | int | Budget = "5s",
+    budget: str | int | SearchBudget = "5s",
     seed: int = 0,
     initial_designs: str | Path | Proposer | None = None,
     stop_at_stall: bool = True,
     out: str | Path | None = None,
-    watch: Callable[[FrontProgress], None] | None = None,
+    watch: Callable[[SearchProgress], None] | None = None,
 ) -> FrontRun:
-    """The Pareto front of `problem`, as nearly as the budget allows; with `out` a second call goes on.
+    """Approximate the Pareto front of a problem within a budget.
 
-    budget: a time such as "5s" (loading the kernels not included), or a number of evaluations, of which the last batch
-        may go beyond it by up to 1000. With a number the result depends on the seed alone.
-    initial_designs: a run folder, all of whose designs are taken, or a proposer, who gives the first designs.
-    stop_at_stall: whether to end early when the hypervolume hardly grows any more.
+    Args:
+        problem: what is evaluated.
+        budget: a time such as "5s", without the loading of the kernels, or a number of evaluations, which the last
+            batch may exceed by up to 1000. With a number the result depends on the seed only.
+        seed: of all random numbers.
+        initial_designs: a run folder, whose designs are all taken, or a proposer.
+        stop_at_stall: end early when the hypervolume hardly grows any more.
+        out: run folder; a second call resumes.
+        watch: called with the progress.
 
     Examples:
         >>> import armwright as aw
@@ -123,9 +93,9 @@ def find_front(
         >>> round(volume, 6) == round(run.summary["hypervolume"]["final"], 6)
         True
     """
-    budget = budget if isinstance(budget, Budget) else Budget.of(str(budget))
-    seed = whole("seed", seed, 0)
-    rows, origin = _beginning(problem, initial_designs)  # before a folder is made
+    budget = budget if isinstance(budget, SearchBudget) else SearchBudget.parse(str(budget))
+    seed = check_integer("seed", seed, 0)
+    matrix, origin = _initial_matrix(problem, initial_designs)  # before a folder is made
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
         config = RunConfig(
@@ -142,50 +112,51 @@ def find_front(
         if folder is not None:
             config = folder.adopt(config)
         if folder is None or not (folder.path / SEARCH).exists():
-            # A proposer is asked, and paid, only once the folder is known to be ours.
+            # A proposer is asked, and paid, only after the folder was checked.
             if initial_designs is not None and not isinstance(initial_designs, (str, Path)):
-                rows = _proposed(problem, initial_designs, seed, None if folder is None else folder.path)
+                matrix = _proposed_matrix(problem, initial_designs, seed, None if folder is None else folder.path)
             if folder is not None:
-                rows = np.vstack([rows, _rows(problem, _trials_of(problem, folder))])
-        return _Search(problem, config, folder, rows, watch).run(budget, stop_at_stall)
+                trials = folder.open_trials(problem.space, len(problem.objectives), len(problem.constraints))
+                matrix = np.vstack([matrix, _matrix(problem, trials)])
+        return _DirectSearch(problem, config, folder, matrix, watch).run(budget, stop_at_stall)
 
 
-class _Search:
-    """One session of a search."""
+class _DirectSearch:
+    """One session of a direct search."""
 
     def __init__(
         self,
         problem: Problem,
         config: RunConfig,
         folder: RunFolder | None,
-        rows: Array,
-        watch: Callable[[FrontProgress], None] | None,
+        matrix: Array,
+        watch: Callable[[SearchProgress], None] | None,
     ) -> None:
         self.problem = problem
         self.config = config
         self.folder = folder
         self.watch = watch
         assert config.reference_point is not None
-        self.search = FrontSearch(problem.space.parameters, self._ranked, config.reference_point, config.seed, rows)
-        self.seconds = 0.0  # of earlier sessions, then of all
-        self.infeasible = 0  # designs, likewise
+        self.search = FrontSearch(problem.space.parameters, self._evaluate, config.reference_point, config.seed, matrix)
+        self.seconds = 0.0  # of all sessions
+        self.infeasible = 0  # designs of all sessions
         if folder is not None:
             self._restore(folder)
 
-    def run(self, budget: Budget, stop_at_stall: bool) -> FrontRun:
-        """Searches as long as the budget lasts, then writes what was found."""
+    def run(self, budget: SearchBudget, stop_at_stall: bool) -> FrontRun:
+        """Search until the budget is spent or the search stalls, then write the results."""
         resumed = self.search.evaluations
         few = self.problem.space.matrix(self.problem.space.sample(1, 0))
-        self.problem.evaluate_matrix(np.repeat(few, MANY_ARMS, axis=0))  # so many load all kernels that are used
-        ended = self._end(budget, stop_at_stall)
+        self.problem.evaluate_matrix(np.repeat(few, MANY_ARMS, axis=0))  # loads all kernels
+        ended = self._end_reason(budget, stop_at_stall)
         if not ended and self.folder is not None:
             discard_results(self.folder.path)
             self.config = self.folder.note_versions(self.config)
-        state = None  # after the last whole generation, as a Ctrl-C may fall into the midst of one
+        state = None  # after the last complete generation: Ctrl-C may interrupt one
         try:
             before, saved = self.seconds, time.monotonic()
             started = saved
-            while not (ended := self._end(budget, stop_at_stall)):
+            while not (ended := self._end_reason(budget, stop_at_stall)):
                 self.search.step()
                 now = time.monotonic()
                 self.seconds = before + now - started
@@ -200,15 +171,15 @@ class _Search:
                 self._save(state)
         return self._finish(ended, resumed)
 
-    def _end(self, budget: Budget, stop_at_stall: bool) -> str:
-        """Why the search ends; empty where it goes on."""
+    def _end_reason(self, budget: SearchBudget, stop_at_stall: bool) -> str:
+        """Return why the search ends; empty if it goes on."""
         if budget.is_spent(self.search.evaluations, self.seconds):
             return "budget"
         return "stall" if stop_at_stall and self.search.evaluations and self.search.stalled else ""
 
-    def _progress(self, budget: Budget) -> FrontProgress:
+    def _progress(self, budget: SearchBudget) -> SearchProgress:
         search = self.search
-        return FrontProgress(search.evaluations, self.seconds, search.hypervolume, len(search.matrix), budget)
+        return SearchProgress(search.evaluations, self.seconds, search.hypervolume, len(search.matrix), budget)
 
     def _save(self, state: Mapping[str, Any]) -> None:
         if self.folder is None:
@@ -226,72 +197,73 @@ class _Search:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
                 self.infeasible = int(state["infeasible"])
-        except Exception as fault:  # numpy, zipfile, zlib and tokenize each have their own
+        except Exception as fault:  # numpy, zipfile, zlib and tokenize raise different ones
             raise RunFolderError(
-                f"{path} is damaged ({fault}); delete it, and the search begins anew with the front in {folder.path}"
+                f"{path} is damaged ({fault}); delete it to start a new search from the front in {folder.path}"
             ) from fault
 
-    def _ranked(self, rows: Array) -> Array:
-        """(N, M) what the search compares designs by."""
-        ranks = self.problem.evaluate_matrix(rows).penalised
-        self.infeasible += int(np.any(ranks >= PENALTY, axis=1).sum())
-        return ranks
+    def _evaluate(self, matrix: Array) -> Array:
+        """Return the (N, M) objective values of designs; penalties for infeasible ones."""
+        values = self.problem.evaluate_matrix(matrix).penalised
+        self.infeasible += int(np.any(values >= PENALTY, axis=1).sum())
+        return values
 
     def _finish(self, ended: str, resumed: int) -> FrontRun:
-        kept = self.search.best(MOST_DESIGNS)
-        designs, values = self.problem.space.designs(self.search.matrix[kept]), self.search.values[kept]
-        broken = np.empty((len(designs), 0))
-        if self.problem.constraints:  # the search knows their ranks alone
-            outcomes = self.problem.evaluate_matrix(self.search.matrix[kept])
-            values, broken = outcomes.values, outcomes.violations
-        trials = [
-            FinishedTrial(
-                number, FRONT_SEARCH, design, tuple(values[number].tolist()), violations=tuple(broken[number].tolist())
-            )
-            for number, design in enumerate(designs)
-        ]
+        trials = self._front_trials()
         history = History(self.problem, trials, 0, self.config.reference_point)
-        searched = {
+        statistics = {
             "evaluations": self.search.evaluations,
             **({"infeasible": self.infeasible} if self.problem.constraints else {}),
             "seconds": round(self.seconds, 3),
             "ended_by": ended,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
-        found = self.search.values
+        values = self.search.values
         if self.folder is None:
-            summary = summarize_front(history, self.config, found, searched, None)
+            summary = summarize_front(history, self.config, values, statistics, None)
             return FrontRun(history, self.config, summary, None, resumed)
         path = self.folder.path
-        there = read_summary(path)
-        ended_before = None if there is None else there.get("search", {}).get("ended_by")
-        if there is None or not results_are_there(path, history) or ended_before != ended:
+        summary = read_summary(path)
+        ended_before = None if summary is None else summary.get("search", {}).get("ended_by")
+        if summary is None or not results_are_there(path, history) or ended_before != ended:
             self.folder.replace_trials(trials)
             verification = verify_front(history)
-            there = summarize_front(history, self.config, found, searched, verification)
-            write_results(self.folder, history, there, verification)
-        return FrontRun(history, self.config, there, path, resumed)
+            summary = summarize_front(history, self.config, values, statistics, verification)
+            write_results(self.folder, history, summary, verification)
+        return FrontRun(history, self.config, summary, path, resumed)
+
+    def _front_trials(self) -> list[FinishedTrial]:
+        """Return the best designs of the front as trials."""
+        kept = self.search.best(MOST_DESIGNS)
+        matrix, values = self.search.matrix[kept], self.search.values[kept]
+        violations = np.empty((len(matrix), 0))
+        if self.problem.constraints:  # the search knows penalised values only
+            outcomes = self.problem.evaluate_matrix(matrix)
+            values, violations = outcomes.values, outcomes.violations
+        return [
+            FinishedTrial(number, FRONT_SEARCH, design, tuple(row), violations=tuple(violations[number].tolist()))
+            for number, (design, row) in enumerate(
+                zip(self.problem.space.designs(matrix), values.tolist(), strict=True)
+            )
+        ]
 
 
 def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
-    """For a task that states none: from a few random designs."""
-    found = problem.evaluate(problem.space.sample(N_SAMPLE, seed))
-    return found_reference_point(found.values, found.violations)
+    """Return a reference point from a few random designs, for a task that states none."""
+    outcomes = problem.evaluate(problem.space.sample(N_SAMPLE, seed))
+    return found_reference_point(outcomes.values, outcomes.violations)
 
 
-def _trials_of(problem: Problem, folder: RunFolder) -> list[FinishedTrial]:
-    """That lie in the folder."""
-    return folder.open_trials(problem.space, len(problem.objectives), len(problem.constraints))
-
-
-def _rows(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:
-    """(N, P) their designs."""
+def _matrix(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:
+    """Return the (N, P) designs of trials."""
     return problem.space.matrix([trial.design for trial in trials]).reshape(-1, len(problem.space.parameters))
 
 
-def _beginning(problem: Problem, initial_designs: str | Path | Proposer | None) -> tuple[Array, dict[str, Any] | None]:
-    """(N, P) designs that are there already, and where they come from; none yet where a proposer is to give them."""
-    nothing = _rows(problem, ())
+def _initial_matrix(
+    problem: Problem, initial_designs: str | Path | Proposer | None
+) -> tuple[Array, dict[str, Any] | None]:
+    """Return the (N, P) designs of a run folder, and a record of their origin; none yet if a proposer gives them."""
+    nothing = _matrix(problem, ())
     if initial_designs is None:
         return nothing, None
     if not isinstance(initial_designs, (str, Path)):
@@ -303,12 +275,12 @@ def _beginning(problem: Problem, initial_designs: str | Path | Proposer | None) 
             f"{initial_designs} holds a run of another task or design space ({run.problem.task.name}, "
             f"{run.problem.space.name})"
         )
-    rows = _rows(problem, run)
-    return rows, {"run": str(initial_designs), "designs": len(rows), "sha256": sha256(rows.tobytes()).hexdigest()}
+    matrix = _matrix(problem, run)
+    return matrix, {"run": str(initial_designs), "designs": len(matrix), "sha256": sha256(matrix.tobytes()).hexdigest()}
 
 
-def _proposed(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Array:
-    """(N, P) a proposer's designs, from a study whose counted trials are all its own: kept and paid for as in any."""
+def _proposed_matrix(problem: Problem, proposer: Proposer, seed: int, out: Path | None) -> Array:
+    """Return (N, P) designs of a proposer, from a study whose counted trials are all its own."""
     folder = None if out is None else out / PROPOSALS
     study = optimize(problem, proposer=proposer, n_step=1, n_total=N_PROPOSED, seed=seed, out=folder)
-    return _rows(problem, study.history)
+    return _matrix(problem, study.history)

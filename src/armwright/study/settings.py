@@ -33,7 +33,9 @@ def study_method(
         SettingsError: an argument is out of range, or two of them exclude each other.
     """
     if len(initial_designs) > n_init:
-        raise SettingsError(f"{len(initial_designs)} initial designs do not fit into the n_init = {n_init} first trials")
+        raise SettingsError(
+            f"{len(initial_designs)} initial designs do not fit into the n_init = {n_init} first trials"
+        )
     if in_flight is not None and proposer is not None and not proposer.overlaps:
         raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
     return Method(

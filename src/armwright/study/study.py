@@ -21,7 +21,6 @@ from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, REFINE, History
 from armwright.runs.results import discard_results, read_summary, results_are_there, summarize, write_results
-from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
 from armwright.search.refine import Refinement, refine_one
 from armwright.search.samplers import BlackBox, SamplerFactory
