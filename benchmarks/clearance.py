@@ -12,7 +12,7 @@ from collections.abc import Callable
 from one_core import on_one_core, print_rates, rates_in_turn, seconds
 
 from armwright.kinematics.clearance import clearances
-from armwright.problem.evaluation import evaluate_arrays
+from armwright.problem.evaluation import Scene, evaluate_arrays
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
 from armwright.spaces.batch_builder import stack_designs
@@ -33,7 +33,7 @@ SPACE = paper_space(6)
 def main() -> None:
     matrix = SPACE.matrix(SPACE.sample(N, seed=0))
     arms = stack_designs(SPACE, matrix)
-    q = evaluate_arrays(arms, TASK.target_positions).q
+    q = evaluate_arrays(arms, Scene(TASK.target_positions, TASK.payloads, TASK.target_arrays)).q
     paper = Problem(TASK, SPACE)
     with_clearance = Problem(TASK, SPACE, objectives=named_objectives(["position_error", "torque", "collision"]))
     work: dict[str, Callable[[], object]] = {

@@ -13,7 +13,7 @@ import pytest
 from armwright.kinematics import ik as solve
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.ik import solve_postures, update_once
-from armwright.problem.evaluation import evaluate, evaluate_arrays
+from armwright.problem.evaluation import Evaluation, Scene, evaluate, evaluate_arrays
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
@@ -357,13 +357,17 @@ def test_stacked_designs_and_arms_have_equal_tools() -> None:
 
 def test_restarts_never_increase_the_error() -> None:
     arms, points = stack_arms(general_arms(100, 5, 3)), np.random.default_rng(3).uniform(-0.6, 0.6, (4, 3))
-    least = evaluate_arrays(arms, points).position_error
+
+    def solved(restarts: int) -> Evaluation:
+        return evaluate_arrays(arms, Scene(points, np.zeros(4), position_targets(4, restarts)))
+
+    least = solved(0).position_error
     for restarts in (1, 3):
-        more = evaluate_arrays(arms, points, target_arrays=position_targets(4, restarts))
+        more = solved(restarts)
         assert np.all(more.position_error <= least)
         assert (more.position_error < least - 1e-3).any()
         least = more.position_error
-        assert np.array_equal(more.q, evaluate_arrays(arms, points, target_arrays=position_targets(4, restarts)).q)
+        assert np.array_equal(more.q, solved(restarts).q)
     assert np.all(more.q[np.broadcast_to((arms.motion == FIXED)[:, None], more.q.shape)] == 0.0)
 
 

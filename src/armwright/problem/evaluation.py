@@ -24,6 +24,38 @@ from armwright.tasks.workspace import Region, sample_regions
 
 
 @dataclass(frozen=True)
+class Scene:
+    """The targets of a task in one case, and their surroundings.
+
+    Attributes:
+        targets: (T, 3) positions [m].
+        payload: (T,) carried by the tip at each target [kg].
+        target_arrays: how the targets are to be reached.
+        obstacles: what clearances are measured from; the inverse kinematics ignores them.
+        moves: lines between targets that the tip follows.
+        workspace: boxes to cover.
+    """
+
+    targets: Array
+    payload: Array
+    target_arrays: TargetArrays
+    obstacles: tuple[Obstacle, ...] = ()
+    moves: Moves = NO_MOVES
+    workspace: tuple[Region, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that the arrays are finite and belong to the same targets."""
+        targets = self.targets
+        if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
+            raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
+        object.__setattr__(self, "payload", _payloads(self.payload, len(targets)))
+        if len(self.target_arrays) != len(targets):
+            raise TaskError(
+                f"target_arrays are of {len(self.target_arrays)} targets, not of the {len(targets)} that are given"
+            )
+
+
+@dataclass(frozen=True)
 class Evaluation:
     """N arms of up to J joints at T targets; 0 for joints that an arm does not have.
 
@@ -180,69 +212,56 @@ def evaluate(
         >>> aw.evaluate(arms, [[0.3, 0.0, 0.2], [0.0, 0.3, 0.2]]).position_error.shape
         (3, 2)
     """
-    return evaluate_arrays(stack_arms(arms), targets, device, None, payload, obstacles, target_arrays, moves, workspace)
+    positions = np.asarray(targets, dtype=np.float64)
+    if target_arrays is None:
+        target_arrays = position_targets(len(np.atleast_1d(positions)))
+    scene = Scene(positions, np.asarray(payload), target_arrays, tuple(obstacles), moves, tuple(workspace))
+    return evaluate_arrays(stack_arms(arms), scene, device)
 
 
 def evaluate_arrays(
-    arrays: ArmArrays,
-    targets: ArrayLike,
-    device: Device = "cpu",
-    start: ArrayLike | None = None,
-    payload: ArrayLike = 0.0,
-    obstacles: Sequence[Obstacle] = (),
-    target_arrays: TargetArrays | None = None,
-    moves: Moves = NO_MOVES,
-    workspace: Sequence[Region] = (),
+    arrays: ArmArrays, scene: Scene, device: Device = "cpu", initial_q: ArrayLike | None = None
 ) -> Evaluation:
-    """Evaluate stacked arms at every target, in their precision.
+    """Evaluate stacked arms at every target of a scene, in their precision.
 
-    start: values [rad] or [m] that broadcast to (N, T, D); None for the straight start. Restarts begin elsewhere.
+    Args:
+        arrays: N arms.
+        scene: T targets.
+        device: where the arms are evaluated.
+        initial_q: initial joint values [rad] or [m] that broadcast to (N, T, D); None for the straight posture. The
+            restarts of the targets begin elsewhere.
     """
-    targets = np.asarray(targets, dtype=np.float64)
-    if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
-        raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
-    loads = _payloads(payload, len(targets))
-    target_arrays = position_targets(len(targets)) if target_arrays is None else target_arrays
-    if len(target_arrays) != len(targets):
-        raise TaskError(f"target_arrays are of {len(target_arrays)} targets, not of the {len(targets)} that are given")
-    postures = _postures(arrays, targets, loads, target_arrays, device, start)
-    for other in _restarts(arrays, target_arrays.restarts):
-        again = _postures(arrays, targets, loads, target_arrays, device, other)
-        postures = _nearer(postures, again, targets, target_arrays)
+    targets = scene.targets
+
+    def solve(initial: ArrayLike | None) -> Postures:
+        return solve_postures(
+            arrays,
+            targets,
+            initial_q=initial,
+            payload=scene.payload,
+            target_arrays=scene.target_arrays,
+            precision=arrays.precision,
+            device=device,
+        )
+
+    postures = solve(initial_q)
+    for other in _restarts(arrays, scene.target_arrays.restarts):
+        postures = _nearer(postures, solve(other), targets, scene.target_arrays)
     reached = postures.reached.astype(np.float64)
     return Evaluation(
         arms=arrays,
         targets=targets,
-        payload=loads,
+        payload=scene.payload,
         q=postures.q.astype(np.float64),
         reached=reached,
         position_error=np.linalg.norm(reached - targets, axis=-1),
         angle_error=postures.angle.astype(np.float64),
         joint_torques=postures.torque.astype(np.float64),
-        target_arrays=target_arrays,
-        obstacles=tuple(obstacles),
+        target_arrays=scene.target_arrays,
+        obstacles=scene.obstacles,
         device=device,
-        moves=moves,
-        workspace=tuple(workspace),
-    )
-
-
-def _postures(
-    arrays: ArmArrays,
-    targets: Array,
-    loads: Array,
-    target_arrays: TargetArrays,
-    device: Device,
-    start: ArrayLike | None,
-) -> Postures:
-    return solve_postures(
-        arrays,
-        targets,
-        initial_q=start,
-        payload=loads,
-        target_arrays=target_arrays,
-        precision=arrays.precision,
-        device=device,
+        moves=scene.moves,
+        workspace=scene.workspace,
     )
 
 

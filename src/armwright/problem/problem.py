@@ -11,7 +11,7 @@ from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, Quantity, read_constraints
-from armwright.problem.evaluation import Evaluation, evaluate_arrays
+from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.objectives import (
     OF_ORIENTATION,
@@ -201,10 +201,13 @@ class Problem:
 
     def physics_of_arms(self, arms: ArmArrays, case: int = 0) -> Evaluation:
         """Return the kinematics and statics of arms at all targets, in one case of the task."""
+        return evaluate_arrays(arms, self.scene(case), self.device)
+
+    def scene(self, case: int = 0) -> Scene:
+        """Return the targets and surroundings of one case of the task."""
         task = self.task
         points, payloads = task.cases[case]
-        known = (payloads, task.obstacles, task.target_arrays, task.straight_moves, task.workspace)
-        return evaluate_arrays(arms, points, self.device, None, *known)
+        return Scene(points, payloads, task.target_arrays, task.obstacles, task.straight_moves, task.workspace)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.

@@ -83,7 +83,5 @@ def verify(
 def _outcomes(problem: Problem, rows: Array, start: Array | None = None) -> Outcomes:
     """Evaluate designs in float64; start: (T, D) angles [rad], None for the straight start."""
     arrays = stack_designs(problem.space, rows, "float64")
-    task = problem.task
-    known = (task.obstacles, task.target_arrays, task.straight_moves, task.workspace)
-    found = [evaluate_arrays(arrays, points, "cpu", start, loads, *known) for points, loads in task.cases]
-    return worst_case([problem.outcomes(case) for case in found])
+    cases = range(len(problem.task.cases))
+    return worst_case([problem.outcomes(evaluate_arrays(arrays, problem.scene(case), "cpu", start)) for case in cases])
