@@ -1,7 +1,7 @@
 """Every error that armwright raises on purpose.
 
     ArmwrightError
-    ├── UsageError              what was asked cannot be done as asked      (exit code 2)
+    ├── UsageError              a request that cannot be fulfilled          (exit code 2)
     │   ├── TaskError           a task's name, file or targets
     │   ├── SpaceError          a design space's file or ranges
     │   ├── DesignError         parameter values that are not in their design space
@@ -9,18 +9,18 @@
     │   ├── SettingsError       the settings of a run
     │   ├── RunConflictError    the run folder holds a run with other settings
     │   └── MissingExtraError   an optional dependency that is not installed
-    ├── AnswerPendingError      a question waits for people (--proposer manual:DIR --once)   (exit code 0)
-    ├── StoppedError            a study ended because its watcher asked for it      (exit code 130, as after Ctrl-C)
-    └── FailureError            something broke on the way                  (exit code 1)
+    ├── AnswerPendingError      a question waits for an answer (--proposer manual:DIR --once)   (exit code 0)
+    ├── StoppedError            a study ended on request                    (exit code 130, as after Ctrl-C)
+    └── FailureError            something failed during the work            (exit code 1)
         ├── RunFolderError      a run folder that cannot be written, or whose content is damaged
         ├── ModelError          a language model that cannot be used
-        ├── ReplayError         a recorded run that cannot be played again, or not to the letter
+        ├── ReplayError         a recorded run that cannot be replayed exactly
         ├── ProposalError       a proposer gave no design; the trial becomes a black-box one
         ├── EvaluatorError      a custom evaluator failed, or the workers that ran it were lost
         └── ClusterError        a Dask cluster does not answer, was lost, or has other versions
 
-A message is one line in the user's words: it names the value with its unit, what is allowed, and the
-way out. What it repeats of files and answers cannot break the line, or speak to a terminal.
+A message is one line. It names the value with its unit, what is allowed, and the way out. Text quoted from files and
+answers is escaped, so that it cannot break the line or control a terminal.
 """
 
 from collections.abc import Iterable, Mapping
@@ -41,7 +41,7 @@ class ArmwrightError(Exception):
 
 
 class UsageError(ArmwrightError):
-    """What was asked cannot be done as asked."""
+    """A request that cannot be fulfilled."""
 
     exit_code = 2
 
@@ -75,7 +75,7 @@ class MissingExtraError(UsageError):
 
 
 class FailureError(ArmwrightError):
-    """Something broke on the way."""
+    """Something failed during the work."""
 
 
 class RunFolderError(FailureError):
@@ -85,7 +85,8 @@ class RunFolderError(FailureError):
 class ModelError(FailureError):
     """A language model that cannot be used.
 
-    final: the kind of fault, where asking again in this session is of no use (a wrong key, a spent quota).
+    Attributes:
+        final: The kind of fault if a retry in this session is useless (a wrong key, a spent quota); else None.
     """
 
     def __init__(self, message: str, *, final: str | None = None) -> None:
@@ -94,15 +95,16 @@ class ModelError(FailureError):
 
 
 class ReplayError(FailureError):
-    """A recorded run that cannot be played again, or not to the letter."""
+    """A recorded run that cannot be replayed exactly."""
 
 
 class ProposalError(FailureError):
     """A proposer gave no design; the trial becomes a black-box one.
 
-    kind: one word for statistics: timeout, connection, refused, …
-    final: whether asking again in this session is of no use (a wrong key, a spent quota).
-    known: how many finished trials the question was made from, where fewer than there are now.
+    Attributes:
+        kind: One word for statistics: timeout, connection, refused, …
+        final: True if a retry in this session is useless (a wrong key, a spent quota).
+        known: Number of finished trials that the proposal was based on, if fewer than now.
     """
 
     known: int | None = None
@@ -116,7 +118,7 @@ class ProposalError(FailureError):
 class EvaluatorError(FailureError):
     """A custom evaluator failed, or the workers that ran it were lost.
 
-    Where its code raised, the traceback is a note of the exception (`__notes__`).
+    If its code raised, the traceback is a note of the exception (`__notes__`).
     """
 
 
@@ -125,10 +127,12 @@ class ClusterError(FailureError):
 
 
 class AnswerPendingError(ArmwrightError):
-    """A question lies ready for people to answer; the run goes on from there.
+    """A question that waits for an answer; the run continues from there.
 
-    question, answer: the files' paths.
-    refusal: why an answer that was there was not taken; empty where there was none.
+    Attributes:
+        question: The path of the question file.
+        answer: The path where the answer is expected.
+        refusal: Why the previous answer was refused; empty if there was none.
     """
 
     exit_code = 0
@@ -141,16 +145,16 @@ class AnswerPendingError(ArmwrightError):
 
 
 class StoppedError(ArmwrightError):
-    """A study ended because whoever watches it asked for that."""
+    """A study ended on request."""
 
     exit_code = 130
 
     def __init__(self, folder: Path) -> None:
-        super().__init__(f"stopped as asked; every finished trial is in {folder}/, and the same command goes on")
+        super().__init__(f"stopped as asked; every finished trial is in {folder}/, and the same command resumes")
 
 
 def _line(text: str) -> str:
-    """A text on one line: characters that are not seen as their escapes, the middle of a long one left out."""
+    """Return a text on one line, with invisible characters escaped and the middle of a long text left out."""
     text = _cut(text)
     if text.isprintable():
         return text

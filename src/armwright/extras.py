@@ -1,4 +1,4 @@
-"""What is installed only where it is asked for, such as with `pip install "armwright[live]"`."""
+"""Optional dependencies (extras), such as `pip install "armwright[live]"`."""
 
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 from armwright.exceptions import MissingExtraError
 
-# The packages that an extra brings: as they are imported, and as they are installed.
+# Packages of each extra: import name and distribution name.
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     "arms": {"robot_descriptions": "robot_descriptions", "xacrodoc": "xacrodoc"},
     "distributed": {"cryptography": "cryptography", "distributed": "distributed"},
@@ -22,20 +22,20 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
 
 
 def is_installed(package: str) -> bool:
-    """Whether a package can be imported; it is not imported for that."""
+    """Return True if a package can be imported, without importing it."""
     try:
         return find_spec(package) is not None
-    except ModuleNotFoundError:  # what it lies in is not there
+    except ModuleNotFoundError:  # its parent package is missing
         return False
 
 
 def missing_packages(extra: str) -> list[str]:
-    """The packages of an extra that are not installed."""
+    """Return the packages of an extra that are not installed."""
     return [package for package in EXTRAS[extra] if not is_installed(package)]
 
 
 def check_extra(extra: str, subject: str) -> None:
-    """MissingExtraError where a package of the extra is not installed; `subject` needs them all."""
+    """Raise MissingExtraError if a package of the extra is not installed; `subject` needs them all."""
     missing = missing_packages(extra)
     if missing:
         raise _missing(extra, subject, missing)
@@ -43,18 +43,20 @@ def check_extra(extra: str, subject: str) -> None:
 
 @contextmanager
 def requires_extra(extra: str, subject: str) -> Generator[None]:
-    """Around imports of what `subject` needs; MissingExtraError where one fails."""
+    """Convert failed imports inside the context to MissingExtraError; `subject` needs them."""
     try:
         yield
     except ModuleNotFoundError as fault:
         raise _missing(extra, subject, missing_packages(extra) or [str(fault.name)]) from fault
     except ImportError as fault:  # another version
-        words = " ".join(str(fault).split())
-        raise MissingExtraError(f"{subject} needs another {fault.name} ({words}): {install_command(extra)}") from fault
+        reason = " ".join(str(fault).split())
+        raise MissingExtraError(
+            f"{subject} needs another version of {fault.name} ({reason}): {install_command(extra)}"
+        ) from fault
 
 
 def install_command(extra: str) -> str:
-    """What installs an extra."""
+    """Return the command that installs an extra."""
     return f'pip install "armwright[{extra}]"'
 
 

@@ -1,4 +1,4 @@
-"""Atomic replacement of files, and text and names that any file system accepts."""
+"""Atomic replacement of files, CSV, and names that any file system accepts."""
 
 import csv
 import io
@@ -26,7 +26,7 @@ def replace_folder(target: Path, part: Path | None = None) -> None:
     if old.exists():
         shutil.rmtree(old)
     if target.exists():
-        target.rename(old)  # in one step, while its files go one by one
+        target.rename(old)  # atomic, unlike the removal of its files
     if part is not None:
         part.rename(target)
     if old.exists():
@@ -46,7 +46,7 @@ def check_name(name: str) -> str:
 
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
-    """Records of the same keys as CSV, with a first line of these; empty for none."""
+    """Return records with the same keys as CSV with a header; empty if there are none."""
     out = io.StringIO()
     writer: csv.DictWriter[str] | None = None
     for row in rows:

@@ -17,9 +17,9 @@ PENALTY = 1e100  # of infeasible designs; larger than any objective
 
 
 def front_mask(values: Array) -> NDArray[np.bool_]:
-    """(N,) True where no other row of `values` (N, M) is better or equal in all and better in one.
+    """Return (N,) True for non-dominated rows of `values` (N, M).
 
-    Of equal rows the first is kept. Infinite rows, as of infeasible designs (`masked_objectives`), are not on it.
+    Of equal rows only the first is kept. Infinite rows, as of infeasible designs (`masked_objectives`), are excluded.
 
     Examples:
         >>> front_mask([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0]])
@@ -32,15 +32,15 @@ def front_mask(values: Array) -> NDArray[np.bool_]:
 
 
 def front_indices(values: Array) -> list[int]:
-    """The rows on the front, by rising first objective."""
-    numbers = np.flatnonzero(front_mask(values))
-    return numbers[np.argsort(values[numbers, 0], kind="stable")].tolist()
+    """Return the indices of the non-dominated rows, by increasing first objective."""
+    indices = np.flatnonzero(front_mask(values))
+    return indices[np.argsort(values[indices, 0], kind="stable")].tolist()
 
 
 def hypervolume(values: Array, reference_point: Sequence[float]) -> float:
-    """The area (volume) dominated by `values` (N, M) and bounded by the reference point.
+    """Return the volume dominated by `values` (N, M) and bounded by the reference point (M,).
 
-    Points that are not below the reference point in all objectives count nothing, nor do dominated ones.
+    Points that are not below the reference point in all objectives do not contribute.
 
     Examples:
         >>> hypervolume([[1.0, 2.0], [2.0, 1.0]], (3.0, 3.0))
@@ -56,7 +56,7 @@ def hypervolume(values: Array, reference_point: Sequence[float]) -> float:
 
 
 class FrontTracker:
-    """The front of a growing set of points, one point after the other, and its hypervolume."""
+    """The front and hypervolume of a growing set of points."""
 
     def __init__(self, n_objectives: int, reference_point: Sequence[float] | None) -> None:
         self._front = np.empty((0, n_objectives))
@@ -70,17 +70,17 @@ class FrontTracker:
 
     @property
     def hypervolume(self) -> float | None:
-        """Bounded by the reference point; None as long as there is none."""
+        """Volume bounded by the reference point; None without one."""
         if self._hypervolume is None and self._reference_point is not None:
             self._hypervolume = hypervolume(self._front, self._reference_point)
         return self._hypervolume
 
     def set_reference_point(self, reference_point: Sequence[float]) -> None:
-        """Bounds the hypervolume from now on."""
+        """Set the point that bounds the hypervolume."""
         self._reference_point, self._hypervolume = reference_point, None
 
     def add(self, point: Sequence[float]) -> None:
-        """One point more; an infinite one, as of an infeasible design, changes nothing."""
+        """Add a point; an infinite one, as of an infeasible design, changes nothing."""
         row = np.asarray(point, dtype=np.float64)
         if np.all(row < np.inf) and not np.any(np.all(self._front <= row, axis=1)):
             self._front = np.vstack([self._front[~np.all(row <= self._front, axis=1)], row])
@@ -88,7 +88,7 @@ class FrontTracker:
 
 
 def hypervolume_history(values: Array, reference_point: Sequence[float]) -> Array:
-    """(N,) the hypervolume of the first 1, 2, …, N rows of `values` (N, M)."""
+    """Return (N,) the hypervolumes of the first 1, 2, …, N rows of `values` (N, M)."""
     tracker = FrontTracker(len(reference_point), reference_point)
     history = np.zeros(len(values))
     for i, row in enumerate(values):
@@ -98,39 +98,42 @@ def hypervolume_history(values: Array, reference_point: Sequence[float]) -> Arra
 
 
 def default_reference_point(values: Array) -> tuple[float, ...]:
-    """1.1 times the worst non-dominated values, for a problem that states no reference point."""
+    """Return 1.1 times the worst non-dominated values, for a problem without a reference point."""
     worst = 1.1 * values[front_mask(values)].max(axis=0)
-    # A value of 0 would leave no area at all.
+    # A value of 0 would leave no volume at all.
     return tuple(np.maximum(worst, 1e-9).tolist())
 
 
-def knee_index(values: Array, reference_point: Sequence[float]) -> int | None:
-    """The row on the front that is farthest below the straight line (plane) between its ends within the reference box.
+def _bounded_front(values: Array, reference_point: Sequence[float]) -> list[int]:
+    """Return the indices of the front's points that are below the reference point in all objectives."""
+    return [i for i in front_indices(values) if np.all(values[i] < np.asarray(reference_point))]
 
-    None where fewer than three designs of the front lie in the box.
+
+def knee_index(values: Array, reference_point: Sequence[float]) -> int | None:
+    """Return the index of the knee: the point of the front farthest below the plane through its ends.
+
+    Only points within the reference point count; None if fewer than three do.
 
     Examples:
         >>> knee_index(np.array([[0.0, 4.0], [1.0, 1.0], [4.0, 0.0]]), (5.0, 5.0))
         1
     """
-    numbers = [n for n in front_indices(values) if np.all(values[n] < np.asarray(reference_point))]
-    if len(numbers) < 3:
+    indices = _bounded_front(values, reference_point)
+    if len(indices) < 3:
         return None
-    front = values[numbers]
+    front = values[indices]
     span = np.ptp(front, axis=0)
     scaled = (front - front.min(axis=0)) / np.where(span > 0.0, span, 1.0)
-    return numbers[int(np.argmin(scaled.sum(axis=1)))]
+    return indices[int(np.argmin(scaled.sum(axis=1)))]
 
 
 def paper_solution_indices(values: Array, reference_point: Sequence[float]) -> tuple[int, int] | None:
-    """Solutions 1 and 2 of the paper's figures: least first, least last objective, within the reference box.
+    """Return the indices of solutions 1 and 2 of the paper's figures: least first and least last objective.
 
-    (Of the paper's objectives: least position error, least torque.)
-
-    None where the front lies wholly outside the box.
+    Only points of the front within the reference point count; None if there are none.
     """
-    numbers = [n for n in front_indices(values) if np.all(values[n] < np.asarray(reference_point))]
-    return (numbers[0], min(numbers, key=lambda n: values[n, -1])) if numbers else None
+    indices = _bounded_front(values, reference_point)
+    return (indices[0], min(indices, key=lambda i: values[i, -1])) if indices else None
 
 
 def feasible_mask(violations: Array) -> NDArray[np.bool_]:
@@ -150,7 +153,7 @@ def masked_objectives(values: Array, violations: Array) -> Array:
 
 
 def penalised_objectives(values: Array, violations: Array) -> Array:
-    """Return (N, M) numbers whose plain domination is constrained domination by Deb's rules.
+    """Return (N, M) indices whose plain domination is constrained domination by Deb's rules.
 
     Feasible designs keep their values. Infeasible ones are worse than all of these, in the order of their violation.
     """

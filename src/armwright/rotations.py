@@ -8,7 +8,7 @@ from armwright.arrays import Array
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
-    """(3, 3) rotation about the fixed x, then y, then z [rad], as in URDF."""
+    """Return the (3, 3) rotation about the fixed x, then y, then z axis [rad], as in URDF."""
     (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
     return np.array(
         [
@@ -20,7 +20,7 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def rotation_to_axis(axis: Sequence[float] | Array) -> Array:
-    """(3, 3) rotation whose z points along `axis` (3,), of any length; its x and y are arbitrary."""
+    """Return a (3, 3) rotation whose z column points along `axis` (3,), of any length; x and y are arbitrary."""
     z = np.array(axis) / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)

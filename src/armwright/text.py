@@ -1,4 +1,4 @@
-"""Text from outside, made safe for one line."""
+"""Untrusted text made safe to show."""
 
 import re
 import unicodedata
@@ -21,21 +21,19 @@ def _visible(text: str) -> str:
 
 
 _THOUGHTS = re.compile(r"<think(?:ing)?>.*?(?:</think(?:ing)?>|\Z)", re.DOTALL | re.IGNORECASE)
-
-
 _THOUGHTS_END = re.compile(r"</think(?:ing)?>", re.IGNORECASE)
 
 
 def without_thoughts(text: str) -> str:
-    """`text` without a model's <think> blocks, also one of which only the end, or only the beginning, is there."""
+    """Return `text` without the <think> blocks of a model, including blocks that lack their start or end tag."""
     return _THOUGHTS_END.split(_THOUGHTS.sub("", text))[-1]
 
 
 def end_of(text: str, most: int) -> str:
-    """The last `most` characters of `text`, which is where an answer stands; visible ones and line ends alone."""
+    """Return the last `most` characters of `text`, where the answer is, without invisible characters."""
     return "\n".join(map(_visible, text[-most:].splitlines()))
 
 
 def fence(text: str) -> str:
-    """A line of dashes that is longer than any in `text`."""
+    """Return a line of dashes that is longer than any in `text`."""
     return "-" * max([9, *map(len, re.findall(r"-+", text))]) + "-"

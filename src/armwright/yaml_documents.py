@@ -1,4 +1,4 @@
-"""YAML documents that people write: read safely, checked against a schema, refused in one line."""
+"""Untrusted YAML documents: read safely, checked against a schema, refused with a one-line error."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,28 +12,28 @@ from armwright.exceptions import did_you_mean
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
-LARGEST_DOCUMENT = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has some 0.3 MB
-RENAMED = {"jitter": "target_noise"}  # keys of files
-MOST_NODES = 400_000  # values in a document; of 10,000 targets that say all that a target can there are 240,000
+LARGEST_DOCUMENT = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has about 0.3 MB
+RENAMED = {"jitter": "target_noise"}  # former keys of files
+MOST_NODES = 400_000  # values in a document; 10,000 targets with all their keys have 240,000
 
 
 def read_document(path: Path, schema: type[Schema], error: type[Exception]) -> Schema:
-    """The content of a YAML file as a value of `schema`; `error` in one line where it is not one."""
+    """Read a YAML file as a value of `schema`; raise `error` with a one-line message if it is not one."""
     try:
         with path.open("rb") as file:
-            data = file.read(LARGEST_DOCUMENT + 1)  # not its size, which a device does not have
+            data = file.read(LARGEST_DOCUMENT + 1)  # not stat(): a device has no size
         text = data.decode("utf-8")
     except UnicodeDecodeError as fault:
         raise error(f"{path} is not a text file in UTF-8") from fault
-    except (OSError, ValueError) as fault:  # the latter of a name with a NUL
+    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         raise error(f"cannot read {path}: {getattr(fault, 'strerror', None) or fault}") from fault
     if len(data) > LARGEST_DOCUMENT:
-        raise error(f"{path} is larger than {LARGEST_DOCUMENT // 2**20} MiB; that is not a file for this purpose")
+        raise error(f"{path}: expected at most {LARGEST_DOCUMENT // 2**20} MiB")
     return parse_document(text, schema, error, str(path))
 
 
 def parse_document(text: str, schema: type[Schema], error: type[Exception], where: str) -> Schema:
-    """The YAML `text` as a value of `schema`; `where` names it in messages."""
+    """Parse YAML text as a value of `schema`; `where` names it in messages."""
     try:
         data = yaml.load(text, Loader=_DocumentLoader)
     except (yaml.YAMLError, RecursionError, ValueError) as fault:
@@ -44,7 +44,7 @@ def parse_document(text: str, schema: type[Schema], error: type[Exception], wher
 
 
 def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Exception], where: str) -> Schema:
-    """`data` as a value of `schema`; `where` names it in messages."""
+    """Validate `data` as a value of `schema`; `where` names it in messages."""
     for key in data:
         if key not in schema.model_fields:
             allowed = ", ".join(schema.model_fields)
@@ -55,22 +55,22 @@ def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Excep
     except ValidationError as fault:
         first = fault.errors(include_url=False, include_context=False)[0]
         at = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
-        words = first["msg"].removeprefix("Value error, ")
+        message = first["msg"].removeprefix("Value error, ")
         got = "" if first["type"] in ("missing", "value_error") else f" (got {_shorten(first['input'])})"
-        raise error(f"{where}: {at + ': ' if at else ''}{words}{got}") from fault
+        raise error(f"{where}: {at + ': ' if at else ''}{message}{got}") from fault
 
 
-# libyaml, where PyYAML has it, reads five times as fast.
+# libyaml, if PyYAML was built with it, is five times as fast.
 _Loader: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
 
 class _DocumentLoader(_Loader):
-    """Safe YAML without what no document needs, and by which a small file fills the memory, or does not end.
+    """Safe YAML without features that let a small file fill the memory or take hours.
 
-    Aliases; tags (PyYAML fails at a `!!int` that is none); numbers in base 60, of which a long one takes hours.
+    Refused are aliases, tags (PyYAML fails at an invalid `!!int`) and numbers in base 60 (quadratic time).
     """
 
-    # libyaml composes without asking anybody.
+    # libyaml composes in C, without calling compose_node.
     get_single_node = Composer.get_single_node
     compose_document = Composer.compose_document
     compose_scalar_node = Composer.compose_scalar_node
@@ -85,24 +85,24 @@ class _DocumentLoader(_Loader):
     def compose_node(self, parent: Any, index: Any) -> Any:
         self._nodes += 1
         if self._nodes > MOST_NODES:
-            raise yaml.YAMLError(f"more than {MOST_NODES:,} values; that is not a file for this purpose")
+            raise yaml.YAMLError(f"expected at most {MOST_NODES:,} values")
         if self.check_event(yaml.AliasEvent):
             raise yaml.YAMLError("anchors and aliases (&, *) are not allowed")
         tag = getattr(self.peek_event(), "tag", None)
         if tag is not None:
-            raise yaml.YAMLError(f"tags ({tag}) are not allowed; quote a text that begins with !")
+            raise yaml.YAMLError(f"tags ({tag}) are not allowed; quote text that begins with !")
         return Composer.compose_node(cast("Any", self), parent, index)
 
     def construct_scalar(self, node: Any) -> Any:
         if node.tag in _NUMBER_TAGS and ":" in node.value:
-            raise yaml.YAMLError(f"{node.value[:20]} is a number in base 60; quote it where it is a text")
+            raise yaml.YAMLError(f"{node.value[:20]} is a number in base 60; quote it if it is text")
         return super().construct_scalar(node)  # pyright: ignore[reportUnknownVariableType]
 
     def construct_mapping(self, node: Any, deep: bool = False) -> Any:
         seen: set[str] = set()
         for key in _scalar_keys(node):
             if key in seen:
-                raise yaml.YAMLError(f'the key "{key}" stands there twice')
+                raise yaml.YAMLError(f'duplicate key "{key}"')
             seen.add(key)
         return super().construct_mapping(node, deep=deep)  # pyright: ignore[reportUnknownVariableType]
 
@@ -127,6 +127,6 @@ def _yaml_fault(fault: Exception) -> str:
 def _shorten(value: object) -> str:
     try:
         text = str(value).replace("\n", " ")
-    except ValueError:  # of more than 4300 digits
+    except ValueError:  # an integer of more than 4300 digits
         text = "a huge number"
     return text if len(text) <= 80 else text[:77] + "..."

@@ -213,7 +213,7 @@ REFUSED = {
         ANSWER.replace("name: cart-arm", r'name: "arm\u202Etxt"'),
         r"control characters are not allowed: 'arm\u202etxt'",
     ),
-    "key twice": (ANSWER.replace("payload: 0.5", "payload: 0.5\npayload: 5"), 'the key "payload" stands there twice'),
+    "key twice": (ANSWER.replace("payload: 0.5", "payload: 0.5\npayload: 5"), 'duplicate key "payload"'),
     "two documents": (ANSWER.replace("payload: 0.5", "%YAML 1.2"), "the task is not valid YAML"),
 }  # fmt: skip
 

@@ -85,6 +85,6 @@ def test_another_version_is_named_as_one() -> None:
     with pytest.raises(MissingExtraError) as fault, requires_extra("live", "the page"):
         from json import no_such_name  # type: ignore[attr-defined] # noqa: F401
     words = str(fault.value)
-    assert words.startswith("the page needs another json (cannot import name 'no_such_name'")
+    assert words.startswith("the page needs another version of json (cannot import name 'no_such_name'")
     assert words.endswith(': pip install "armwright[live]"')
     assert "\n" not in words

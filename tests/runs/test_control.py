@@ -271,7 +271,7 @@ def test_a_cell_that_is_stopped_has_failed_in_words(chat_server: ChatServer, tmp
     chat_server.answer = answer
     stopped = run_cell(cell)
     assert stopped.fault == (
-        f"stopped as asked; every finished trial is in {cell.folder}/, and the same command goes on"
+        f"stopped as asked; every finished trial is in {cell.folder}/, and the same command resumes"
     )
     assert run_cell(cell).fault == ""
 

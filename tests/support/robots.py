@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.robot.arm import Arm, Joint, Link
 from armwright.robot.urdf_writer import to_urdf
-from armwright.robot.urdf_xml import rotation
+from armwright.robot.urdf_xml import rotation_about
 from tests.support.arms import _general_joint, _general_link, _vector
 
 
@@ -54,7 +54,7 @@ def with_frames_anyhow(arm: Arm, seed: int, off: float = 0.0) -> str:
         if axis is not None:
             direction = np.array([float(value) for value in axis.get("xyz").split()])  # type: ignore[union-attr]
             if joint.get("type") == "revolute":
-                zero = rotation(direction, float(rng.uniform(-off, off)))
+                zero = rotation_about(direction, float(rng.uniform(-off, off)))
             if rng.random() < 0.5:
                 direction = -direction
                 limit = joint.find("limit")

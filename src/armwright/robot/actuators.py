@@ -1,6 +1,6 @@
-"""Real actuators with the data of their makers and its source; fields without a source are empty.
+"""Real actuators from the data sheets of their makers, in actuators.csv.
 
-The data is in actuators.csv. A space file names actuators of the catalogue, or describes others.
+A space file names actuators of the catalogue, or describes others. Values without a source are empty.
 """
 
 import csv
@@ -24,21 +24,21 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     Masses in kg, torques in N m, speed in rad/s without load, size in m, price in USD.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,39}$")  # for space files and tables
-    maker: str = Field(default="", max_length=100)  # who sells it
-    kind: str = Field(default="", max_length=40)  # what it is: a servo, a gear motor
-    voltage: float | None = Field(default=None, gt=0.0)  # that the numbers hold for [V]
-    mass: float = Field(ge=0.0, le=1e4)  # of all of it [kg]
-    stall_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # when it is held fast [N m]
-    rated_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # for any time [N m]
-    peak_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # for a short time [N m]
-    speed: float | None = Field(default=None, gt=0.0)  # without load [rad/s]
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,39}$")  # used in space files and tables
+    maker: str = Field(default="", max_length=100)
+    kind: str = Field(default="", max_length=40)  # such as servo or gear motor
+    voltage: float | None = Field(default=None, gt=0.0)  # for which the values hold [V]
+    mass: float = Field(ge=0.0, le=1e4)  # [kg]
+    stall_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # [N m]
+    rated_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # continuous [N m]
+    peak_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # intermittent [N m]
+    speed: float | None = Field(default=None, gt=0.0)  # no-load [rad/s]
     width: float | None = Field(default=None, gt=0.0)  # [m]
     height: float | None = Field(default=None, gt=0.0)  # [m]
     depth: float | None = Field(default=None, gt=0.0)  # [m]
     price: float | None = Field(default=None, ge=0.0)  # [USD]
-    source: str = Field(default="", max_length=500)  # where the numbers stand
-    note: str = Field(default="", max_length=1000)  # what else is to be known
+    source: str = Field(default="", max_length=500)
+    note: str = Field(default="", max_length=1000)
 
     def torque(self, kind: TorqueKind) -> float | None:
         """Return the stall, rated or peak torque [N m]."""
@@ -71,7 +71,7 @@ def catalogue() -> Mapping[str, ActuatorRecord]:
 
 
 def resolve_actuator(entry: Any) -> Any:
-    """Return the record of a named actuator; anything else unchanged, to be validated as a record."""
+    """Return the record of a named actuator; anything else unchanged, for pydantic to validate."""
     if not isinstance(entry, str):
         return entry
     known = catalogue()

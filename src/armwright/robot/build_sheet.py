@@ -1,4 +1,4 @@
-"""The build sheet of an arm: what to cut, and what each joint must turn and hold."""
+"""The build sheet of an arm: lengths to cut, and limits and loads of each joint."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -8,17 +8,24 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.robot.arm import Arm
 
-AXIS_WORDS = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
+AXIS_NAMES = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
 
 
 @dataclass(frozen=True)
 class SheetRow:
     """A joint and the link after it.
 
-    length: of the link, joint to joint [m]. mass: of the link [kg]. lower, upper: limits [rad] or [m].
-    used: the least and the largest value at the targets [rad] or [m]. torque: the largest absolute one that holds
-    it at any target [N m], or force [N] where it slides; target: at which one, counted from 1.
-    actuator: its name; use: the share of its torque that is needed; price: [USD].
+    Attributes:
+        length: Length of the link, from joint to joint [m].
+        mass: Mass of the link [kg].
+        lower: Lower limit of the joint [rad] or [m].
+        upper: Upper limit of the joint [rad] or [m].
+        used: Smallest and largest value at the targets [rad] or [m].
+        torque: Largest absolute holding torque at any target [N m], or force of a prismatic joint [N].
+        target: Number of that target, counted from 1.
+        actuator: Name of the actuator; empty if not chosen.
+        utilisation: The torque as a fraction of the allowed one; None if that is unknown.
+        price: Price of the actuator [USD]; None if unknown.
     """
 
     number: int
@@ -32,21 +39,21 @@ class SheetRow:
     torque: float
     target: int
     actuator: str
-    use: float | None
+    utilisation: float | None
     price: float | None
 
 
 def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
-    """One for each joint; q, torques: (T, J) at the targets."""
+    """Return a row for each joint; q, torques: (T, J) at the targets."""
     rows: list[SheetRow] = []
     for j, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True)):
         worst = int(np.argmax(np.abs(torques[:, j])))
-        torque, motor = float(np.abs(torques[worst, j])), joint.actuator
+        torque, actuator = float(np.abs(torques[worst, j])), joint.actuator
         rows.append(
             SheetRow(
                 number=j + 1,
                 kind=joint.kind,
-                axis=AXIS_WORDS[joint.axis],
+                axis=AXIS_NAMES[joint.axis],
                 length=link.length,
                 mass=link.mass,
                 lower=joint.lower,
@@ -54,16 +61,16 @@ def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
                 used=(float(q[:, j].min()), float(q[:, j].max())),
                 torque=torque,
                 target=worst + 1,
-                actuator="" if motor is None else motor.name,
-                use=None if joint.effort is None else torque / joint.effort,
-                price=None if motor is None else motor.price,
+                actuator="" if actuator is None else actuator.name,
+                utilisation=None if joint.effort is None else torque / joint.effort,
+                price=None if actuator is None else actuator.price,
             )
         )
     return rows
 
 
 def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterable[str]) -> str:
-    """The sheet to read and to print."""
+    """Return the sheet as Markdown."""
     base = ", ".join(f"{1e3 * value:.1f}" for value in arm.base)
     lines = [
         f"# Build sheet: {title}",
@@ -83,7 +90,9 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
             row.actuator or "–",
             "" if fixed else f"{row.lower:.3f} to {row.upper:.3f} {unit}",
             "" if fixed else f"{row.used[0]:.3f} to {row.used[1]:.3f} {unit}",
-            "" if fixed else f"{row.torque:.4g} {force}" + ("" if row.use is None else f" ({row.use:.0%})"),
+            ""
+            if fixed
+            else f"{row.torque:.4g} {force}" + ("" if row.utilisation is None else f" ({row.utilisation:.0%})"),
             "" if fixed else str(row.target),
             f"{1e3 * row.length:.1f} mm",
             f"{1e3 * row.mass:.4g} g",

@@ -1,14 +1,13 @@
-"""Which links of an arm need no look for collisions between them, by proof.
+"""Pairs of links whose collision check can be disabled, by proof.
 
-A link is a solid cylinder along its segment, from its joint to the next. It lies within all that is nearer to the
-segment than its radius r. It holds all that is nearer than s = min(r, half its length) to the segment less s at each
-end. So two links are apart where their segments are farther apart than both r together, and meet where the shorter
-segments are nearer than both s together.
+A link is a solid cylinder along its segment, from its joint to the next. The capsule of its radius r about the segment
+contains it. It contains the capsule of radius s = min(r, length / 2) about the segment shortened by s at each end. So
+two links are apart if the distance of their segments exceeds the sum of both r, and collide if the distance of the
+shortened segments is below the sum of both s.
 
-Of a box of joint values the middle tells the whole box: turning a joint by a changes the distance of two segments by
-a R at most, R the farthest that one of them gets from the joint's axis (either: the distance changes by the part of
-the motion along the shortest line between them, which both its ends have in common), and sliding by a changes it by a.
-Where this is not enough the box is halved.
+The distance at the centre of a box of joint values bounds it in the whole box: rotating a joint by a changes the
+distance of two segments by at most a R, where R is the largest distance of either of them from the axis of the joint,
+and sliding by a changes it by at most a. If the bound is too weak, the box is halved.
 """
 
 import math
@@ -22,29 +21,29 @@ from armwright.robot.arm import AXES, Arm, Joint, Link
 Reason = Literal["Adjacent", "Never", "Always"]
 
 MARGIN = 1e-6  # [m]; files have ten digits, and float64 rounds
-MOST_BOXES = 50_000  # for a pair; beyond it nothing is proven
+MOST_BOXES = 50_000  # per pair; beyond it the search for a proof ends
 
 
 def disabled_collision_pairs(arm: Arm) -> dict[tuple[int, int], Reason]:
-    """Pairs of links with a length, counted from 0, and why nothing has to be looked for between them.
+    """Return pairs of links, counted from 0, that need no collision check, and the reason.
 
-    Adjacent: nothing solid or nothing that moves is between them. Never, Always: they meet in no posture, or in every
-    one, within the joints' limits.
+    Adjacent links have no solid link or no moving joint between them. Others collide in no posture within the joint
+    limits (Never), or in every one (Always). Links without length are not solid.
     """
     solid = [n for n, link in enumerate(arm.links) if link.length > 0.0]
     pairs: dict[tuple[int, int], Reason] = {}
-    for place, first in enumerate(solid):
-        for second in solid[place + 1 :]:
-            still = all(joint.kind == "fixed" for joint in arm.joints[first + 1 : second + 1])
-            neighbours = second == solid[place + 1]
-            reason = "Adjacent" if still or neighbours else _proven(arm, first, second)
+    for i, first in enumerate(solid):
+        for second in solid[i + 1 :]:
+            rigid = all(joint.kind == "fixed" for joint in arm.joints[first + 1 : second + 1])
+            neighbours = second == solid[i + 1]
+            reason = "Adjacent" if rigid or neighbours else _proven(arm, first, second)
             if reason is not None:
                 pairs[first, second] = reason
     return pairs
 
 
 def _proven(arm: Arm, first: int, second: int) -> Reason | None:
-    """Never or Always; None where neither is so, or is not found out with MOST_BOXES boxes."""
+    """Return Never or Always; None if neither holds or can be proven with MOST_BOXES boxes."""
     joints = arm.joints[first + 1 : second + 1]
     links = arm.links[first : second + 1]
     moving = [j for j, joint in enumerate(joints) if joint.kind != "fixed"]
@@ -77,10 +76,10 @@ def _inset(link: Link) -> float:
 
 
 def _rate(joints: tuple[Joint, ...], links: tuple[Link, ...], j: int) -> float:
-    """The most that the distance of the first and the last link changes by joint j [m/rad] or [m/m].
+    """Return the largest rate of the distance between the first and the last link by joint j [m/rad] or [m/m].
 
-    links[j] comes before joint j and links[j + 1] after it. A link that the joint carries has its end within its
-    length across the axis of it; all others may stand anyhow.
+    links[j] comes before joint j and links[j + 1] after it. The end of a link next to the joint is as far from its axis
+    as the link reaches across it; all other links may have any direction.
     """
     if joints[j].kind == "prismatic":
         return 1.0
@@ -97,7 +96,7 @@ def _rate(joints: tuple[Joint, ...], links: tuple[Link, ...], j: int) -> float:
 
 
 def _halved(centres: Array, halves: Array, rates: Array) -> tuple[Array, Array]:
-    """Each box as two, cut across the joint that matters most."""
+    """Return both halves of each box, cut across the joint with the largest effect."""
     rows = np.arange(len(centres))
     widest = np.argmax(halves * rates, axis=1)
     halves = halves.copy()
@@ -108,21 +107,21 @@ def _halved(centres: Array, halves: Array, rates: Array) -> tuple[Array, Array]:
 
 
 def _distances(joints: tuple[Joint, ...], links: tuple[Link, ...], moving: list[int], q: Array) -> tuple[Array, Array]:
-    """(B,) and (B,): between the segments of the first and the last link, and between the shorter ones within [m]."""
-    frames, places = np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3))
+    """Return the distances (B,) of the segments of the first and the last link, and of the shortened ones [m]."""
+    frames, positions = np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3))
     for j, joint in enumerate(joints):
-        places = places + frames @ np.array(links[j].offset)
+        positions = positions + frames @ np.array(links[j].offset)
         if j in moving:
             values = q[:, moving.index(j)]
             if joint.kind == "prismatic":
-                places = places + frames[:, :, AXES.index(joint.axis)] * values[:, None]
+                positions = positions + frames[:, :, AXES.index(joint.axis)] * values[:, None]
             else:
                 frames = frames @ _rotations(joint, values)
-    start, end = np.zeros_like(places), np.broadcast_to(np.array(links[0].offset), places.shape)
-    other_end = places + frames @ np.array(links[-1].offset)
+    start, end = np.zeros_like(positions), np.broadcast_to(np.array(links[0].offset), positions.shape)
+    other_end = positions + frames @ np.array(links[-1].offset)
     cut, other_cut = (_inset(link) / link.length for link in (links[0], links[-1]))
-    inner = (*_shortened(start, end, cut), *_shortened(places, other_end, other_cut))
-    return segment_distance(start, end, places, other_end), segment_distance(*inner)
+    inner = (*_shortened(start, end, cut), *_shortened(positions, other_end, other_cut))
+    return segment_distance(start, end, positions, other_end), segment_distance(*inner)
 
 
 def _shortened(a: Array, b: Array, cut: float) -> tuple[Array, Array]:
@@ -130,7 +129,7 @@ def _shortened(a: Array, b: Array, cut: float) -> tuple[Array, Array]:
 
 
 def _rotations(joint: Joint, angles: Array) -> Array:
-    """(B, 3, 3)"""
+    """Return (B, 3, 3) rotations of a joint by angles (B,) [rad]."""
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[joint.axis]
     matrices = np.tile(np.eye(3), (len(angles), 1, 1))
     matrices[:, i, i] = matrices[:, j, j] = np.cos(angles)
@@ -140,9 +139,9 @@ def _rotations(joint: Joint, angles: Array) -> Array:
 
 
 def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """(B,) the distance between the segments a b and c d, each (B, 3) [m].
+    """Return (B,) the distances between the segments from a to b and from c to d, each (B, 3) [m].
 
-    It is that of an end to the other segment, or of the two lines where their nearest points are on both.
+    It is the distance of an end to the other segment, or that of the two lines if their nearest points are on both.
     """
     ends = [_point_distance(a, c, d), _point_distance(b, c, d), _point_distance(c, a, b), _point_distance(d, a, b)]
     u, v, w = b - a, d - c, c - a
@@ -157,7 +156,7 @@ def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
 
 
 def _point_distance(p: Array, a: Array, b: Array) -> Array:
-    """(B,) of points to segments."""
+    """Return (B,) the distances of points p to the segments from a to b [m]."""
     along = b - a
     square = _dot(along, along)
     t = np.clip(_dot(p - a, along) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)

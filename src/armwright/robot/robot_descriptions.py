@@ -1,4 +1,4 @@
-"""URDF files by path, or by the name of an arm in the package `robot_descriptions`, which fetches it."""
+"""URDF files by path, or by the name of an arm in the package `robot_descriptions`, which downloads it."""
 
 import re
 from importlib import import_module
@@ -13,21 +13,24 @@ _SUFFIX = "_description"
 
 
 def find_urdf(name_or_path: str | Path) -> Path:
-    """The URDF file of this path; else of the arm of this name, such as `ur5e` or `panda`.
+    """Return the URDF file of a path, or of an arm by name, such as `ur5e` or `panda`.
 
-    ArmError where there is neither; MissingExtraError and FailureError where a name cannot be looked up or fetched.
+    Raises:
+        ArmError: If there is neither a file nor an arm of this name.
+        MissingExtraError: If the extra `arms` is not installed.
+        FailureError: If the description cannot be downloaded.
     """
     path = Path(name_or_path)
     if path.is_file():
         return path
     if path.is_dir():
-        raise ArmError(f"{path} is a folder; a URDF file is needed, or the name of an arm, such as ur5e")
+        raise ArmError(f"{path} is a folder; expected a URDF file, or the name of an arm, such as ur5e")
     if path.suffix or len(path.parts) != 1:
         raise ArmError(f"there is no file {path}")
-    return _fetched(str(name_or_path))
+    return _download(str(name_or_path))
 
 
-def _fetched(name: str) -> Path:
+def _download(name: str) -> Path:
     with requires_extra("arms", f"there is no file {name}, and an arm by its name"):
         robots: Any = import_module("robot_descriptions")
     known: dict[str, str] = {}
@@ -41,25 +44,25 @@ def _fetched(name: str) -> Path:
         raise ArmError(
             f'there is no file {name}, and robot_descriptions has no URDF "{name}".{did_you_mean(name, names)}'
         )
-    return _path_of(module, name)
+    return _import_description(module, name)
 
 
-def _path_of(module: str, name: str) -> Path:
-    """The file of a description; to import it fetches what is not there yet."""
+def _import_description(module: str, name: str) -> Path:
+    """Return the URDF file of a description; importing it downloads what is missing."""
     git: Any = import_module("git")  # comes with robot_descriptions
     try:
         description = import_module(f"robot_descriptions.{module}")
         path = import_module("robot_descriptions._xacro").get_urdf_path(description)
     except (ImportError, OSError, ValueError, RuntimeError, git.GitError) as fault:
         raise FailureError(
-            f"robot_descriptions cannot give the URDF of {name}: {_reason(fault)}. The first time it needs the network "
-            "and git, and xacrodoc for some; a URDF file of your own needs neither"
+            f"robot_descriptions cannot give the URDF of {name}: {_reason(fault)}. The first download needs "
+            "network access and git, for some arms also xacrodoc; a local URDF file needs none of them"
         ) from fault
     return Path(path)
 
 
 def _reason(fault: Exception) -> str:
-    """In one line; of git, what it calls fatal."""
+    """Return the reason on one line; of git, the part that it calls fatal."""
     text = " ".join(str(fault).split())
     return text[max(0, text.find("fatal:")) :][:200].strip("'. ")
 

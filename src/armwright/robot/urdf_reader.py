@@ -1,9 +1,9 @@
-"""An arm that exists already, from its URDF: the serial chain from its base to its tip as an `Arm`.
+"""An existing arm from its URDF: the serial chain from its base to its tip as an `Arm`.
 
-What is fixed to a link of the chain weighs with it, and so do fingers, which stay where they are at 0. An `Arm` wants
-frames that are parallel to the world's when its joints are at 0, and axes along x, y or z. Where the file's own zero is
-not such a posture, another one is found: a joint at a right angle to the one before it comes to lie along an axis of
-the world when that one is turned.
+Links that are fixed to a link of the chain add to its mass, and so do fingers, which stay at 0. An `Arm` needs frames
+that are parallel to the world frame with all joints at 0, and axes along x, y or z. If the zero posture of the file is
+not such a posture, another one is found: a joint at a right angle to the one before it can be aligned with an axis of
+the world by rotating that one.
 """
 
 import math
@@ -17,23 +17,28 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
 from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, Vector
-from armwright.robot.urdf_xml import Document, Pose, UrdfJoint, read_document, rotation
+from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document, rotation_about
 
-SNAP = 1e-3  # [rad]; an axis that is off by less is taken to lie along x, y or z
+SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
 LARGEST_ANGLE = 2 * math.pi  # [rad]
-RADIUS = 0.04  # [m], where the file has no cylinder to take it from; for drawings
-FINGERS = 2  # joints in a row, the most that a branch may have to be one of several fingers
-GRIPPER = re.compile("grip|jaw|finger", re.IGNORECASE)  # names of a last joint that is no joint of the arm
+RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
+FINGERS = 2  # longest chain of joints of a branch that counts as a finger
+GRIPPER = re.compile("grip|jaw|finger", re.IGNORECASE)  # names of a last joint that belongs to a gripper
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfArm:
     """An arm read from a URDF, with its base link at the world's origin.
 
-    tip: the link whose origin is the tip.
-    joints: the names of the arm's joints, from base to tip.
-    signs, zeros: joint j of the arm at q stands in the URDF at signs[j] * q + zeros[j].
-    notes: what was chosen, changed or missing, for its reader.
+    Attributes:
+        name: The name of the robot.
+        arm: The arm.
+        base_link: The link at the origin of the world.
+        tip: The link whose origin is the tip.
+        joints: The names of the moving joints, from base to tip.
+        signs: Sign of each joint: value q of the arm is signs * q + zeros in the URDF.
+        zeros: Value of each joint in the URDF at 0 of the arm [rad] or [m].
+        notes: Choices, changes and missing data, as sentences for the user.
     """
 
     name: str
@@ -46,21 +51,25 @@ class UrdfArm:
     notes: tuple[str, ...] = ()
 
     def values_in_urdf(self, q: Sequence[float] | Array) -> Array:
-        """(..., J) the values of the URDF's joints [rad] or [m], of the arm's (..., J)."""
+        """Return the values (..., J) of the URDF's joints for those of the arm (..., J) [rad] or [m]."""
         return np.asarray(q) * self.signs + self.zeros
 
 
 def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = None) -> UrdfArm:
-    """The serial arm of a URDF file.
+    """Read the serial arm of a URDF file.
 
-    tip: the link whose origin is to reach the targets; without it, the last one before fingers, or of all.
-    base_link: what stands on the ground; without it, the robot's root.
-    ArmError, in one line, for what is no URDF, or no serial arm that the kernels can compute.
+    Args:
+        path: The URDF file.
+        tip: The link whose origin should reach the targets; by default the last one before a gripper.
+        base_link: The link that stands on the ground; by default the root of the robot.
+
+    Raises:
+        ArmError: If the file is not a URDF, or has no serial arm that can be computed.
     """
     document = read_document(Path(path))
-    tree = _Tree(document, str(path))
-    base = tree.root if base_link is None else tree.checked(base_link, "base link")
-    last = tree.usual_tip(base) if tip is None else tree.checked(tip, "tip")
+    tree = _LinkTree(document, str(path))
+    base = tree.root if base_link is None else tree.check_link(base_link, "base link")
+    last = tree.default_tip(base) if tip is None else tree.check_link(tip, "tip")
     chain = tree.chain(base, last)
     moving = [joint for joint in chain if joint.kind != "fixed"]
     if not moving:
@@ -68,30 +77,32 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     for joint in moving:
         _check_joint(joint, str(path))
     zeros = _zeros(chain, str(path))
-    return _arm(tree, base, last, moving, zeros, _chosen(tree, base, tip, last, moving))
+    return _arm(tree, base, last, moving, zeros, _chain_notes(tree, base, tip, last, moving))
 
 
 def _arm(
-    tree: "_Tree", base: str, tip: str, moving: Sequence[UrdfJoint], zeros: Mapping[str, float], notes: list[str]
+    tree: "_LinkTree", base: str, tip: str, moving: Sequence[UrdfJoint], zeros: Mapping[str, float], notes: list[str]
 ) -> UrdfArm:
     poses = tree.poses(base, zeros)
-    bodies = tree.bodies(base, [joint.child for joint in moving])  # names of links, by the body that they are of
-    places = [poses[joint.child].place for joint in moving] + [poses[tip].place]
+    bodies = tree.bodies(base, [joint.child for joint in moving])  # names of links, per body
+    positions = [poses[joint.child].position for joint in moving] + [poses[tip].position]
     joints: list[Joint] = []
     links: list[Link] = []
     signs: list[float] = []
     snapped = 0.0
     for i, joint in enumerate(moving):
-        axis, sign, off = _nearest_axis(poses[joint.child].turn @ joint.axis)
+        axis, sign, deviation = _nearest_axis(poses[joint.child].rotation @ joint.axis)
         signs.append(sign)
-        snapped = max(snapped, off)
+        snapped = max(snapped, deviation)
         joints.append(_as_joint(joint, axis, sign, zeros[joint.name], notes))
-        own = [tree.document.links[name] for name in bodies[i + 1]]
-        mass = sum(link.mass for link in own)
-        moments = sum((link.mass * (poses[link.name] @ Pose(np.eye(3), link.com)).place for link in own), np.zeros(3))
-        com = moments / mass - places[i] if mass > 0.0 else np.zeros(3)
-        radius = max((link.radius for link in own if link.radius is not None), default=RADIUS)
-        links.append(Link(_vector(places[i + 1] - places[i]), mass, _vector(com), radius))
+        body = [tree.document.links[name] for name in bodies[i + 1]]
+        mass = sum(link.mass for link in body)
+        moments = sum(
+            (link.mass * (poses[link.name] @ Pose(np.eye(3), link.com)).position for link in body), np.zeros(3)
+        )
+        com = moments / mass - positions[i] if mass > 0.0 else np.zeros(3)
+        radius = max((link.radius for link in body if link.radius is not None), default=RADIUS)
+        links.append(Link(_vector(positions[i + 1] - positions[i]), mass, _vector(com), radius))
     if snapped > 1e-9:
         notes.append(f"axes are taken to lie along x, y or z; they are off by up to {snapped:.1g} rad")
     shifted = [f"{name} by {value:.4g} rad" for name, value in zeros.items() if value]
@@ -101,13 +112,13 @@ def _arm(
         notes.append("no link states a mass; torques are those of the payload alone")
     if any(joint.actuator is None for joint in joints):
         notes.append("not every joint states an effort, so how much of it is used is not known")
-    turn = poses[tip].turn
+    rotation = poses[tip].rotation
     arm = Arm(
-        base=_vector(places[0]),
+        base=_vector(positions[0]),
         joints=tuple(joints),
         links=tuple(links),
-        tool_axis=_vector(turn[:, 2]),
-        tool_side=_vector(turn[:, 0]),
+        tool_axis=_vector(rotation[:, 2]),
+        tool_side=_vector(rotation[:, 0]),
         base_mass=sum(tree.document.links[name].mass for name in bodies[0]),
     )
     names = tuple(joint.name for joint in moving)
@@ -116,20 +127,18 @@ def _arm(
 
 
 def _check_joint(joint: UrdfJoint, where: str) -> None:
-    """ArmError for what no joint of a serial arm is."""
+    """Raise ArmError if a joint cannot be part of a serial arm."""
     of = f'{where}: joint "{joint.name}"'
     if joint.kind in ("floating", "planar"):
-        raise ArmError(f"{of} is {joint.kind}; between base and tip only turning and sliding joints can be computed")
-    if joint.follows is not None:
-        raise ArmError(f'{of} repeats "{joint.follows}"; between base and tip each joint must move of its own')
+        raise ArmError(f"{of} is {joint.kind}; between base and tip only revolute and prismatic joints can be computed")
+    if joint.mimics is not None:
+        raise ArmError(f'{of} mimics "{joint.mimics}"; between base and tip each joint must move independently')
     if joint.kind != "continuous" and not (joint.lower or 0.0) < (joint.upper or 0.0):
-        raise ArmError(
-            f"{of} has the limits {joint.lower or 0.0:g} and {joint.upper or 0.0:g}; lower < upper is needed"
-        )
+        raise ArmError(f"{of}: expected limits lower < upper, got {joint.lower or 0.0:g} and {joint.upper or 0.0:g}")
 
 
-def _chosen(tree: "_Tree", base: str, tip: str | None, last: str, moving: Sequence[UrdfJoint]) -> list[str]:
-    """What is said of the choice of a chain."""
+def _chain_notes(tree: "_LinkTree", base: str, tip: str | None, last: str, moving: Sequence[UrdfJoint]) -> list[str]:
+    """Return the notes on the choice of a chain."""
     notes = [] if tip is not None else [f'the tip is the link "{last}" (--tip names another)']
     others = sum(joint.kind != "fixed" for joint in tree.below(base)) - len(moving)
     if others:
@@ -138,7 +147,7 @@ def _chosen(tree: "_Tree", base: str, tip: str | None, last: str, moving: Sequen
 
 
 def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list[str]) -> Joint:
-    """The joint about the positive axis, counted from its zero."""
+    """Return the joint about the positive world axis, with limits relative to its zero."""
     actuator = None
     if joint.effort:
         actuator = Actuator(joint.name, 0.0, abs(joint.effort), joint.speed or None)
@@ -157,13 +166,14 @@ def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list
 
 
 def _zeros(chain: Sequence[UrdfJoint], where: str) -> dict[str, float]:
-    """A posture [rad] in which every joint lies along an axis of the world: 0, but for the joints that must be turned.
+    """Return a posture [rad] with all joint axes along axes of the world, 0 for as many joints as possible.
 
-    ArmError where there is none.
+    Raises:
+        ArmError: If none is found.
     """
     moving = [joint for joint in chain if joint.kind != "fixed"]
     zeros = {joint.name: 0.0 for joint in moving}
-    before: UrdfJoint | None = None  # the last one that turns
+    before: UrdfJoint | None = None  # the last joint that is not prismatic
     for joint in moving:
         axis = _axes(chain, zeros)[joint.name]
         if _nearest_axis(axis)[2] > SNAP and before is not None:
@@ -176,28 +186,28 @@ def _zeros(chain: Sequence[UrdfJoint], where: str) -> dict[str, float]:
             before = joint
     for name, axis in _axes(chain, zeros).items():
         if _nearest_axis(axis)[2] > SNAP:
-            words = ", ".join(f"{value:.3f}" for value in axis)
+            vector = ", ".join(f"{value:.3f}" for value in axis)
             raise ArmError(
-                f'{where}: joint "{name}" has the axis ({words}) with all joints at 0, along none of x, y and z and '
+                f'{where}: joint "{name}" has the axis ({vector}) with all joints at 0, along none of x, y and z and '
                 "not at a right angle to the joint before; such an arm cannot be computed yet"
             )
     return zeros
 
 
 def _axes(chain: Sequence[UrdfJoint], zeros: Mapping[str, float]) -> dict[str, Array]:
-    """The axes (3,) of the moving joints in the world, by name."""
+    """Return the axes (3,) of the moving joints in the world, by name."""
     axes: dict[str, Array] = {}
-    turn = np.eye(3)
+    rotation = np.eye(3)
     for joint in chain:
-        turn = turn @ joint.place.turn
+        rotation = rotation @ joint.origin.rotation
         if joint.kind != "fixed":
-            axes[joint.name] = turn @ joint.axis
-            turn = turn @ rotation(joint.axis, 0.0 if joint.kind == "prismatic" else zeros[joint.name])
+            axes[joint.name] = rotation @ joint.axis
+            rotation = rotation @ rotation_about(joint.axis, 0.0 if joint.kind == "prismatic" else zeros[joint.name])
     return axes
 
 
 def _nearest_axis(direction: Array) -> tuple[int, float, float]:
-    """The world's axis nearest to a direction (3,) of unit length, whether it points along it or not, how far off."""
+    """Return the index of the world axis nearest to a unit vector (3,), the sign, and the angle between them [rad]."""
     axis = int(np.abs(direction).argmax())
     sign = math.copysign(1.0, direction[axis])
     across = float(np.linalg.norm(np.delete(direction, axis)))
@@ -214,55 +224,54 @@ def _vector(values: Array) -> Vector:
     return x, y, z
 
 
-class _Tree:
-    """A document's links as a tree."""
+class _LinkTree:
+    """The links of a URDF as a tree."""
 
-    def __init__(self, document: Document, where: str) -> None:
+    def __init__(self, document: UrdfDocument, where: str) -> None:
         self.document, self._where = document, where
         self._children: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}
         self._parent: dict[str, UrdfJoint] = {}
         for joint in document.joints:
             if joint.child in self._parent:
-                raise ArmError(f'{where}: the link "{joint.child}" has two parents; a tree is needed')
+                raise ArmError(f'{where}: the link "{joint.child}" has two parents; expected a tree')
             self._parent[joint.child] = joint
             self._children[joint.parent].append(joint)
         roots = [name for name in document.links if name not in self._parent]
         if len(roots) != 1:
-            said = ", ".join(roots[:5]) or "none, as the joints go in a circle"
-            raise ArmError(f"{where}: one link without a parent is needed, the root; there are {len(roots)} ({said})")
+            names = ", ".join(roots[:5]) or "none: the joints form a cycle"
+            raise ArmError(f"{where}: expected one root link, found {len(roots)} ({names})")
         self.root = roots[0]
         if len(list(self.below(self.root))) < len(document.joints):
-            raise ArmError(f"{where}: some joints go in a circle; a tree is needed")
-        self._deepest: dict[str, int] = {}  # the most joints in a row that move, below each link
-        self._longest: dict[str, int] = {}  # the most links in a row below each link
+            raise ArmError(f"{where}: some joints form a cycle; expected a tree")
+        self._deepest: dict[str, int] = {}  # moving joints of the longest chain below each link
+        self._longest: dict[str, int] = {}  # links of the longest chain below each link
         for joint in reversed(list(self.below(self.root))):
             self._deepest[joint.parent] = max(self._deepest.get(joint.parent, 0), self._moving(joint))
             self._longest[joint.parent] = max(self._longest.get(joint.parent, 0), 1 + self._longest.get(joint.child, 0))
 
     def _moving(self, joint: UrdfJoint) -> int:
-        """The most joints in a row that move, from this one on."""
+        """Return the number of moving joints of the longest chain from this joint on."""
         return joint.moves + self._deepest.get(joint.child, 0)
 
     def below(self, link: str) -> Iterator[UrdfJoint]:
-        """All joints beyond a link, each after those that it hangs on."""
+        """Yield all joints beyond a link, parents first."""
         waiting = [link]
         while waiting:
             joints = self._children[waiting.pop()]
             yield from joints
             waiting += [joint.child for joint in joints]
 
-    def checked(self, link: str, kind: str) -> str:
-        """The name, if it is a link's."""
+    def check_link(self, link: str, kind: str) -> str:
+        """Return the name of a link; raise ArmError if there is none."""
         if link not in self.document.links:
             names = ", ".join(list(self.document.links)[:40])
             raise ArmError(
-                f'{self._where} has no link "{link}" for its {kind}.{did_you_mean(link, self.document.links)} '
-                f"Links: {names}"
+                f'{self._where} has no link "{link}" ({kind}).{did_you_mean(link, self.document.links)} Links: {names}'
             )
         return link
 
     def chain(self, base: str, tip: str) -> list[UrdfJoint]:
-        """The joints from a link to one beyond it."""
+        """Return the joints from a link to one beyond it."""
         chain: list[UrdfJoint] = []
         link = tip
         while link != base:
@@ -272,10 +281,10 @@ class _Tree:
             link = self._parent[link].parent
         return chain[::-1]
 
-    def usual_tip(self, base: str) -> str:
-        """The end of the arm's one chain: where it opens into fingers, or where no joint moves any more.
+    def default_tip(self, base: str) -> str:
+        """Return the end of the only chain: the last link before a gripper, or before no joint moves any more.
 
-        From there on along what is fixed, as far as it goes.
+        From there it follows the longest chain of fixed joints.
         """
         link, moved = base, 0
         while branches := [joint for joint in self._children[link] if self._moving(joint)]:
@@ -295,19 +304,19 @@ class _Tree:
         return link
 
     def _is_gripper(self, joint: UrdfJoint) -> bool:
-        """Whether a last joint is called as those of grippers are."""
+        """Return True if a last joint is named like those of grippers."""
         return self._moving(joint) == 1 and GRIPPER.search(f"{joint.name} {joint.child}") is not None
 
     def poses(self, base: str, values: Mapping[str, float]) -> dict[str, Pose]:
-        """Of every link from the base on, in the base's frame; joints without a value [rad] stand at 0."""
+        """Return the pose of every link in the base frame; values: joint angles by name [rad], by default 0."""
         poses = {base: Pose(np.eye(3), np.zeros(3))}
         for joint in self.below(base):
-            turned = Pose(rotation(joint.axis, values.get(joint.name, 0.0)), np.zeros(3))
-            poses[joint.child] = poses[joint.parent] @ joint.place @ turned
+            motion = Pose(rotation_about(joint.axis, values.get(joint.name, 0.0)), np.zeros(3))
+            poses[joint.child] = poses[joint.parent] @ joint.origin @ motion
         return poses
 
     def bodies(self, base: str, moved: Sequence[str]) -> list[list[str]]:
-        """The links that move as one: those of the base, then those of each link in `moved` up to the next."""
+        """Return the links of each rigid body: that of the base, then that of each link in `moved`."""
         body = {base: 0}
         starts = {link: number for number, link in enumerate(moved, start=1)}
         for joint in self.below(base):

@@ -1,6 +1,6 @@
-"""A URDF as its links and joints: read safely, checked, refused in one line.
+"""The links and joints of a URDF: read safely, checked, refused with a one-line error.
 
-Meshes, colours and whatever else a URDF may hold are passed over.
+Meshes, colours and everything else in a URDF are ignored.
 """
 
 import math
@@ -15,25 +15,32 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import ArmError
 
-LARGEST_FILE = 4 * 1024 * 1024  # [bytes]; of 60 robots that are often used the largest has 0.2 MB
-DEEPEST = 50  # elements within each other; a URDF needs 6
+LARGEST_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
+DEEPEST = 50  # nested elements; a URDF needs 6
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a frame stands in another one: its axes as columns (3, 3), and its origin (3,) [m]."""
+    """The pose of a frame in another one."""
 
-    turn: Array
-    place: Array
+    rotation: Array  # (3, 3), the axes of the frame as columns
+    position: Array  # (3,) its origin [m]
 
     def __matmul__(self, inner: "Pose") -> "Pose":
-        return Pose(self.turn @ inner.turn, self.place + self.turn @ inner.place)
+        return Pose(self.rotation @ inner.rotation, self.position + self.rotation @ inner.position)
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfLink:
-    """mass: [kg]. com: its centre in the link's frame, (3,) [m]. radius: of its thickest cylinder, where it has one."""
+    """A link of a URDF.
+
+    Attributes:
+        name: Its name.
+        mass: Its mass [kg].
+        com: (3,) its centre of mass in the link frame [m].
+        radius: The radius of its thickest cylinder [m]; None if it has none.
+    """
 
     name: str
     mass: float
@@ -43,62 +50,72 @@ class UrdfLink:
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """place: of its child in its parent, where it has not moved. axis: (3,) of unit length, in the child.
+    """A joint of a URDF.
 
-    lower, upper, effort, speed: as the file has them [rad, m, N m, N, rad/s, m/s]; None where it has none.
-    follows: the joint whose movement it repeats, where it does so.
+    Attributes:
+        name: Its name.
+        kind: Its type in the file.
+        parent: The name of the link before it.
+        child: The name of the link after it.
+        origin: The pose of the child in the parent at a joint value of 0.
+        axis: (3,) unit vector in the child frame.
+        lower: Lower limit [rad] or [m]; None if missing, as for the next three.
+        upper: Upper limit [rad] or [m].
+        effort: Largest torque [N m] or force [N].
+        speed: Largest speed [rad/s] or [m/s].
+        mimics: The name of the joint that it mimics, if any.
     """
 
     name: str
     kind: str
     parent: str
     child: str
-    place: Pose
+    origin: Pose
     axis: Array
     lower: float | None
     upper: float | None
     effort: float | None
     speed: float | None
-    follows: str | None
+    mimics: str | None
 
     @property
     def moves(self) -> bool:
-        """Whether it moves of its own."""
-        return self.kind != "fixed" and self.follows is None
+        """True if it moves independently of other joints."""
+        return self.kind != "fixed" and self.mimics is None
 
 
 @dataclass(frozen=True, slots=True)
-class Document:
-    """A robot's links by name, and its joints in the file's order."""
+class UrdfDocument:
+    """The links of a robot by name, and its joints in the order of the file."""
 
     name: str
     links: dict[str, UrdfLink]
     joints: tuple[UrdfJoint, ...]
 
 
-def read_document(path: Path) -> Document:
-    """The links and joints of a URDF file; ArmError where it is none."""
+def read_document(path: Path) -> UrdfDocument:
+    """Read the links and joints of a URDF file; raise ArmError if it is not one."""
     try:
         if path.stat().st_size > LARGEST_FILE:
-            raise ArmError(f"{path} is larger than {LARGEST_FILE // 2**20} MiB; a URDF without its meshes is not")
+            raise ArmError(f"{path}: expected a URDF of at most {LARGEST_FILE // 2**20} MiB")
         data = path.read_bytes()
     except OSError as fault:
         raise ArmError(f"cannot read {path}: {fault.strerror or fault}") from fault
     return parse_document(data, str(path))
 
 
-def parse_document(data: bytes, where: str) -> Document:
-    """The same of a file's bytes; `where` names it in messages."""
+def parse_document(data: bytes, where: str) -> UrdfDocument:
+    """Parse the bytes of a URDF file; `where` names it in messages."""
     robot = _parsed(data, where)
     if robot.tag != "robot":
-        raise ArmError(f"{where} is not a URDF: its root is <{_short(robot.tag)}>, where <robot> is needed")
+        raise ArmError(f"{where} is not a URDF: expected the root <robot>, got <{_short(robot.tag)}>")
     links = [_link(element, where) for element in robot.findall("link")]
     joints = tuple(_joint(element, where) for element in robot.findall("joint"))
     for kind, names in (("link", [link.name for link in links]), ("joint", [joint.name for joint in joints])):
         seen: set[str] = set()
         for name in names:
             if name in seen:
-                raise ArmError(f'{where}: the {kind} "{_short(name)}" stands there twice')
+                raise ArmError(f'{where}: duplicate {kind} "{_short(name)}"')
             seen.add(name)
     if not links:
         raise ArmError(f"{where} has no link")
@@ -106,14 +123,12 @@ def parse_document(data: bytes, where: str) -> Document:
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in known:
-                raise ArmError(
-                    f'{where}: joint "{_short(joint.name)}" joins the link "{_short(end)}", which is not there'
-                )
-    return Document(robot.get("name") or Path(where).stem, known, joints)
+                raise ArmError(f'{where}: joint "{_short(joint.name)}" joins the unknown link "{_short(end)}"')
+    return UrdfDocument(robot.get("name") or Path(where).stem, known, joints)
 
 
 def _parsed(data: bytes, where: str) -> ElementTree.Element:
-    """The XML; without entities, by which a small file fills the memory or reads others."""
+    """Parse XML without entities, with which a small file could fill the memory or read other files."""
     builder = ElementTree.TreeBuilder()
     parser = expat.ParserCreate()
     depth = 0
@@ -122,7 +137,7 @@ def _parsed(data: bytes, where: str) -> ElementTree.Element:
         nonlocal depth
         depth += 1
         if depth > DEEPEST:
-            raise ArmError(f"{where} has more than {DEEPEST} elements within each other; that is no URDF")
+            raise ArmError(f"{where} has more than {DEEPEST} nested elements; that is not a URDF")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -152,8 +167,8 @@ def _link(element: ElementTree.Element, where: str) -> UrdfLink:
     if inertial is not None:
         mass = _numbers(inertial.find("mass"), "value", 1, of)[0]
         if mass < 0.0:
-            raise ArmError(f"{of} has a mass of {mass:g} kg; 0 or more is needed")
-        com = _pose(inertial.find("origin"), of).place
+            raise ArmError(f"{of}: expected a mass of 0 kg or more, got {mass:g} kg")
+        com = _pose(inertial.find("origin"), of).position
     shapes = [_numbers(shape, "radius", 1, of)[0] for shape in element.iter("cylinder")]
     return UrdfLink(name, mass, com, max((radius for radius in shapes if radius > 0.0), default=None))
 
@@ -163,7 +178,7 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
     of = f'{where}: joint "{_short(name)}"'
     kind = element.get("type", "")
     if kind not in KINDS:
-        raise ArmError(f'{of} is of the type "{_short(kind)}"; there are {", ".join(KINDS)}')
+        raise ArmError(f'{of} has the unknown type "{_short(kind)}"; available: {", ".join(KINDS)}')
     axis = element.find("axis")
     direction = np.array([1.0, 0.0, 0.0] if axis is None else _numbers(axis, "xyz", 3, of))
     length = float(np.linalg.norm(direction))
@@ -181,7 +196,7 @@ def _joint(element: ElementTree.Element, where: str) -> UrdfJoint:
         _pose(element.find("origin"), of),
         direction / (length if length > 0.0 else 1.0),
         *values,
-        follows=None if mimic is None else mimic.get("joint", ""),
+        mimics=None if mimic is None else mimic.get("joint", ""),
     )
 
 
@@ -196,17 +211,17 @@ def _name(element: ElementTree.Element, kind: str, where: str) -> str:
 
 
 def _pose(element: ElementTree.Element | None, of: str) -> Pose:
-    """Of an <origin>; where it is missing, of one that changes nothing."""
+    """Return the pose of an <origin>; the identity if it is missing."""
     if element is None:
         return Pose(np.eye(3), np.zeros(3))
-    place = np.array(_numbers(element, "xyz", 3, of)) if element.get("xyz") is not None else np.zeros(3)
+    position = np.array(_numbers(element, "xyz", 3, of)) if element.get("xyz") is not None else np.zeros(3)
     angles = _numbers(element, "rpy", 3, of) if element.get("rpy") is not None else [0.0, 0.0, 0.0]
-    about_x, about_y, about_z = (rotation(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
-    return Pose(about_z @ about_y @ about_x, place)
+    about_x, about_y, about_z = (rotation_about(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
+    return Pose(about_z @ about_y @ about_x, position)
 
 
-def rotation(axis: Array, angle: float) -> Array:
-    """(3, 3) about an axis (3,) of unit length by `angle` [rad]."""
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Return the (3, 3) rotation about a unit vector (3,) by an angle [rad] (Rodrigues' formula)."""
     x, y, z = axis.tolist()
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
@@ -215,13 +230,13 @@ def rotation(axis: Array, angle: float) -> Array:
 def _numbers(element: ElementTree.Element | None, key: str, n: int, of: str) -> list[float]:
     text = "" if element is None else element.get(key, "")
     if "$" in text:
-        raise ArmError(f'{of}: {key} = "{_short(text)}" is xacro, not URDF yet; `xacro FILE > arm.urdf` expands it')
+        raise ArmError(f'{of}: {key} = "{_short(text)}" is xacro, not URDF; try `xacro FILE > arm.urdf`')
     try:
         values = [float(part) for part in text.split()]
     except ValueError:
         values = []
     if len(values) != n or not all(math.isfinite(value) for value in values):
-        raise ArmError(f'{of}: {key} = "{_short(text)}"; {n} finite {"number is" if n == 1 else "numbers are"} needed')
+        raise ArmError(f'{of}: {key}: expected {n} finite {"number" if n == 1 else "numbers"}, got "{_short(text)}"')
     return values
 
 
