@@ -18,7 +18,7 @@ def short(out: Path, problem: Problem, n_total: int = 12) -> StudyResult:
 
 
 @pytest.mark.slow
-def test_every_figure_as_png_and_pdf(tmp_path: Path) -> None:
+def test_figures_are_written_as_png_and_pdf(tmp_path: Path) -> None:
     short(tmp_path, Problem(load_task("target-2")))
     written = write_figures(tmp_path)
     assert {"hypervolume.png", "samples.png", "front.png", "arms.png", "attribution.png"} <= {
@@ -38,13 +38,13 @@ def test_every_figure_as_png_and_pdf(tmp_path: Path) -> None:
         pytest.param(Task(name="many", targets=tuple((0.3, 0.01 * i, 0.2) for i in range(40))), marks=pytest.mark.slow),
     ],
 )
-def test_odd_tasks_are_drawn_too(tmp_path: Path, task: Task) -> None:
+def test_unusual_tasks_are_drawn(tmp_path: Path, task: Task) -> None:
     short(tmp_path, Problem(task), n_total=1)
     assert write_figures(tmp_path)
 
 
 @pytest.mark.slow
-def test_drawing_again_leaves_no_figure_of_a_former_choice(tmp_path: Path) -> None:
+def test_redrawing_removes_outdated_figures(tmp_path: Path) -> None:
     problem = Problem(random_task(0))
     short(tmp_path, problem, n_total=2)
     write_figures(tmp_path)
@@ -54,7 +54,7 @@ def test_drawing_again_leaves_no_figure_of_a_former_choice(tmp_path: Path) -> No
     assert arms == {f"arm-{member.number:04d}.png" for _, member in chosen_members(run.history)}
 
 
-def test_the_chosen_designs_are_the_fronts_ends_within_the_box_and_the_most_precise(tmp_path: Path) -> None:
+def test_chosen_members_are_the_ends_of_the_front_and_the_most_precise(tmp_path: Path) -> None:
     tight = load_task("target-1").model_copy(update={"reference_point": (5.0, 2.5)})
     history = short(tmp_path, Problem(tight), n_total=40).history
     chosen = dict(chosen_members(history))
@@ -65,14 +65,14 @@ def test_the_chosen_designs_are_the_fronts_ends_within_the_box_and_the_most_prec
     assert chosen["Most precise of all, beyond the reference point"] == history.front[0]
 
 
-def test_the_curve_begins_with_the_random_trials_and_ends_at_the_final_value(tmp_path: Path) -> None:
+def test_hypervolume_curve_spans_random_trials_to_final_value(tmp_path: Path) -> None:
     run = short(tmp_path, Problem(load_task("target-1")))
     line = draw_hypervolume(run.history).axes[0].lines[0]
     assert len(line.get_xdata()) == 13
     assert line.get_ydata()[-1] == run.hypervolume[-1]
 
 
-def test_the_stacks_end_at_the_final_hypervolume_and_the_size_of_the_front(tmp_path: Path) -> None:
+def test_attribution_stacks_end_at_hypervolume_and_front_size(tmp_path: Path) -> None:
     run = short(tmp_path, Problem(load_task("target-1")))
     volume, members = draw_attribution(run.history).axes
     assert volume.lines[-1].get_ydata()[-1] == pytest.approx(run.hypervolume[-1])
@@ -80,13 +80,13 @@ def test_the_stacks_end_at_the_final_hypervolume_and_the_size_of_the_front(tmp_p
     assert [text.get_text() for text in volume.figure.legends[0].texts] == ["black box", "rules", "random"]
 
 
-def test_sample_panels_are_at_the_papers_shares(tmp_path: Path) -> None:
+def test_sample_panels_use_the_shares_of_the_paper(tmp_path: Path) -> None:
     run = short(tmp_path, Problem(load_task("target-1")), n_total=20)
     titles = [axes.get_title() for axes in draw_samples(run.history).axes]
     assert [title.split()[1] for title in titles] == ["1", "7", "13", "20"]
 
 
-def test_a_run_without_its_random_trials_cannot_be_drawn(tmp_path: Path) -> None:
+def test_figures_without_all_random_trials_are_refused(tmp_path: Path) -> None:
     def stop(progress: Progress) -> None:
         if progress.number == 1:
             raise KeyboardInterrupt

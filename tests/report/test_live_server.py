@@ -22,7 +22,7 @@ from armwright.runs.folder import read_run
 from tests.support.browser import Tab
 from tests.support.chat_server import Answer, ChatServer, Request, designer, wants_design
 from tests.support.command_line import PATIENCE, refused, start
-from tests.support.live_server import ask, served, wish
+from tests.support.live_server import ask, post_control, served
 from tests.support.wire_formats import model_options
 
 __all__ = ["served"]  # a fixture
@@ -110,7 +110,7 @@ def model(server: ChatServer) -> list[str]:
     ]
 
 
-def test_designs_arrive_a_hint_is_used_and_stop_stops(
+def test_live_page_receives_designs_sends_hints_and_stops(
     tmp_path: Path, tab: Tab, live: ExitStack, chat_server: ChatServer
 ) -> None:
     gate = Gate()
@@ -125,14 +125,14 @@ def test_designs_arrive_a_hint_is_used_and_stop_stops(
     assert tab.ask("armwright.content.n") == 8
     page.locator("#hint-text").fill(HINT)
     page.get_by_role("button", name="Send").click()
-    expect(page.locator("#hints")).to_contain_text(f"waits for the next question: {HINT}")
+    expect(page.locator("#hints")).to_contain_text(f"waiting for the next prompt: {HINT}")
     assert [hint.text for hint in read_control(study.folder).hints] == [HINT]
 
     # A reload shows the whole state; a second tab, too.
     page.reload()
     page.locator("#loading").wait_for(state="hidden")
     assert tab.ask("armwright.content.n") == 8
-    expect(page.locator("#hints")).to_contain_text("waits for the next question")
+    expect(page.locator("#hints")).to_contain_text("waiting for the next prompt")
     other = Tab(page.context.browser)
     other.open(study.address)
     expect(other.page.locator("#hints")).to_contain_text(HINT)
@@ -159,7 +159,7 @@ def test_designs_arrive_a_hint_is_used_and_stop_stops(
     page.get_by_role("button", name="Stop after this design").click()
     assert study.end() == 130
     assert "stopped" in "".join(study.said)
-    expect(page.locator("#doing")).to_have_text(re.compile(r"^stopped at \d+ of 4004; the same command goes on"))
+    expect(page.locator("#doing")).to_have_text(re.compile(r"^stopped at \d+ of 4004; repeat the command to resume"))
     expect(page.locator("#pause")).to_be_hidden()
     finished = len(read_run(study.folder)[1])
     assert f"stopped at {finished} of" in page.locator("#doing").inner_text()
@@ -172,7 +172,7 @@ def test_designs_arrive_a_hint_is_used_and_stop_stops(
     assert tab.faults == []
 
 
-def test_the_page_shows_the_end_and_outlives_the_study(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
+def test_live_page_shows_the_end_and_outlives_the_study(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
     study = live.enter_context(LiveStudy(tmp_path / "run", "--proposer", "rules", "--n-total", "30", "--seed", "3"))
     tab.open(study.address)
     expect(tab.page.locator("#doing")).to_have_text("finished: 40 designs")
@@ -189,7 +189,7 @@ def test_the_page_shows_the_end_and_outlives_the_study(tmp_path: Path, tab: Tab,
     assert tab.faults == []
 
 
-def test_a_study_survives_its_server_and_its_browser(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
+def test_study_survives_a_killed_server(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
     plain = aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_total=300, out=tmp_path / "plain")
     study = live.enter_context(LiveStudy(tmp_path / "run", "--proposer", "none", "--n-total", "300"))
     tab.open(study.address)
@@ -205,7 +205,7 @@ def _children(pid: int) -> list[int]:
     return [child.pid for child in psutil.Process(pid).children()]
 
 
-def test_a_killed_study_is_seen_to_be_gone(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
+def test_killed_study_is_shown_as_not_running(tmp_path: Path, tab: Tab, live: ExitStack) -> None:
     study = live.enter_context(
         LiveStudy(tmp_path / "run", "--proposer", "none", "--n-total", "20000", "--sampler", "random")
     )
@@ -216,25 +216,25 @@ def test_a_killed_study_is_seen_to_be_gone(tmp_path: Path, tab: Tab, live: ExitS
     study.end()
 
 
-def test_only_the_page_itself_may_ask_for_anything(served: tuple[Path, int, str]) -> None:
+def test_control_needs_token_origin_and_json(served: tuple[Path, int, str]) -> None:
     folder, port, token = served
-    assert wish(port, "") == 403
-    assert wish(port, token[:-1] + ("A" if token[-1] != "A" else "B")) == 403
+    assert post_control(port, "") == 403
+    assert post_control(port, token[:-1] + ("A" if token[-1] != "A" else "B")) == 403
     for origin in ("", "null", "http://evil.example", f"http://localhost:{port}", f"https://127.0.0.1:{port}"):
-        assert wish(port, token, Origin=origin) == 403
-    assert wish(port, token, Content_Type="text/plain") == 415
+        assert post_control(port, token, Origin=origin) == 403
+    assert post_control(port, token, Content_Type="text/plain") == 415
     assert not read_control(folder).paused
-    assert wish(port, token) == 204
+    assert post_control(port, token) == 204
     assert read_control(folder).paused
-    assert wish(port, token, {"action": "resume"}) == 204
+    assert post_control(port, token, {"action": "resume"}) == 204
 
 
-def test_a_name_that_was_made_to_point_here_is_refused(served: tuple[Path, int, str]) -> None:
+def test_foreign_host_header_is_refused(served: tuple[Path, int, str]) -> None:
     """DNS rebinding: the browser believes that the page and the server are one site."""
     _, port, token = served
     for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", ""):
         assert ask(port, "GET", "/run", Host=host)[0] in (400, 421)
-        assert not host or wish(port, token, Host=host, Origin=f"http://{host}") == 421
+        assert not host or post_control(port, token, Host=host, Origin=f"http://{host}") == 421
     assert ask(port, "GET", "/run", Host=f"localhost:{port}")[0] == 200
 
 
@@ -254,14 +254,14 @@ def test_a_name_that_was_made_to_point_here_is_refused(served: tuple[Path, int, 
         ({"action": "hint", "text": " \n "}, 409),
     ],
 )
-def test_what_is_no_wish_is_refused(served: tuple[Path, int, str], content: object, status: int) -> None:
+def test_invalid_control_requests_are_refused(served: tuple[Path, int, str], content: object, status: int) -> None:
     folder, port, token = served
     before = read_control(folder)
-    assert wish(port, token, content) == status
+    assert post_control(port, token, content) == status
     assert read_control(folder) == before
 
 
-def test_nothing_but_the_run_is_given_away(served: tuple[Path, int, str]) -> None:
+def test_unknown_paths_and_files_are_not_found(served: tuple[Path, int, str]) -> None:
     _, port, _ = served
     for path in ("/../config.yaml", "/config.yaml", "/%2e%2e/etc/passwd", "/file?design=0&format=../../config.yaml",
                  "/file?design=99&format=urdf", "/file", "/control"):  # fmt: skip
@@ -272,18 +272,18 @@ def test_nothing_but_the_run_is_given_away(served: tuple[Path, int, str]) -> Non
     assert len(ask(port, "GET", "/run?designs=10")[1]) < len(whole)
 
 
-def test_nothing_listens_beyond_the_loopback(served: tuple[Path, int, str]) -> None:
+def test_server_listens_on_loopback_only(served: tuple[Path, int, str]) -> None:
     _, port, _ = served
     listening = [c.laddr.ip for c in psutil.net_connections("inet") if c.status == "LISTEN" and c.laddr.port == port]
     assert listening == ["127.0.0.1"]
 
 
-def test_a_folder_without_a_run_is_said_at_once(tmp_path: Path) -> None:
+def test_live_refuses_a_folder_without_a_run(tmp_path: Path) -> None:
     assert "is not a run folder" in refused(1, "live", tmp_path)
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_the_server_in_order(tmp_path: Path) -> None:
+def test_ctrl_c_ends_the_server_cleanly(tmp_path: Path) -> None:
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
     with start("live", tmp_path / "run") as server:
         assert server.stdout is not None

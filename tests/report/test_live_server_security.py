@@ -22,7 +22,7 @@ from armwright.report.page import write_report
 from armwright.runs.control import read_control
 from tests.fuzz.targets import a_server
 from tests.support.browser import FLAGS, Tab, program
-from tests.support.live_server import ask, served, wish
+from tests.support.live_server import ask, post_control, served
 
 __all__ = ["served"]  # a fixture
 
@@ -58,7 +58,7 @@ def right(port: int, token: str) -> list[str]:
     return [f"Host: {host}", f"Origin: http://{host}", "Content-Type: application/json", f"X-Armwright-Token: {token}"]
 
 
-def test_every_answer_says_what_a_browser_may_do_with_it(served: tuple[Path, int, str]) -> None:
+def test_responses_have_security_headers(served: tuple[Path, int, str]) -> None:
     _, port, token = served
     host = f"Host: 127.0.0.1:{port}"
     for status, request in (
@@ -81,7 +81,7 @@ def test_every_answer_says_what_a_browser_may_do_with_it(served: tuple[Path, int
 
 
 @pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "BREW"])
-def test_only_a_post_is_a_wish(served: tuple[Path, int, str], method: str) -> None:
+def test_control_accepts_post_only(served: tuple[Path, int, str], method: str) -> None:
     folder, port, token = served
     before = read_control(folder)
     more = ["Access-Control-Request-Method: POST", "X-HTTP-Method-Override: POST", "Content-Length: 0"]
@@ -94,7 +94,7 @@ def test_only_a_post_is_a_wish(served: tuple[Path, int, str], method: str) -> No
     assert read_control(folder) == before
 
 
-def test_a_token_counts_only_where_the_page_puts_it(served: tuple[Path, int, str]) -> None:
+def test_token_counts_only_in_its_header(served: tuple[Path, int, str]) -> None:
     folder, port, token = served
     host, origin, kind, _ = right(port, token)
     length = "Content-Length: 18"
@@ -122,7 +122,7 @@ def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_two_hosts_are_none(served: tuple[Path, int, str], first: bool) -> None:
+def test_two_host_headers_are_refused(served: tuple[Path, int, str], first: bool) -> None:
     folder, port, token = served
     hosts = [f"Host: 127.0.0.1:{port}", "Host: evil.example"][:: 1 if first else -1]
     origin = f"Origin: http://{hosts[0].partition(': ')[2]}"
@@ -145,7 +145,7 @@ PATHS = (
 
 
 @pytest.mark.parametrize("path", PATHS)
-def test_no_path_leads_to_a_file(served: tuple[Path, int, str], path: str) -> None:
+def test_paths_do_not_reach_files(served: tuple[Path, int, str], path: str) -> None:
     _, port, _ = served
     status, _, body = said(port, lines(f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{port}"))
     assert status in (400, 404)
@@ -153,7 +153,7 @@ def test_no_path_leads_to_a_file(served: tuple[Path, int, str], path: str) -> No
     assert b"root:" not in body
 
 
-def test_a_body_without_an_end_is_refused_before_it_ends(served: tuple[Path, int, str]) -> None:
+def test_endless_body_is_refused_early(served: tuple[Path, int, str]) -> None:
     folder, port, token = served
     server = next(c.pid for c in psutil.net_connections("inet") if c.laddr.port == port and c.status == "LISTEN")
     before = psutil.Process(server).memory_info().rss
@@ -168,14 +168,14 @@ def test_a_body_without_an_end_is_refused_before_it_ends(served: tuple[Path, int
     assert not read_control(folder).paused
 
 
-def test_slow_ones_keep_nobody_waiting(served: tuple[Path, int, str]) -> None:
+def test_slow_clients_do_not_block_others(served: tuple[Path, int, str]) -> None:
     folder, port, token = served
     begun = lines("POST /control HTTP/1.1", *right(port, token), "Content-Length: 18") + b'{"action":'
     slow = [socket.create_connection(("127.0.0.1", port), timeout=20) for _ in range(50)]
     for number, connection in enumerate(slow):
         connection.sendall(begun if number % 2 else begun[:30])
     assert ask(port, "GET", "/run")[0] == 200
-    assert wish(port, token, {"action": "resume"}) == 204
+    assert post_control(port, token, {"action": "resume"}) == 204
     for connection in slow:
         connection.close()
     assert ask(port, "GET", "/run")[0] == 200
@@ -227,7 +227,7 @@ ATTACK = """async (home) => {
 }"""
 
 
-def test_another_page_of_the_browser_gets_nothing(served: tuple[Path, int, str], browser: Browser, evil: str) -> None:
+def test_cross_origin_page_gets_nothing(served: tuple[Path, int, str], browser: Browser, evil: str) -> None:
     folder, port, _ = served
     before = read_control(folder)
     tab = Tab(browser)
@@ -244,7 +244,7 @@ def test_another_page_of_the_browser_gets_nothing(served: tuple[Path, int, str],
     tab.close()
 
 
-def test_a_name_that_is_made_to_point_here_shows_nothing(served: tuple[Path, int, str], browser: Browser) -> None:
+def test_dns_rebinding_shows_nothing(served: tuple[Path, int, str], browser: Browser) -> None:
     """DNS rebinding in a real browser: to it, evil.example is this server."""
     _, port, _ = served
     rebound = browser.browser_type.launch(
@@ -259,7 +259,7 @@ def test_a_name_that_is_made_to_point_here_shows_nothing(served: tuple[Path, int
     rebound.close()
 
 
-def test_names_in_a_run_folder_are_no_markup(tmp_path: Path, browser: Browser) -> None:
+def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> None:
     """Of objectives, sources, faults, arms, and the folder itself: somebody sends a run folder to look at."""
     folder = tmp_path / re.sub("[/]", "", LINK)[:60]
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="rules", n_init=3, n_step=2, n_total=4, out=folder)

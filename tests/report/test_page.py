@@ -72,7 +72,7 @@ def isolated(tab: Tab, history: History) -> int:
     return inside[int(np.argmax(apart))]
 
 
-def test_it_opens_without_a_network_and_asks_for_nothing(run: Path, tab: Tab) -> None:
+def test_page_opens_offline_without_requests(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html")
     assert tab.requests == [(run / "report.html").resolve().as_uri()]
     assert tab.faults == []
@@ -84,7 +84,7 @@ def test_it_opens_without_a_network_and_asks_for_nothing(run: Path, tab: Tab) ->
     assert tab.text("#repeat code") == "armwright optimize target-2 --proposer rules --n-total 40 --seed 1"
 
 
-def test_nothing_on_it_sends_the_run_anywhere(run: Path, tab: Tab) -> None:
+def test_page_sends_nothing(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html")
     names = tab.page.locator("[data-title], [aria-label], button").evaluate_all(
         "all => all.map((one) => "
@@ -94,7 +94,7 @@ def test_nothing_on_it_sends_the_run_anywhere(run: Path, tab: Tab) -> None:
     assert not [name for name in names if re.search("share|cloud|upload|edit in", name, re.IGNORECASE)]
 
 
-def test_playing_goes_on_whatever_is_selected(run: Path, tab: Tab) -> None:
+def test_playback_continues_after_a_selection(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html", "#design=12&target=1")
     tab.page.locator("#play").click()
     tab.ask("armwright.set({ design: 20 })")
@@ -103,7 +103,7 @@ def test_playing_goes_on_whatever_is_selected(run: Path, tab: Tab) -> None:
     tab.page.locator("#play").click()
 
 
-def test_a_front_beyond_the_reference_box_is_seen(tmp_path: Path, tab: Tab) -> None:
+def test_front_outside_the_reference_box_is_shown(tmp_path: Path, tab: Tab) -> None:
     task = aw.load_task("target-1").model_copy(update={"name": "far", "reference_point": (0.01, 0.01)})
     aw.optimize(aw.Problem(task=task), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
     tab.open(write_report(tmp_path / "run"))
@@ -113,7 +113,7 @@ def test_a_front_beyond_the_reference_box_is_seen(tmp_path: Path, tab: Tab) -> N
     assert tab.text("#repeat code").startswith("armwright optimize TASK.yaml ")
 
 
-def test_its_policy_names_its_own_scripts_alone(run: Path, tab: Tab) -> None:
+def test_content_security_policy_allows_own_scripts_only(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html")
     text = (run / "report.html").read_text()
     (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
@@ -127,7 +127,7 @@ def test_its_policy_names_its_own_scripts_alone(run: Path, tab: Tab) -> None:
     assert tab.ask("window.hacked") is None
 
 
-def test_a_click_on_a_point_shows_that_arm(run: Path, tab: Tab, history: History) -> None:
+def test_clicking_a_point_shows_its_arm(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
     number = isolated(tab, history)
     tab.page.mouse.click(*place_of(tab, number))
@@ -141,7 +141,7 @@ def test_a_click_on_a_point_shows_that_arm(run: Path, tab: Tab, history: History
     assert f"#design={number}&target=5" in tab.page.url
 
 
-def test_its_numbers_are_those_of_the_kernels(run: Path, tab: Tab, history: History) -> None:
+def test_page_kinematics_match_the_kernels(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
     for number in (0, 17, 40):
         told, evaluation = tab.ask(f"armwright.postures({number})"), history.evaluation([number])
@@ -150,7 +150,7 @@ def test_its_numbers_are_those_of_the_kernels(run: Path, tab: Tab, history: Hist
         assert torques == pytest.approx(evaluation.joint_torques[0], abs=1e-5 * np.abs(torques).max())
 
 
-def test_stepping_through_the_targets(run: Path, tab: Tab) -> None:
+def test_stepper_visits_all_targets(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html", "#design=12&target=9")
     assert tab.text("#target-words").startswith("Target 9 of 9")
     tab.page.locator("#next").click()
@@ -162,7 +162,7 @@ def test_stepping_through_the_targets(run: Path, tab: Tab) -> None:
     assert tab.page.locator("#postures tr.chosen td").first.inner_text() == "2"
 
 
-def test_a_deep_link_and_one_that_leads_nowhere(run: Path, tab: Tab) -> None:
+def test_valid_and_invalid_deep_links(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html", "#design=23&target=4")
     assert tab.ask("[armwright.state.design, armwright.state.target]") == [23, 3]
     tab.page.evaluate("location.hash = '#design=7&target=2'")
@@ -174,7 +174,7 @@ def test_a_deep_link_and_one_that_leads_nowhere(run: Path, tab: Tab) -> None:
     assert tab.faults == []
 
 
-def test_the_slider_shows_earlier_iterations(run: Path, tab: Tab, history: History) -> None:
+def test_slider_shows_earlier_iterations(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
     tab.page.locator("#iteration").fill("14")
     assert tab.text("#iteration-value") == "14"
@@ -190,7 +190,7 @@ def test_the_slider_shows_earlier_iterations(run: Path, tab: Tab, history: Histo
     assert tab.text("#iteration-value") == "40"
 
 
-def test_what_is_downloaded_loads(run: Path, tab: Tab, history: History) -> None:
+def test_downloaded_files_load(run: Path, tab: Tab, history: History) -> None:
     number = history.front[0].number
     tab.open(run / "report.html", f"#design={number}")
     files = {}
@@ -209,7 +209,7 @@ def test_what_is_downloaded_loads(run: Path, tab: Tab, history: History) -> None
     assert [float(row["position_error"]) for row in rows] == pytest.approx(evaluation.position_error[0], abs=1e-5)
 
 
-def test_a_design_that_is_not_on_the_front_has_numbers_and_no_files(run: Path, tab: Tab, history: History) -> None:
+def test_design_off_the_front_has_values_but_no_files(run: Path, tab: Tab, history: History) -> None:
     front = {member.number for member in history.front}
     tab.open(run / "report.html", f"#design={next(n for n in range(50) if n not in front)}")
     assert tab.page.get_by_role("button", name="URDF").is_disabled()
@@ -217,7 +217,7 @@ def test_a_design_that_is_not_on_the_front_has_numbers_and_no_files(run: Path, t
     assert "Not on the Pareto front" in tab.text("#design-words")
 
 
-def test_infeasible_designs_are_hollow_on_no_front_and_say_what_they_break(tmp_path: Path, tab: Tab) -> None:
+def test_infeasible_designs_are_hollow_and_list_violations(tmp_path: Path, tab: Tab) -> None:
     task = aw.load_task("target-2").model_copy(update={"constraints": ("worst_error <= 0.4", "length >= 0.5")})
     history = aw.optimize(aw.Problem(task=task), proposer="none", n_total=30, seed=1, out=tmp_path / "run").history
     tab.open(write_report(tmp_path / "run"))
@@ -243,7 +243,7 @@ def test_infeasible_designs_are_hollow_on_no_front_and_say_what_they_break(tmp_p
     assert tab.faults == []
 
 
-def test_the_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: History) -> None:
+def test_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
     numbers = [int(text) for text in tab.page.locator("#table tbody tr td:first-child").all_inner_texts()]
     assert numbers == [member.number for member in history.front]  # by rising position error
@@ -263,7 +263,7 @@ def test_the_table_sorts_and_selects_by_keyboard(run: Path, tab: Tab, history: H
 
 
 def asked(tab: Tab, where: str = "", by: str = "the knee", weights: str = "", robust: bool = False) -> list[int]:
-    """The designs of the table, in its order, after a wish was typed in."""
+    """The designs of the table, in its order, after a query was typed in."""
     page = tab.page
     page.locator("#pick-where").fill(where)
     page.locator("#pick-by").select_option(label=by)
@@ -280,7 +280,7 @@ def picked(run: Path, *conditions: str, **wishes: Any) -> list[int]:
     return [member.number for member in members]
 
 
-def test_picking_in_the_page_is_picking_in_a_terminal(run: Path, tab: Tab) -> None:
+def test_page_pick_matches_the_pick_command(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html")
     assert tab.ask("armwright.state.design") == picked(run)[0]  # it begins with the knee
     assert asked(tab) == picked(run)
@@ -295,18 +295,18 @@ def test_picking_in_the_page_is_picking_in_a_terminal(run: Path, tab: Tab) -> No
     assert tab.text("#pick-words").endswith(
         'armwright pick RUN --where "torque<4.5" --weights position_error=2,torque=1'
     )
-    tab.page.get_by_role("button", name="All again").click()
+    tab.page.get_by_role("button", name="Show all").click()
     assert tab.page.locator("#table tbody tr").count() == len(picked(run))
 
 
-def test_why_nothing_was_picked(run: Path, tab: Tab, history: History) -> None:
+def test_page_pick_explains_empty_results(run: Path, tab: Tab, history: History) -> None:
     tab.open(run / "report.html")
     before = tab.page.locator("#table tbody tr").count()
     asked(tab, "torque<100, position_error<=1e-6")
     least = float(re.findall(r"the nearest has ([\d.]+)\.", tab.text("#pick-words"))[0])
     assert least == pytest.approx(min(member.values[0] for member in history.front), rel=1e-3)
     asked(tab, "mas<2")
-    assert 'no number "mas"' in tab.text("#pick-words")
+    assert 'Unknown quantity "mas"' in tab.text("#pick-words")
     asked(tab, "torque")
     assert "such as mass<=2.5" in tab.text("#pick-words")
     asked(tab, by="weights", weights="torque=0")
@@ -315,7 +315,7 @@ def test_why_nothing_was_picked(run: Path, tab: Tab, history: History) -> None:
     assert tab.faults == []
 
 
-def test_two_designs_side_by_side(run: Path, tab: Tab) -> None:
+def test_comparing_two_designs(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html", "#design=12")
     tab.page.get_by_role("button", name="Compare").click()
     tab.ask("armwright.set({ design: 20 })")
@@ -325,7 +325,7 @@ def test_two_designs_side_by_side(run: Path, tab: Tab) -> None:
     assert tab.ask("armwright.state.compared") is None
 
 
-def test_without_webgl_everything_else_works(run: Path, browser: Browser, history: History) -> None:
+def test_page_works_without_webgl(run: Path, browser: Browser, history: History) -> None:
     tab = Tab(browser, offline=True)
     tab.context.add_init_script(
         "HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, "
@@ -341,7 +341,7 @@ def test_without_webgl_everything_else_works(run: Path, browser: Browser, histor
     tab.close()
 
 
-def test_words_of_others_stay_words(tmp_path: Path, tab: Tab, chat_server: ChatServer) -> None:
+def test_markup_in_answers_is_escaped(tmp_path: Path, tab: Tab, chat_server: ChatServer) -> None:
     task = aw.Task(name="evil", targets=aw.load_task("target-1").targets, description=HOSTILE, provenance=HOSTILE)
     best = dict(known_front(aw.Problem(task=task)).designs[0].params)
     answer = json.dumps({**best, "reason": HOSTILE})
@@ -363,7 +363,7 @@ def test_words_of_others_stay_words(tmp_path: Path, tab: Tab, chat_server: ChatS
     assert tab.requests == [(tmp_path / "run" / "report.html").resolve().as_uri()]
 
 
-def test_a_search_for_the_whole_front(tmp_path: Path, tab: Tab) -> None:
+def test_page_of_a_front_search(tmp_path: Path, tab: Tab) -> None:
     run = aw.find_front(aw.Problem(task=aw.load_task("target-3")), budget=3000, out=tmp_path / "front")
     tab.open(write_report(tmp_path / "front"))
     assert f"{run.summary['hypervolume']['final']:.4g}" in tab.text("#facts")
@@ -374,7 +374,7 @@ def test_a_search_for_the_whole_front(tmp_path: Path, tab: Tab) -> None:
     assert tab.faults == []
 
 
-def test_of_three_objectives_any_two_are_shown(tmp_path: Path, tab: Tab) -> None:
+def test_any_two_of_three_objectives_are_shown(tmp_path: Path, tab: Tab) -> None:
     task = aw.load_task("target-1").model_copy(
         update={
             "name": "three",
@@ -398,7 +398,7 @@ def test_of_three_objectives_any_two_are_shown(tmp_path: Path, tab: Tab) -> None
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 900])
-def test_it_fits_small_screens(run: Path, browser: Browser, width: int, scheme: str) -> None:
+def test_page_fits_small_screens(run: Path, browser: Browser, width: int, scheme: str) -> None:
     tab = Tab(browser, viewport={"width": width, "height": 800}, color_scheme=scheme, offline=True)
     tab.open(run / "report.html")
     assert tab.ask("document.documentElement.scrollWidth") <= width
@@ -409,7 +409,7 @@ def test_it_fits_small_screens(run: Path, browser: Browser, width: int, scheme: 
 
 
 @pytest.mark.slow
-def test_ten_thousand_designs(tmp_path: Path, tab: Tab) -> None:
+def test_page_with_ten_thousand_designs(tmp_path: Path, tab: Tab) -> None:
     rng = np.random.default_rng(1)
     points = np.round(rng.uniform([-0.6, -0.6, 0.0], [0.6, 0.6, 0.8], (20, 3)), 3)
     task = aw.Task(name="twenty", targets=tuple(map(tuple, points.tolist())), reference_point=(12.5, 12.5))
@@ -427,7 +427,7 @@ def test_ten_thousand_designs(tmp_path: Path, tab: Tab) -> None:
     assert tab.faults == []
 
 
-def test_a_run_without_a_trial_has_nothing_to_report(run: Path, tmp_path: Path) -> None:
+def test_report_without_trials_is_refused(run: Path, tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text())
     with pytest.raises(RunFolderError, match="nothing to report"):
         write_report(tmp_path)
@@ -435,7 +435,7 @@ def test_a_run_without_a_trial_has_nothing_to_report(run: Path, tmp_path: Path) 
         write_report(tmp_path / "nowhere")
 
 
-def test_an_unfinished_run_can_be_looked_at(run: Path, tmp_path: Path, tab: Tab) -> None:
+def test_unfinished_run_is_shown(run: Path, tmp_path: Path, tab: Tab) -> None:
     lines = (run / "trials.jsonl").read_bytes().splitlines(keepends=True)
     (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text())
     (tmp_path / "trials.jsonl").write_bytes(b"".join(lines[:20]) + lines[20][:30])
@@ -444,6 +444,6 @@ def test_an_unfinished_run_can_be_looked_at(run: Path, tmp_path: Path, tab: Tab)
     assert tab.ask("armwright.content.n") == 20
 
 
-def test_each_module_is_a_function_of_its_own() -> None:
+def test_page_modules_are_wrapped_in_functions() -> None:
     """What the page runs is what its modules say: nothing of import and export is left."""
     assert not re.search(r"^\s*(import|export) ", program(), re.MULTILINE)

@@ -51,7 +51,7 @@ def ask(port: int, method: str, path: str, body: bytes | None = None, **headers:
     return found
 
 
-def wish(port: int, token: str, content: object = None, **headers: str) -> int:
+def post_control(port: int, token: str, content: object = None, **headers: str) -> int:
     """What the server says to a POST that is right but for these headers."""
     right = {"Origin": f"http://127.0.0.1:{port}", "Content_Type": "application/json", "X_Armwright_Token": token}
     body = content if isinstance(content, bytes) else json.dumps(content or {"action": "pause"}).encode()

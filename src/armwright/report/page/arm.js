@@ -4,7 +4,7 @@ import { missWords, postures, why } from "./design.js";
 import { PRISMATIC, chain, length, rail } from "./kinematics.js";
 import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
-import { $, colour, element, number, onTheme, shown } from "./words.js";
+import { $, colour, element, number, onTheme, shown } from "./format.js";
 
 const CELLS = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // m, sides of the grid's cells
 const MOST_CELLS = 16; // along one side
@@ -221,8 +221,8 @@ function drawFloor() {
     groups.floor.add(segments([...corner, ...end], new THREE.LineBasicMaterial({ color: colour("soft") })));
     groups.floor.add(label(axis, place));
   }
-  const where = isSeen ? "the axes stand at the world's origin" : "the axes stand at the grid's corner, not at the world's origin";
-  $("arm-note").textContent = `Grid of ${number(cell)} m; ${where}; z is up. Drag turns, wheel or two fingers zoom, arrow keys step through the targets.`;
+  const where = isSeen ? "the axes are at the world's origin" : "the axes are at the grid's corner, not at the world's origin";
+  $("arm-note").textContent = `Grid of ${number(cell)} m; ${where}; z is up. Drag to rotate; use the wheel or two fingers to zoom, and the arrow keys to step through the targets.`;
 }
 
 function segments(points, material) {

@@ -1,7 +1,7 @@
 // The hypervolume over the iterations, and who gained what.
 
 import { set } from "./state.js";
-import { $, colour, element, isTouched, number, onTheme, percent, plain } from "./words.js";
+import { $, colour, element, isTouched, number, onTheme, percent, plain } from "./format.js";
 
 const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
 
@@ -20,7 +20,7 @@ export function openCurve(shownContent) {
 
 export function drawCurve() {
   $("curve-box").querySelector("h2").textContent =
-    content.head.study ? "Hypervolume, and who enlarged it" : "Hypervolume";
+    content.head.study ? "Hypervolume by source" : "Hypervolume";
   const search = content.head.result.search;
   const traces = search ? ofSearch(search) : ofStudy();
   const best = content.head.best_known;

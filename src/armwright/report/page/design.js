@@ -2,7 +2,7 @@
 
 import { angleOff, chain, distance, holding, length, linkLength, reach } from "./kinematics.js";
 import { listen, set, state } from "./state.js";
-import { $, element, metres, millimetres, number, save } from "./words.js";
+import { $, element, metres, millimetres, number, save } from "./format.js";
 
 const AT_LIMIT = 1e-3; // rad or m
 const TYPES = { urdf: "application/xml", mjcf: "application/xml", csv: "text/csv" };
@@ -44,7 +44,7 @@ export function missWords(one) {
 
 const degrees = (angle) => `${number((180 * angle) / Math.PI, 3)}°`;
 
-// Why a target is missed: as armwright/misses.py has it.
+// Why a target is missed: as problem/miss_reasons.py has it.
 export function why(arm, one) {
   const beyond = distance(one.target, arm.base) - reach(arm);
   const reasons = beyond > 0 ? [`out of reach by ${millimetres(beyond)}`] : [];
@@ -84,15 +84,15 @@ export function drawDesign() {
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
   for (const button of document.querySelectorAll(".download")) {
     button.disabled = button.dataset.format !== "csv" && !hasFiles;
-    button.title = button.disabled ? "Files are kept for the designs of the front" : `Download #${i} as ${button.textContent}`;
+    button.title = button.disabled ? "Files are available for the designs of the front" : `Download #${i} as ${button.textContent}`;
   }
   const scale = head.torque_scale === null ? "" : ` The torque objective is ${head.torque_scale} times their norm, summed.`;
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
   const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.description).join("; ")}.` : "";
   const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.description).join("; ")}.` : "";
   const lines = head.moves.length ? ` Straight moves between targets: ${head.moves.map(([a, b]) => `${a + 1} to ${b + 1}`).join(", ")}.` : "";
-  const cases = head.cases ? ` Objectives are the worst of the task as it stands, ${head.cases}; all else is of the task as it stands.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", ways of sliding joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${solids}${lines}${boxes}`;
+  const cases = head.cases ? ` Objectives are the worst of the nominal task and ${head.cases}; everything else is of the nominal task.` : "";
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${solids}${lines}${boxes}`;
 }
 
 // What the design has where it is bounded.
@@ -109,7 +109,7 @@ function drawLinks(arm) {
   const { joint } = content.head.colours;
   $("links").replaceChildren(...Array.from(arm.axis, (axis, j) => {
     const long = linkLength(arm, j);
-    const moves = [`turns about ${"xyz"[axis]}`, `slides along ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
+    const moves = [`rotates about ${"xyz"[axis]}`, `slides along ${"xyz"[axis]}`, "fixed"][arm.kind[j]];
     const word = content.joints(state.design), letter = word.length === arm.axis.length ? word[j] : ["RPY"[axis], "slide", "F"][arm.kind[j]];
     const bar = element("div", { title: `Link ${j + 1}: ${millimetres(long)}, after joint ${j + 1} (${moves} at first)` },
       `${letter} ${millimetres(long)}`);
@@ -172,7 +172,7 @@ async function download(format) {
     try {
       save(name, content.head.files[i]?.[format] ?? (await fetchFile(i, format)), TYPES[format]);
     } catch (fault) {
-      $("design-note").textContent = `The file did not come: ${fault.message}.`;
+      $("design-note").textContent = `The download failed: ${fault.message}.`;
     }
   }
 }

@@ -1,6 +1,6 @@
-// What run this is, and what it came to.
+// The run's title, its key figures and its configuration.
 
-import { $, duration, element, number, percent, plural } from "./words.js";
+import { $, duration, element, number, percent, plural } from "./format.js";
 
 let content = null;
 
@@ -62,6 +62,6 @@ export function drawConfiguration() {
   walk("", head.config);
   $("configuration-box").hidden = false;
   $("configuration").replaceChildren(element("p", { class: "note" }, `Run folder ${head.folder}. ${head.masses}.`), list);
-  const how = $("content") ? "One file, which needs no network." : "Live; report.html in the run folder shows the same without a server.";
+  const how = $("content") ? "This file works without a network." : "Live page; report.html in the run folder shows the same without a server.";
   $("footer").textContent = `Made by armwright ${head.config.versions.armwright ?? ""} from the run folder ${head.folder}. ${how}`;
 }

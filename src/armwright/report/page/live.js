@@ -1,6 +1,6 @@
 // The same page while the run goes on: asks its server for what is new, and sends what the user wants.
 
-import { $, duration, element } from "./words.js";
+import { $, duration, element } from "./format.js";
 
 const AGAIN = 1000; // ms until a lost server is asked again
 
@@ -91,15 +91,15 @@ async function catchUp() {
   }
 }
 
-async function send(wish) {
+async function send(request) {
   try {
     const reply = await fetch("control", {
-      method: "POST", headers: { "content-type": "application/json", "x-armwright-token": token }, body: JSON.stringify(wish),
+      method: "POST", headers: { "content-type": "application/json", "x-armwright-token": token }, body: JSON.stringify(request),
     });
-    complain("refusal", reply.ok ? "" : `That was refused: ${await reply.text()}.`);
+    complain("refusal", reply.ok ? "" : `Refused: ${await reply.text()}.`);
     return reply.ok;
   } catch {
-    complain("refusal", "That did not reach the run.");
+    complain("refusal", "The request did not reach the server.");
     return false;
   }
 }
@@ -117,7 +117,7 @@ function doing() {
     case "evaluating":
       return status.designs < status.planned ? `evaluating ${status.designs + 1} of ${status.planned}` : "writing the results";
     case "paused": return `paused for ${since()}, at ${status.designs} of ${status.planned}`;
-    case "stopped": return `stopped at ${status.designs} of ${status.planned}; the same command goes on`;
+    case "stopped": return `stopped at ${status.designs} of ${status.planned}; repeat the command to resume`;
     case "finished": return `finished: ${status.designs} designs`;
     default: return `not running, at ${status.designs}${status.planned ? ` of ${status.planned}` : ""}`;
   }
@@ -125,7 +125,7 @@ function doing() {
 
 function show() {
   const isOver = lost || !["asking", "evaluating", "paused"].includes(status?.doing);
-  if (lost && status?.doing !== "finished") $("doing").textContent = "No connection to the run; trying again …";
+  if (lost && status?.doing !== "finished") $("doing").textContent = "Connection lost; trying again …";
   else if (status !== null) $("doing").textContent = doing();
   if (status === null) return;
   $("progress").hidden = !status.planned;
@@ -140,5 +140,5 @@ function show() {
   complain("fault", status.fault ? `last fault: ${status.fault}` : "");
   const used = status.hints.filter((hint) => hint.used !== null), waiting = status.hints.filter((hint) => hint.used === null);
   $("hints").replaceChildren(...[...used.slice(-1), ...waiting].map((hint) => element("li", {},
-    hint.used === null ? "waits for the next question: " : `used at iteration ${hint.used}: `, element("em", {}, hint.text))));
+    hint.used === null ? "waiting for the next prompt: " : `used at iteration ${hint.used}: `, element("em", {}, hint.text))));
 }

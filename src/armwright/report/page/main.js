@@ -11,7 +11,7 @@ import { drawPick, forget, openPick, ranked } from "./pick.js";
 import { fromAddress, keepAddress, set, state } from "./state.js";
 import { drawTable, openTable } from "./table.js";
 import { drawTranscript, openTranscript } from "./transcript.js";
-import { $ } from "./words.js";
+import { $ } from "./format.js";
 
 const content = new Content();
 let isOpen = false;

@@ -1,7 +1,7 @@
 // The designs in the plane of two objectives: who found them, their front, and which one is selected.
 
 import { listen, set, state } from "./state.js";
-import { $, colour, element, isTouched, number, onTheme, plain, plural, title } from "./words.js";
+import { $, colour, element, isTouched, number, onTheme, plain, plural, title } from "./format.js";
 
 const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
 const VIEW = 1.35; // of the reference point, the part of the plane that is shown first
@@ -202,9 +202,9 @@ function draw() {
   if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
   for (const arm of content.head.existing_arms) notes.push(existingWords(arm, high));
-  if (many) notes.push("Large: on the front in all objectives; in this plane others may lie before them.");
+  if (many) notes.push("Large: on the front in all objectives; other designs may dominate them in this plane.");
   if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
-  if (content.head.is_toy) notes.push("Toy masses: torques compare designs, and say nothing of motors.");
+  if (content.head.is_toy) notes.push("Toy masses: use torques to compare designs, not to choose motors.");
   $("pareto-note").textContent = notes.join(" ");
 }
 
@@ -212,7 +212,7 @@ function draw() {
 function existingWords(arm, high) {
   const [u, v] = [arm.values[x], arm.values[y]];
   const place = high(x) !== undefined && (u > high(x) || v > high(y)) ? ` lies outside this view, at ${number(u)}, ${number(v)};` : ":";
-  if (u === null || v === null) return `${arm.name}: not comparable, as it does not state all of these numbers.`;
+  if (u === null || v === null) return `${arm.name}: not comparable, because some of these values are unknown.`;
   return `${arm.name}${place} ${standing(arm)}.`;
 }
 

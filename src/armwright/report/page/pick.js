@@ -1,8 +1,8 @@
-// Choosing a design of the front by conditions and one wish, as `armwright pick` does (decision.py).
+// Choose a design of the front by conditions and a ranking, as `armwright pick` does (runs/selection.py).
 
 import { set } from "./state.js";
 import { show } from "./table.js";
-import { $, number, plural } from "./words.js";
+import { $, number, plural } from "./format.js";
 
 const NUMBER = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][-+]?\\d+)?";
 const CONDITION = new RegExp(`^\\s*([A-Za-z_]\\w*)\\s*(<=|>=|<|>)\\s*(${NUMBER})\\s*$`);
@@ -69,14 +69,14 @@ export function ranked(shownContent, numbers) {
 const split = (text) => text.split(",").filter((part) => part.trim());
 
 function known(name, allowed) {
-  if (!allowed.includes(name)) throw new Error(`A design has no number "${name}". There are: ${allowed.join(", ")}`);
+  if (!allowed.includes(name)) throw new Error(`Unknown quantity "${name}"; available: ${allowed.join(", ")}`);
   return name;
 }
 
 function conditions() {
   return split($("pick-where").value).map((part) => {
     const found = CONDITION.exec(part);
-    if (!found) throw new Error(`"${part.trim()}": a name, one of <= < >= >, and a number are needed, such as mass<=2.5`);
+    if (!found) throw new Error(`"${part.trim()}": expected a name, one of <= < >= >, and a number, such as mass<=2.5`);
     return { name: known(found[1], names), relation: found[2], bound: Number(found[3]) };
   });
 }
@@ -84,10 +84,10 @@ function conditions() {
 function weights() {
   const said = new Map(split($("pick-weights").value).map((part) => {
     const found = WEIGHT.exec(part);
-    if (!found || !(Number(found[2]) >= 0)) throw new Error(`"${part.trim()}": names with numbers are needed, such as position_error=2, torque=1`);
+    if (!found || !(Number(found[2]) >= 0)) throw new Error(`"${part.trim()}": expected names with weights, such as position_error=2, torque=1`);
     return [known(found[1], content.objectives.map((o) => o.name)), Number(found[2])];
   }));
-  if (![...said.values()].some((weight) => weight > 0)) throw new Error("At least one weight must be above 0.");
+  if (![...said.values()].some((weight) => weight > 0)) throw new Error("Expected at least one weight above 0.");
   return said;
 }
 
@@ -112,7 +112,7 @@ function nearestMiss(asked, told) {
     const nearest = relation.startsWith("<") ? Math.min(...values) : Math.max(...values);
     return `No design of the front has ${name} ${relation} ${bound}; the nearest has ${number(nearest)}.`;
   }
-  return "No design of the front meets all of these conditions at once.";
+  return "No design of the front meets all conditions at once.";
 }
 
 function choose() {

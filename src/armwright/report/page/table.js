@@ -2,7 +2,7 @@
 
 import { showRow } from "./design.js";
 import { listen, set, state } from "./state.js";
-import { $, element, metres, number, plural } from "./words.js";
+import { $, element, metres, number, plural } from "./format.js";
 
 let content = null;
 let sorted = { key: "0", up: true };
@@ -25,7 +25,7 @@ function columns() {
     })),
   ];
   if (head.result.robust !== null) {
-    made.push({ key: "robust", name: "verdict", text: true, value: (i) => (content.isRobust(i) ? "robust" : "sensitive") });
+    made.push({ key: "robust", name: "robustness", text: true, value: (i) => (content.isRobust(i) ? "robust" : "sensitive") });
   }
   made.push({ key: "joints", name: "joints", text: true, value: (i) => content.joints(i) });
   if (head.parameters.some((p) => p.name === "mount")) {

@@ -1,9 +1,9 @@
 // What was asked and answered for the selected design, or for all.
 
 import { listen, state } from "./state.js";
-import { $, duration, element, number } from "./words.js";
+import { $, duration, element, number } from "./format.js";
 
-const STEPS = { reasoning: "thoughts", parameters: "thoughts into parameters", answer: "answer", check: "check" };
+const STEPS = { reasoning: "reasoning", parameters: "parameters from the reasoning", answer: "answer", check: "check" };
 const FAULTS = { true: "failed", false: "" };
 
 let content = null;
@@ -33,10 +33,10 @@ function words() {
   const i = state.design, said = content.proposals[i];
   if (i === null) return "Select a design.";
   if (said?.refines !== null && said?.refines !== undefined) return `#${i} is design #${said.refines}, refined.`;
-  if (said?.fault) return `At #${i} a proposal was due and failed (${said.fault}); the black box took its place.`;
-  if (!said) return `#${i} was found by: ${content.look(i).label}; nobody gave words for it.`;
+  if (said?.fault) return `The proposal for #${i} failed (${said.fault}); the black box replaced it.`;
+  if (!said) return `#${i}, source: ${content.look(i).label}; no reason is given.`;
   const expected = said.expected ? ` Expected: ${said.expected.map((value) => number(value)).join(", ")}.` : "";
-  return `#${i}, by ${content.look(i).label}: ${said.reason || "no reason was given"}.${expected}`.replace("..", ".");
+  return `#${i}, by ${content.look(i).label}: ${said.reason || "no reason is given"}.${expected}`.replace("..", ".");
 }
 
 function told(call) {
