@@ -1,4 +1,4 @@
-"""Hints that wait for a question to go with."""
+"""Hints of the user that wait for the next question to a model."""
 
 import threading
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from armwright.runs.control import ControlFile, Hint
 
 
 class Hints:
-    """The hints of a run, each for one question; several threads may ask at a time."""
+    """The hints of a run, each for one question; safe to use from several threads."""
 
     def __init__(self, folder: Path | None) -> None:
         self._control = ControlFile(folder)
@@ -17,14 +17,14 @@ class Hints:
         self._lock = threading.Lock()
 
     def take(self, transcript: Transcript) -> tuple[Hint, ...]:
-        """Those that no call has used; as long as they are not given back, no other question gets them."""
+        """Take the unused hints; no other question gets them until they are given back."""
         with self._lock:
-            gone = self._under_way | used_hints(transcript.calls).keys()
-            taken = tuple(hint for hint in self._control.read().hints if hint not in gone)
+            used = self._under_way | used_hints(transcript.calls).keys()
+            taken = tuple(hint for hint in self._control.read().hints if hint not in used)
             self._under_way.update(taken)
         return taken
 
     def give_back(self, hints: Iterable[Hint]) -> None:
-        """The question that they went with has ended; the transcript says whether it used them."""
+        """Return hints after their question has ended; the transcript shows whether they were used."""
         with self._lock:
             self._under_way.difference_update(hints)

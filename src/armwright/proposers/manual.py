@@ -1,4 +1,4 @@
-"""People as a proposer: for a model that can be used only through its web page, or for a designer's own ideas."""
+"""Manual answers as a proposer: from a model's web page, or a designer's own ideas."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ class ManualProposer(PromptedProposer):
         wait: Wait for an answer; if false, raise AnswerPendingError. The same call continues once it is there.
     """
 
-    overlaps = False  # a person answers one question at a time, and may be days over it
+    overlaps = False  # a person answers one question at a time, and may take days
 
     def __init__(self, folder: str | Path, options: PromptOptions | None = None, *, wait: bool = True) -> None:
         if Path(folder).exists() and not Path(folder).is_dir():
@@ -30,17 +30,17 @@ class ManualProposer(PromptedProposer):
         super().__init__(self.manual, answers, "manual")
 
     def check(self) -> None:
-        """Nobody is asked before there is a question."""
+        """Check nothing: nobody is asked before the first question."""
 
     def announce(self, number: int) -> str:
-        """Which file waits for which, as long as there is no answer."""
-        asked, answer = self.manual.files(number)
+        """Name the files of the question and of its answer, until it is answered."""
+        question, answer = self.manual.files(number)
         if self.manual.is_answered(number):
             return ""
-        return f"{asked} waits for your answer in {answer}"
+        return f"{question} waits for your answer in {answer}"
 
     def ask_designs(self, question: Question, problem: Problem) -> Reply:
-        """The answer's designs; what is refused is put aside with the reason, and another answer is waited for."""
+        """Wait for an answer with designs; a refused answer is set aside with the reason."""
 
         def read(text: str) -> str:
             return written_answers(read_text(text, problem, self.options.proposals), problem)

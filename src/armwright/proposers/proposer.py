@@ -1,4 +1,4 @@
-"""What a proposer is. Your own needs a name and `propose`; the rest has defaults."""
+"""The interface of proposers. A custom one needs a name and `propose`; the rest has defaults."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +15,14 @@ from armwright.spaces.parameters import Design
 class Proposal:
     """A design to evaluate next.
 
-    reason: in one line.
-    expected: the objectives that the proposer expects of it, where it says so.
-    asked: the trial that it was asked for; needed of proposals that were made in an earlier session.
-    known: how many finished trials it was made from, where fewer than the proposer was given.
-    note: what the user should know of how it came about.
+    Attributes:
+        design: the design.
+        id: unique within the run.
+        reason: one line.
+        expected: objectives that the proposer expects, if any.
+        asked: trial that it was requested for; required for proposals of an earlier session.
+        known: number of finished trials it was made from, if fewer than the proposer was given.
+        note: message for the user about its origin.
     """
 
     design: Design
@@ -33,10 +36,12 @@ class Proposal:
 
 @dataclass(frozen=True)
 class RecordedTurn:
-    """A proposer's turn in a run that is played again.
+    """A proposal or failure in a run that is replayed.
 
-    asked: the trial that it was asked for.  feedback: how many finished trials were known then.
-    proposal: the proposal's id; None where there was a fault instead.
+    Attributes:
+        asked: trial that it was requested for.
+        feedback: number of finished trials known at the time.
+        proposal: id of the proposal; None for a failure.
     """
 
     asked: int
@@ -46,18 +51,19 @@ class RecordedTurn:
 
 @dataclass(frozen=True)
 class Record:
-    """A recorded run: the proposer's turns by trial number, and how many trials it has."""
+    """A recorded run: its proposals and failures by trial number, and its number of trials."""
 
     turns: Mapping[int, RecordedTurn]
     n_trials: int
 
 
 class Proposer(Protocol):
-    """Proposes one design for every n_step trials; inherit from it and write `propose`.
+    """Proposes one design for every n_step trials; subclass it and implement `propose`.
 
-    name: the `source` of its trials.
-    per_call: how many designs one call of `propose` gives, at most.
-    overlaps: whether it can be asked while black-box trials go on (--overlap), from other threads.
+    Attributes:
+        name: the `source` of its trials.
+        per_call: number of designs per call of `propose`, at most.
+        overlaps: True if other threads may call it while black-box trials run (--overlap).
     """
 
     name: str
@@ -65,44 +71,54 @@ class Proposer(Protocol):
     overlaps: bool = True
 
     def settings(self) -> Mapping[str, Any]:
-        """What must be known to repeat its proposals; kept in config.yaml. No secrets."""
+        """Return what is needed to repeat the proposals, for config.yaml; no secrets."""
         return {}
 
     def open(self, folder: Path | None) -> None:
-        """Called first of all, with the run folder where there is one: what it did before in this run lies there."""
+        """Load earlier work of this run from its folder, if it has one. Called before all other methods."""
 
     def forecast(self, problem: Problem, n: int) -> str:
-        """About what `n` more proposals will take, in one line for the user; empty where that is nothing."""
+        """Estimate what `n` more proposals take, in one line for the user; empty for nothing."""
         return ""
 
     def announce(self, number: int) -> str:
-        """What the user should know while the proposal for trial `number` is waited for; empty for nothing."""
+        """Return a message for the user during the wait for the proposal of trial `number`, or an empty text."""
         return ""
 
     def check(self) -> None:
-        """Called before the first trial if a proposal is due; FailureError where the proposer cannot work."""
+        """Check that proposals are possible. Called before the first trial if a proposal is due.
+
+        Raises:
+            FailureError: The proposer cannot work.
+        """
 
     def unused(self, history: History) -> Sequence[Proposal]:
-        """Proposals of earlier sessions of this run that no trial has used yet; they go first."""
+        """Return proposals of earlier sessions of this run that no trial has used yet; they go first."""
         return ()
 
     def record(self) -> Record | None:
-        """Of a run that is played again: when its proposals entered."""
+        """Return when the proposals of a replayed run entered; None if no run is replayed."""
         return None
 
     def summary(self) -> ProposerSummary:
-        """What it did and cost so far."""
+        """Return the number, cost and time of the calls so far."""
         return ProposerSummary(self.name)
 
     def cancel(self) -> None:
-        """Ends what is under way in other threads (the study ends, or was interrupted)."""
+        """Cancel calls in other threads, because the study ends or was interrupted."""
 
     def propose(self, history: History, seed: int, number: int) -> Proposal | Sequence[Proposal]:
-        """The next design, or several to be evaluated in turn; ProposalError where there is none.
+        """Propose the next design, or several to evaluate one after the other.
 
-        history: the finished trials; number: the trial that is asked for (ids are made from it).
+        The result must depend on the arguments alone, so that a killed run resumes identically. With --overlap, other
+        threads call this.
 
-        Must depend on nothing but these, so that a killed run goes on as if it had not been. With --overlap it is
-        called from other threads.
+        Args:
+            history: the finished trials.
+            seed: of all random draws.
+            number: trial that the proposal is for; ids contain it.
+
+        Raises:
+            ProposalError: There is no proposal.
         """
         ...

@@ -1,4 +1,4 @@
-"""A recorded run's proposals, played again."""
+"""Replay of the proposals of a recorded run."""
 
 import json
 import os
@@ -26,13 +26,15 @@ from armwright.yaml_documents import check_document
 
 
 class ReplayProposer(PromptedProposer):
-    """Plays the transcripts of a run folder, or of a transcripts.jsonl, again: no network, no cost.
+    """Replays the transcripts of a run folder, or of a transcripts.jsonl, without network or cost.
 
-    With the settings of the recorded run, on the same machine with the same versions, the run comes out equal to the
-    bit. Where a prompt differs from the recorded one, it is reported; with `strict` it is an error.
+    With the settings of the recorded run, on the same machine with the same versions, the run is equal to the bit.
 
-    options: how the recorded run asked, where nothing says so: prompt and memory of a transcript without its
-        config.yaml. What differs from the defaults and from the record is refused.
+    Args:
+        source: run folder or transcripts file.
+        strict: treat a prompt that differs from the recorded one as an error; otherwise it is reported.
+        options: prompt and memory of a transcript without its config.yaml. Options that contradict the record are
+            refused.
     """
 
     def __init__(self, source: str | Path, strict: bool = False, options: PromptOptions | None = None) -> None:
@@ -52,16 +54,16 @@ class ReplayProposer(PromptedProposer):
         self._trials = _recorded_trials(folder, recorded)
 
     def settings(self) -> Mapping[str, Any]:
-        """What is replayed, and how it was asked for."""
+        """Return the source of the replay, and how it was asked."""
         return {"replay": str(self.source), **super().settings()}
 
     def check(self) -> None:
-        """Says the recorded check again, so that the account is the same; nothing can fail here."""
+        """Replay the recorded check, so that the summary is the same; it cannot fail."""
         if any(call.step == "check" and call.fault is None for call in self.recording.calls):
             super().check()
 
     def record(self) -> Record | None:
-        """When the recorded proposals entered; None where only the transcript is there."""
+        """Return when the recorded proposals entered; None for a transcript without its run."""
         if not self._trials:
             return None
         turns: dict[int, RecordedTurn] = {}
@@ -73,46 +75,46 @@ class ReplayProposer(PromptedProposer):
         return Record(turns, len(self._trials))
 
     def summary(self) -> ProposerSummary:
-        """The account of the recorded calls that were played."""
+        """Return the summary of the replayed calls."""
         notes = {"replay": str(self.source), "differing_prompts": len(self.recording.differing)}
         return replace(super().summary(), notes=notes)
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
-        """The recorded designs; the recorded fault where there was one."""
+        """Return the recorded designs, or raise the recorded error."""
         identity = self.identity(number)
         try:
             proposals = super().propose(history, seed, number)
-        except DesignError as refusal:
-            raise ReplayError(f"{self.recording.source}: the answer for {identity} was changed: {refusal}") from refusal
-        except ProposalError as fault:
-            if fault.kind != "missing":
+        except DesignError as error:
+            raise ReplayError(f"{self.recording.source}: the answer for {identity} was changed: {error}") from error
+        except ProposalError as error:
+            if error.kind != "missing":
                 raise
-            why = ProposalError(*self._why_missing(number))
-            why.known = fault.known
-            raise why from fault
+            recorded = ProposalError(*self._why_missing(number))
+            recorded.known = error.known
+            raise recorded from error
         if identity not in self.recording.differing:
             return proposals
         note = f"the prompt for {identity} differs from the recorded one"
         return [replace(proposals[0], note=note), *proposals[1:]]
 
     def next_hints(self, number: int) -> tuple[Hint, ...]:
-        """Those that the recorded question went with; none are new."""
+        """Return the hints of the recorded question; there are no new ones."""
         return hints_of(self.recording.calls, self.identity(number))
 
     def _why_missing(self, number: int) -> tuple[str, str]:
         recorded = next((t for t in self._trials if t.fault and number == (t.asked or t.number)), None)
-        if recorded is not None:  # never asked, or not to the end: no budget, or a model that was given up
+        if recorded is not None:  # never asked or not answered: no budget, or a model that was given up
             assert recorded.fault is not None
             return recorded.fault, f"recorded: {recorded.fault}"
-        there = sorted({int(c.proposal.rpartition("-")[2]) for c in self.recording.calls if c.proposal})
+        numbers = sorted({int(c.proposal.rpartition("-")[2]) for c in self.recording.calls if c.proposal})
         return "missing", (
-            f"{self.recording.source} holds no proposal for trial {number}, but for {', '.join(map(str, there[:4]))}"
-            f"{', …' if len(there) > 4 else ''}; were n_init and n_step others?"
+            f"{self.recording.source} holds no proposal for trial {number}, but for {', '.join(map(str, numbers[:4]))}"
+            f"{', …' if len(numbers) > 4 else ''}; were n_init and n_step others?"
         )
 
 
 def recorded_options(config: RunConfig | None) -> tuple[Prompt | None, PromptOptions]:
-    """How the proposer of a run asked, and its prompt where that was a template of the user's own."""
+    """Return the prompt options of a run, and its prompt if that was a custom template."""
     settings = config.study.proposer if config is not None else None
     if not settings or "prompt" not in settings:
         return None, PromptOptions()
@@ -146,7 +148,7 @@ def _as_recorded(
 
 
 def options_of(calls: Sequence[Call]) -> PromptOptions:
-    """How calls were asked for, as far as they show it: the form of the answer, and how many designs a call."""
+    """Return the form of the answer and the number of designs per call, as far as calls show them."""
     proposed = [call for call in calls if call.proposal]
     if all(call.step != "answer" for call in proposed):
         form = "two-step"
@@ -157,8 +159,8 @@ def options_of(calls: Sequence[Call]) -> PromptOptions:
 
 
 def _designs(answer: str) -> int:
-    """How many designs a kept answer holds."""
-    with suppress(ValueError, TypeError, KeyError):  # one design; or a transcript that was changed by hand
+    """Count the designs of a recorded answer."""
+    with suppress(ValueError, TypeError, KeyError):  # one design, or a transcript edited by hand
         return max(1, len(json.loads(answer)["designs"]))
     return 1
 
