@@ -27,7 +27,7 @@ def test_check_describes_a_builtin_task_and_the_default_space() -> None:
     assert done.returncode == 0, done.stderr
     for text in ("8 targets", "position_error [m]", "reference point: (5, 5)", "11 free parameters", "a toy"):
         assert text in done.stdout
-    assert done.stdout.endswith("task and space are valid; no warnings\n")
+    assert done.stdout.endswith("task and space are valid; warnings: none\n")
 
 
 def test_check_prints_json(in_folder: Path) -> None:

@@ -68,7 +68,7 @@ def show_check(console: Console, problem: Problem) -> None:
         console.print(f"note: {note}")
     for warning in record["warnings"]:
         console.print(f"warning: {warning}")
-    console.print(f"task and space are valid; {len(record['warnings']) or 'no'} warnings")
+    console.print(f"task and space are valid; warnings: {len(record['warnings']) or 'none'}")
 
 
 def free_parameters(space: DesignSpace) -> list[Parameter]:

@@ -1,4 +1,4 @@
-"""What is installed, what is configured, and whether it works."""
+"""Examine what is installed and configured, and whether it works."""
 
 import os
 from collections.abc import Iterator
@@ -14,8 +14,7 @@ from armwright.runs.config import versions
 
 OK, MISSING, WRONG = "ok", "--", "!!"
 
-# Vendor, the package that speaks to it, and the environment variables that it needs; of several names in one place
-# one is enough.
+# Vendor, its client package, and the environment variables it needs; of names joined by "or", one is enough.
 VENDORS = (
     ("openai-chat", "openai", ("OPENAI_API_KEY",)),
     ("anthropic", "anthropic", ("ANTHROPIC_API_KEY",)),
@@ -29,7 +28,7 @@ VENDORS = (
 
 @dataclass(frozen=True)
 class Finding:
-    """mark: ok, -- (not there, and that is fine as long as it is not wanted), !! (wrong)."""
+    """A line of the report; mark: ok, -- (missing, which matters only if wanted) or !! (wrong)."""
 
     mark: str
     subject: str
@@ -37,7 +36,7 @@ class Finding:
 
 
 def examine(options: ModelOptions | None = None) -> Iterator[Finding]:
-    """What is there, without sending anything anywhere. Values of keys are never shown."""
+    """Yield findings without sending anything. Values of keys are never shown."""
     yield Finding(OK, "versions", ", ".join(f"{name} {number}" for name, number in versions().items()))
     yield _kernels()
     yield from map(_extra, EXTRAS)
@@ -46,7 +45,11 @@ def examine(options: ModelOptions | None = None) -> Iterator[Finding]:
 
 
 def try_model(options: ModelOptions | None = None) -> str:
-    """One tiny call to the configured model; ModelError where it fails."""
+    """Make one small call to the configured model.
+
+    Raises:
+        ModelError: No model is configured, or the call fails.
+    """
     configured = configured_model(options)
     if configured is None:
         raise ModelError("no model is configured; give --model, or set ARMWRIGHT_MODEL")
@@ -73,7 +76,7 @@ def _kernels() -> Finding:
         problem.evaluate(problem.space.sample(2, seed=0))
     except ArmwrightError as fault:
         return Finding(WRONG, "kernels", str(fault))
-    return Finding(OK, "kernels", "compiled, and they run on the CPU")
+    return Finding(OK, "kernels", "compiled and running on the CPU")
 
 
 def _extra(extra: str) -> Finding:

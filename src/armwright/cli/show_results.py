@@ -161,7 +161,7 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
         links = ", ".join(f"{length:.3f}" for length in member.design.links)
         console.print(Text(f"#{member.number}", style="bold") + Text(f" ({member.source}): {values}"))
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
-        base = format_point(member.design.origin)
+        base = format_point([round(value, 3) for value in member.design.origin])
         console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}")
     first = picked[0].number
     console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
