@@ -1,7 +1,7 @@
 """A Dask cluster that runs functions: processes of this machine, or an existing cluster.
 
 It is the one engine for work in other processes: single designs (`dask_backend.py`) and whole runs of an experiment
-(`experiment/running.py`). A task whose worker is lost runs again on another worker.
+(`experiments/runner.py`). A task whose worker is lost runs again on another worker.
 """
 
 import json
@@ -109,7 +109,7 @@ class Cluster:
         self._versions = _versions_of(PACKAGES)
         with ExitStack() as stack:
             self._client = stack.enter_context(_client_of(workers))
-            self._client.subscribe_topic("all", self._hear)
+            self._client.subscribe_topic("all", self._receive_event)
             waiting = "" if self._n_threads() else ", which has no worker yet"
             notify(f"evaluating on {workers.description}{waiting}")
             self.close = stack.pop_all().close
@@ -135,10 +135,10 @@ class Cluster:
         """
         import cloudpickle
 
-        name_there = f"armwright-{uuid4().hex}"
+        task_name = f"armwright-{uuid4().hex}"
         call = cloudpickle.dumps(partial(_run, function, *arguments))
-        future = self._client.submit(_run_pickled, self._versions, call, key=name_there, pure=False)
-        self._tasks[name_there] = _Task(key, name, future)
+        future = self._client.submit(_run_pickled, self._versions, call, key=task_name, pure=False)
+        self._tasks[task_name] = _Task(key, name, future)
         future.add_done_callback(self._events.put)
 
     def wait(self, timeout: float) -> Finished | None:
@@ -151,7 +151,7 @@ class Cluster:
             event = self._events.get(timeout=timeout)
         except queue.Empty:
             if self._client.status != "running":
-                raise self._lost() from None
+                raise self._connection_error() from None
             return None
         return self._count_losses(cast("frozenset[str]", event)) if isinstance(event, frozenset) else self._end(event)
 
@@ -159,9 +159,9 @@ class Cluster:
         try:
             return sum(self._client.nthreads().values())
         except (OSError, TimeoutError) as fault:
-            raise self._lost() from fault
+            raise self._connection_error() from fault
 
-    def _hear(self, event: tuple[float, Any]) -> None:
+    def _receive_event(self, event: tuple[float, Any]) -> None:
         """Take an event of the scheduler; called by Dask's thread."""
         content = cast("dict[str, Any]", event[1]) if isinstance(event[1], dict) else {}
         if content.get("action") == "remove-worker" and not content.get("expected"):
@@ -190,19 +190,19 @@ class Cluster:
         except KilledWorker:  # the scheduler's own limit is lower than ours
             return self._give_up(future.key)
         except (CancelledError, OSError, TimeoutError) as fault:
-            raise self._lost() from fault
+            raise self._connection_error() from fault
         if versions:
-            raise self._refused(versions)
+            raise self._version_error(versions)
         key = self._tasks.pop(future.key).key
         return Finished(key, error=value.error) if isinstance(value, _Failure) else Finished(key, value)
 
-    def _refused(self, there: dict[str, str]) -> ClusterError:
-        others = [
-            f"{name} {there[name]} instead of {here}" for name, here in self._versions.items() if there[name] != here
+    def _version_error(self, versions: dict[str, str]) -> ClusterError:
+        differences = [
+            f"{name} {versions[name]} instead of {own}" for name, own in self._versions.items() if versions[name] != own
         ]
-        return ClusterError(f"a worker has {', '.join(others)}; install the same versions for every worker")
+        return ClusterError(f"a worker has {', '.join(differences)}; install the same versions for every worker")
 
-    def _lost(self) -> ClusterError:
+    def _connection_error(self) -> ClusterError:
         what = "the Dask scheduler" if self._workers.scheduler else "the local workers"
         where = f" at {self._workers.scheduler}" if self._workers.scheduler else ""
         return ClusterError(f"lost the connection to {what}{where}; rerun the same command to resume")
@@ -218,19 +218,19 @@ def _sent_by_value() -> tuple[Callable[..., dict[str, str]], Callable[..., Any]]
         import platform
         from importlib import metadata
 
-        there = {"Python": ".".join(platform.python_version_tuple()[:2])}
+        found = {"Python": ".".join(platform.python_version_tuple()[:2])}
         for name in packages:
             try:
-                there[name] = metadata.version(name)
+                found[name] = metadata.version(name)
             except metadata.PackageNotFoundError:
-                there[name] = "missing"
-        return there
+                found[name] = "missing"
+        return found
 
     def run_pickled(versions: dict[str, str], call: bytes) -> tuple[Any, dict[str, str]]:
         import pickle
 
-        here = versions_of(versions.keys() - {"Python"})
-        return (None, here) if here != versions else (pickle.loads(call)(), {})
+        own = versions_of(versions.keys() - {"Python"})
+        return (None, own) if own != versions else (pickle.loads(call)(), {})
 
     return versions_of, run_pickled
 

@@ -71,11 +71,11 @@ def _pickled(problem: Problem) -> bytes:
     try:
         return bytes(cloudpickle.dumps(problem))
     except Exception as fault:
-        words = " ".join(str(fault).split())
-        raise SettingsError(f"the problem cannot be sent to workers: {type(fault).__name__}: {words}") from fault
+        reason = " ".join(str(fault).split())
+        raise SettingsError(f"the problem cannot be sent to workers: {type(fault).__name__}: {reason}") from fault
 
 
-@lru_cache(maxsize=4)  # one a search that the worker serves; an evaluator's file is loaded once
+@lru_cache(maxsize=4)  # one per search that the worker serves; the file of an evaluator is loaded once
 def _unpickled(pickled: bytes) -> Problem:
     import cloudpickle
 

@@ -1,4 +1,4 @@
-"""What would be sent to a model, without sending it."""
+"""Preview of the prompt that a run would send to a language model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -25,9 +25,14 @@ from armwright.tasks.task import Task
 
 @dataclass(frozen=True)
 class Preview:
-    """A prompt for trial `number`, its length in tokens (estimated), and the JSON schema of the answer.
+    """Prompt for a trial.
 
-    note: what else will be in the prompt when it is really sent; empty where nothing will.
+    Attributes:
+        number: number of the trial.
+        prompt: the text.
+        tokens: estimated length of the prompt [tokens].
+        schema: JSON schema of the answer.
+        note: trials that will be in the prompt when it is sent; empty if there are none.
     """
 
     number: int
@@ -38,7 +43,7 @@ class Preview:
 
 
 def preview(problem: Problem, options: PromptOptions, *, n_init: int = 10, seed: int = 0) -> Preview:
-    """The first prompt of a new run."""
+    """Return the first prompt of a new run."""
     history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
     proposer = PromptedProposer(ReplayBackend((), Path()), options, "llm")
     text = proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init))
@@ -53,14 +58,14 @@ def preview_after(
     space: DesignSpace | None = None,
     number: int | None = None,
 ) -> Preview:
-    """The prompt for the next proposal of a run, asked for as the run asks.
+    """Return the prompt for the next proposal of a run, requested as the run would.
 
     Args:
-        run: The run folder.
-        options: Options in place of those of the run, as far as they are set.
-        task: If given, the task that the run must have.
-        space: If given, the design space that the run must have.
-        number: Trial whose prompt is shown as it was then; None for the next one.
+        run: run folder.
+        options: options that replace those of the run, if set.
+        task: task that the run must have, if given.
+        space: design space that the run must have, if given.
+        number: trial whose past prompt is returned; None for the next one.
     """
     config, history = read_run(run)
     if task is not None and task.target_specs != config.task.target_specs:
@@ -79,8 +84,8 @@ def preview_after(
     proposer.look(run)
     requests = ProposalRequests(proposer, config.seed)
     if number is not None:
-        then = _then(run, config, history, proposer.asked(), number)
-        text = proposer.prompt_for(then, requests.seed(number), proposer.past_hints(number))
+        past = _history_at(run, config, history, proposer.asked(), number)
+        text = proposer.prompt_for(past, requests.seed(number), proposer.past_hints(number))
         return _preview(proposer, history.problem, number, text)
     schedule = request_schedule(requests, Blocks.of(config.study), lambda: history, config.study.in_flight)
     number, finished = schedule.upcoming(len(history))
@@ -97,8 +102,8 @@ def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: st
     return Preview(number, text, estimated_tokens(text), proposer.schema(problem))
 
 
-def _then(run: Path, config: RunConfig, history: History, asked: Mapping[int, int], number: int) -> History:
-    """What was known when a past proposal was asked for."""
+def _history_at(run: Path, config: RunConfig, history: History, asked: Mapping[int, int], number: int) -> History:
+    """Return the trials that were known when a past proposal was requested."""
     blocks = Blocks.of(config.study)
     if asked:
         if number in asked:
@@ -113,7 +118,7 @@ def _then(run: Path, config: RunConfig, history: History, asked: Mapping[int, in
 
 
 def _note(before: int, unused: int) -> str:
-    """What comes before the next question."""
+    """Return a note on the trials that precede the next request."""
     if not before:
         return ""
     trials = "1 trial comes" if before == 1 else f"{before} trials come"

@@ -22,10 +22,14 @@ MOST_EVALUATIONS = 10**9
 
 @dataclass(frozen=True)
 class RefinedRun:
-    """A refined run.
+    """Result of refining a run.
 
-    before, history: without and with the new trials.  tried: how many designs were refined.
-    evaluations: spent in all.
+    Attributes:
+        before: the trials before.
+        history: the trials, with the new ones.
+        summary: content of summary.json.
+        tried: number of designs refined.
+        evaluations: number of evaluations spent in all.
     """
 
     before: History
@@ -36,14 +40,18 @@ class RefinedRun:
 
     @property
     def added(self) -> int:
-        """How many designs became better."""
+        """Number of designs that were improved."""
         return len(self.history) - len(self.before)
 
 
 def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
-    """Refines each design of a finished run's front; what became better is added as trials of source `refine`.
+    """Refine each design of the front of a finished run, and add improved designs as trials of source `refine`.
 
-    evaluations: for each design.  The same call again goes on from the front as it is then.
+    Another call continues from the front it finds.
+
+    Args:
+        path: run folder.
+        evaluations: number of evaluations per design.
     """
     if not POPULATION <= evaluations <= MOST_EVALUATIONS:
         raise SettingsError(
@@ -67,13 +75,13 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
         earlier = summary.get("refine") or {"rounds": 0, "in_vain": 0}
         seed = derived_seed(config.seed, REFINING, len(before), earlier["rounds"])
         refined = refine_members(before, members, seed, evaluations)
-        found = _trials(before, members, refined)
-        in_vain = earlier["in_vain"] + (0 if found else refined.evaluations)
+        improved = _trials(before, members, refined)
+        in_vain = earlier["in_vain"] + (0 if improved else refined.evaluations)
         summary = {**summary, "refine": {"rounds": earlier["rounds"] + 1, "in_vain": in_vain}}
         discard_results(path)
-        for trial in found:
+        for trial in improved:
             folder.append(trial)
-        after = History(config.problem, (*trials, *found), method.n_init, config.reference_point)
+        after = History(config.problem, (*trials, *improved), method.n_init, config.reference_point)
         verification = verify_front(after)
         summary = resummarize(summary, after, config, verification)
         write_results(folder, after, summary, verification)
@@ -81,9 +89,9 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
 
 
 def _trials(history: History, members: Sequence[FrontMember], refined: Refined) -> list[FinishedTrial]:
-    """A trial for each design that became better; all evaluations are shared out among these.
+    """Return a trial for each improved design; all evaluations are divided among them.
 
-    Where none did, the summary tells of the evaluations: under `refine`, and in its sum.
+    If none was improved, the summary keeps the evaluations: under `refine`, and in its total.
     """
     better = np.flatnonzero(refined.improved).tolist()
     designs = history.problem.space.designs(refined.matrix[better])
