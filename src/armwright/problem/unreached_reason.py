@@ -24,20 +24,20 @@ def unreached_reason(arm: Arm, evaluation: Evaluation, row: int, target: int) ->
 
 def miss_words(evaluation: Evaluation, row: int, target: int) -> str:
     """By how much: the distance, and the angle where the target asks for one."""
-    words = f"{1e3 * evaluation.position_error[row, target]:.1f} mm"
+    distance = f"{1e3 * evaluation.position_error[row, target]:.1f} mm"
     if not evaluation.target_arrays.n_angular[target]:
-        return words
-    return f"{words} and {math.degrees(evaluation.angle_error[row, target]):.1f}°"
+        return distance
+    return f"{distance} and {math.degrees(evaluation.angle_error[row, target]):.1f}°"
 
 
 def limit_words(arm: Arm, q: Array) -> list[str]:
     """Which joints stand at which limit; q: (J,) or longer [rad] or [m]."""
-    words: list[str] = []
+    limits: list[str] = []
     for number, (joint, value) in enumerate(zip(arm.joints, q, strict=False), start=1):
         if joint.kind == "fixed":
             continue
         if value > joint.upper - AT_LIMIT:
-            words.append(f"joint {number} at its upper limit")
+            limits.append(f"joint {number} at its upper limit")
         elif value < joint.lower + AT_LIMIT:
-            words.append(f"joint {number} at its lower limit")
-    return words
+            limits.append(f"joint {number} at its lower limit")
+    return limits

@@ -108,14 +108,14 @@ def stop_study(folder: Path) -> None:
 
 def add_hint(folder: Path, text: str) -> Hint:
     """Give the language model a hint for its next prompt; SettingsError if the text is empty or too long."""
-    words = replace_surrogates(text).strip()
-    if not 1 <= len(words) <= LONGEST_HINT:
-        raise SettingsError(f"a hint of {len(words):,} characters: from 1 to {LONGEST_HINT:,} are possible")
+    message = replace_surrogates(text).strip()
+    if not 1 <= len(message) <= LONGEST_HINT:
+        raise SettingsError(f"a hint of {len(message):,} characters: from 1 to {LONGEST_HINT:,} are possible")
 
     def added(asked: Control) -> Control:
         if len(asked.hints) >= MOST_HINTS:
             raise SettingsError(f"{folder} has {MOST_HINTS} hints, and more are not possible")
-        hint = Hint(asked.hints[-1].id + 1 if asked.hints else 1, words)
+        hint = Hint(asked.hints[-1].id + 1 if asked.hints else 1, message)
         return asked.model_copy(update={"hints": (*asked.hints, hint)})
 
     return _change(folder, added).hints[-1]
@@ -171,11 +171,11 @@ class Channel:
         if self._folder is None:
             return
         before = self._said
-        words = before.fault if before is not None and fault is None else replace_surrogates(fault or "")
-        if before is not None and (doing, words) == (before.doing, before.fault):
+        message = before.fault if before is not None and fault is None else replace_surrogates(fault or "")
+        if before is not None and (doing, message) == (before.doing, before.fault):
             return
         since = before.since if before is not None and doing == before.doing else time.time()
-        self._said = Status(pid=os.getpid(), doing=doing, number=number, since=since, fault=words)
+        self._said = Status(pid=os.getpid(), doing=doing, number=number, since=since, fault=message)
         with suppress(OSError):
             replace_file(self._folder / STATUS, self._said.model_dump_json().encode())
 

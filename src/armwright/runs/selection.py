@@ -33,26 +33,24 @@ class Condition:
         return bool(_HOLDS[self.relation](numbers[self.name], self.bound))
 
 
-def read_condition(words: str) -> Condition:
+def read_condition(text: str) -> Condition:
     """Parse a condition such as `position_error<=0.05`; SettingsError if it is none."""
-    found = _CONDITION.fullmatch(words)
+    found = _CONDITION.fullmatch(text)
     if found is None:
-        raise SettingsError(f'--where "{words}": a name, one of <= < >= >, and a number are needed, such as mass<=2.5')
+        raise SettingsError(f'--where "{text}": expected a name, one of <= < >= > and a number, such as mass<=2.5')
     return Condition(found[1], found[2], float(found[3]))
 
 
-def read_weights(words: str) -> dict[str, float]:
+def read_weights(text: str) -> dict[str, float]:
     """Parse weights such as `position_error=2,torque=1`."""
     weights: dict[str, float] = {}
-    for part in words.split(","):
+    for part in text.split(","):
         found = _WEIGHT.fullmatch(part)
         if found is None:
-            raise SettingsError(
-                f'--weights "{words}": names with numbers are needed, such as position_error=2,torque=1'
-            )
+            raise SettingsError(f'--weights "{text}": expected names with numbers, such as position_error=2,torque=1')
         weights[found[1]] = float(found[2])
     if not any(weights.values()):
-        raise SettingsError(f'--weights "{words}": at least one must be above 0')
+        raise SettingsError(f'--weights "{text}": expected at least one above 0')
     return weights
 
 
@@ -98,11 +96,11 @@ def pick(
         True
     """
     if by is not None and weights is not None:
-        raise SettingsError("choose by one number or by weights, not by both")
+        raise SettingsError("expected one quantity or weights, got both")
     if len(history) and not history.front:
         raise FailureError(unmet(history))
-    told = {member.number: numbers_of(history, member) for member in history.front}
-    names = list(told[history.front[0].number]) if history.front else []
+    quantities = {member.number: numbers_of(history, member) for member in history.front}
+    names = list(quantities[history.front[0].number]) if history.front else []
     objectives = [objective.name for objective in history.problem.objectives]
     for name in [*(condition.name for condition in where), *([] if by is None else [by])]:
         _check_name(name, names)
@@ -111,17 +109,17 @@ def pick(
     left = [
         member
         for member in history.front
-        if all(condition.holds(told[member.number]) for condition in where)
+        if all(condition.holds(quantities[member.number]) for condition in where)
         and (numbers is None or member.number in numbers)
     ]
     if not left:
-        raise FailureError(_nearest_miss(where, list(told.values())))
+        raise FailureError(_describe_unmet(where, list(quantities.values())))
     if by is not None:
-        return sorted(left, key=lambda member: told[member.number][by])
+        return sorted(left, key=lambda member: quantities[member.number][by])
     scale = np.array(history.reference_point or np.ones(len(objectives)))
     if weights is not None:
-        heavy = np.array([weights.get(name, 0.0) for name in objectives]) / scale
-        return sorted(left, key=lambda member: float(heavy @ np.array(member.values)))
+        scaled_weights = np.array([weights.get(name, 0.0) for name in objectives]) / scale
+        return sorted(left, key=lambda member: float(scaled_weights @ np.array(member.values)))
     knee = knee_index(np.array([member.values for member in left]), history.reference_point or (math.inf,) * len(scale))
     first = [] if knee is None else [left[knee]]
     others = [member for member in left if member not in first]
@@ -148,16 +146,14 @@ def pick_from(
 
 def _check_name(name: str, names: Sequence[str]) -> None:
     if name not in names:
-        raise SettingsError(
-            f'a design has no number "{name}".{did_you_mean(name, names)} There are: {", ".join(names)}'
-        )
+        raise SettingsError(f'unknown quantity "{name}".{did_you_mean(name, names)} Available: {", ".join(names)}')
 
 
-def _nearest_miss(where: Sequence[Condition], told: Sequence[Mapping[str, float]]) -> str:
+def _describe_unmet(where: Sequence[Condition], quantities: Sequence[Mapping[str, float]]) -> str:
     """Describe the first condition that no design meets, and the nearest value."""
     for condition in where:
-        if not any(condition.holds(numbers) for numbers in told):
-            values = [numbers[condition.name] for numbers in told]
+        if not any(condition.holds(numbers) for numbers in quantities):
+            values = [numbers[condition.name] for numbers in quantities]
             nearest = min(values) if condition.relation in ("<", "<=") else max(values)
             bound = f"{condition.name} {condition.relation} {condition.bound:g}"
             return f"no design of the front has {bound}; the nearest has {nearest:.4g}"
