@@ -103,7 +103,8 @@ def test_experiment_with_too_many_cells_is_refused(tmp_path: Path) -> None:
 
 def test_experiment_with_line_breaks_in_its_commands_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
-    file.write_text('name: x\ntasks: [target-1]\nseeds: 1\nmethods: {a: {label: A, proposer: llm, prompt: "a\\n"}}\n')
+    method = '{label: A, proposer: llm, model_options: {prompt: "a\\n"}}'
+    file.write_text(f"name: x\ntasks: [target-1]\nseeds: 1\nmethods: {{a: {method}}}\n")
     with pytest.raises(SettingsError, match="is not printable") as refusal:
         plan_cells(*load_experiment(str(file)), tmp_path)
     assert str(refusal.value).isprintable()
@@ -183,9 +184,10 @@ def test_transcript_with_an_invalid_proposal_is_refused(run: Path, value: str) -
 @pytest.mark.parametrize("url", ["http://a:x/v1", "http://[::1", "http://", "http://\x01/v1", "http://a b/v1"])
 def test_invalid_server_address_is_refused(url: str) -> None:
     from armwright.llm.client import ModelClient
+    from armwright.llm.model_options import ModelOptions
 
     with pytest.raises(SettingsError, match="is no address"):
-        ModelClient("openai-chat:x", url)
+        ModelClient(ModelOptions(model="openai-chat:x", base_url=url))
 
 
 @pytest.mark.parametrize(
