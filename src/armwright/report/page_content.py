@@ -84,9 +84,12 @@ class RunContent:
         return None if isinstance(self.config.method, FrontMethod) else self.config.method
 
     def packed(self, designs_from: int = 0, calls_from: int = 0, with_files: bool = True) -> bytes:
-        """The whole run, or what is new from a design and a call on.
+        """Pack the whole run, or only its new part.
 
-        with_files: URDF and MJCF of the front's designs, too.
+        Args:
+            designs_from: Number of the first new design.
+            calls_from: Index of the first new call.
+            with_files: Include URDF and MJCF of the designs on the front.
         """
         if designs_from not in {self._n, *(first for first, _ in self._chunks)}:
             designs_from = 0  # the page holds a state that was never sent: send everything
