@@ -142,7 +142,7 @@ def test_power_equals_change_of_energy() -> None:
         kinetic = 0.5 * (speed * inverse_dynamics(arrays, at, 0.0 * v, speed, load, 0.0)).sum(axis=(1, 2))
         frames = forward_kinematics(arrays, at)
         bodies = arrays.bodies
-        heights = (frames.place + (frames.rotation @ bodies.total_com[:, None, :, :, None])[..., 0])[..., 2]
+        heights = (frames.position + (frames.rotation @ bodies.total_com[:, None, :, :, None])[..., 0])[..., 2]
         potential = 9.81 * ((bodies.total_mass[:, None] * heights).sum(axis=2) + load * frames.tip[..., 2])
         return kinetic + potential[:, 0]
 

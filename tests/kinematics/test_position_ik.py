@@ -480,7 +480,7 @@ def test_refused_arms_are_named() -> None:
         return Arm((0.0, 0.0, 0.0), joints, (link,) * len(joints))
 
     refused = [
-        ([arm(*[turning] * 17)], "an arm has 17 joints; the kernels take at most 16"),
+        ([arm(*[turning] * 17)], "an arm has 17 joints; the kernels support at most 16"),
         ([arm(turning, Joint("revolute", "x", -1.0, 6.5))], r"joint 2: limits \[-1, 6.5\] rad are outside"),
         ([arm(Joint("revolute", "x", -6.5, 1.0))], r"joint 1: limits \[-6.5, 1\] rad are outside"),
         ([], "at least one arm"),

@@ -81,10 +81,10 @@ class Bodies:
         around_axis = (self.mass * self.radius**2 / 2.0)[..., None, None]
         tensor = across_axis * (np.eye(3) - along) + around_axis * along
         centre = self.total_com
-        for mass, place in ((self.mass, self.com), (self.end_mass, self.end_mass_position)):
-            away = place - centre
-            squared = (away**2).sum(axis=-1)[..., None, None] * np.eye(3)
-            tensor += mass[..., None, None] * (squared - away[..., :, None] * away[..., None, :])
+        for mass, position in ((self.mass, self.com), (self.end_mass, self.end_mass_position)):
+            lever = position - centre
+            squared = (lever**2).sum(axis=-1)[..., None, None] * np.eye(3)
+            tensor += mass[..., None, None] * (squared - lever[..., :, None] * lever[..., None, :])
         return tensor
 
     def __getitem__(self, part: slice) -> "Bodies":
@@ -163,10 +163,10 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
 
     Args:
         arms: N arms of at most MAX_JOINTS joints.
-        precision: of the arrays that the kernels read.
+        precision: The precision of the arrays that the kernels read.
 
     Raises:
-        ArmError: if there is no arm, or one that the kernels cannot take.
+        ArmError: If there is no arm, or one that the kernels do not support.
     """
     if not arms:
         raise ArmError("expected at least one arm, got none")
@@ -216,7 +216,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
 def round_down(limits: Array, precision: Precision) -> Any:
     """Return upper limits in this precision, none above its exact value.
 
-    float32 of 2.4 rad is 1e-7 rad more than 2.4, which no kept angle may be.
+    2.4 rad in float32 is 1e-7 rad above the limit, which no joint angle may exceed.
     """
     near = limits.astype(precision)
     return np.where(near > limits, np.nextafter(near, near.dtype.type(-np.inf)), near)
@@ -224,7 +224,7 @@ def round_down(limits: Array, precision: Precision) -> Any:
 
 def _check(arm: Arm) -> None:
     if len(arm.joints) > MAX_JOINTS:
-        raise ArmError(f"an arm has {len(arm.joints)} joints; the kernels take at most {MAX_JOINTS}")
+        raise ArmError(f"an arm has {len(arm.joints)} joints; the kernels support at most {MAX_JOINTS}")
     for number, joint in enumerate(arm.joints, start=1):
         if joint.kind == "revolute" and max(-joint.lower, joint.upper) > MAX_ANGLE:
             raise ArmError(

@@ -58,9 +58,9 @@ def _newton_euler(
     a[..., 2] = gravity
     force, moment = np.empty((2, n, k, dof, 3))  # on each link, about its centre of mass
     lever = np.empty((n, k, dof, 3))  # from the joint to that centre, in the world [m]
-    before = frames.place[:, :, 0]
+    before = frames.position[:, :, 0]
     for j in range(dof):
-        step = frames.place[:, :, j] - before
+        step = frames.position[:, :, j] - before
         a = a + _relative(omega, alpha, step) + 2.0 * _cross(omega, linear_rate[:, :, j]) + linear_change[:, :, j]
         alpha = alpha + angular_change[:, :, j] + _cross(omega, angular_rate[:, :, j])
         omega = omega + angular_rate[:, :, j]
@@ -70,20 +70,23 @@ def _newton_euler(
         local_omega, local_alpha = (_product(rotation.swapaxes(-1, -2), vector) for vector in (omega, alpha))
         tensor = inertia[:, j]  # symmetric
         moment[:, :, j] = _product(rotation, local_alpha @ tensor + _cross(local_omega, local_omega @ tensor))
-        before = frames.place[:, :, j]
+        before = frames.position[:, :, j]
     after = frames.tip
     total_force = payload[:, None] * (a + _relative(omega, alpha, after - before))  # (N, K, 3)
     total_moment = np.zeros((n, k, 3))  # about the next joint
     torques = np.empty((n, k, dof))
     for j in reversed(range(dof)):
-        place = frames.place[:, :, j]
+        position = frames.position[:, :, j]
         total_moment = (
-            total_moment + _cross(after - place, total_force) + moment[:, :, j] + _cross(lever[:, :, j], force[:, :, j])
+            total_moment
+            + _cross(after - position, total_force)
+            + moment[:, :, j]
+            + _cross(lever[:, :, j], force[:, :, j])
         )
         total_force = total_force + force[:, :, j]
         load = np.where(prismatic[:, :, j], total_force, total_moment)
         torques[:, :, j] = (frames.axis[:, :, j] * load).sum(axis=-1)
-        after = place
+        after = position
     return torques
 
 

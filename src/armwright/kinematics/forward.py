@@ -15,7 +15,7 @@ class Frames:
     """Joint frames of N arms in K postures, in the world."""
 
     rotation: Array  # (N, K, D, 3, 3) frame of what joint j carries, its axes as columns
-    place: Array  # (N, K, D, 3) position of the joint, after its translation [m]
+    position: Array  # (N, K, D, 3) position of the joint, after its translation [m]
     axis: Array  # (N, K, D, 3) that it rotates about or translates along; 0 for a fixed joint
     tip: Array  # (N, K, 3) [m]
 
@@ -34,28 +34,28 @@ def forward_kinematics(arms: ArmArrays, q: Array) -> Frames:
     angle = np.where(revolute[:, None], q, 0.0)[..., None, None]
     rotated = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)  # Rodrigues' formula
     displacement = np.where(prismatic[:, None], q, 0.0)[..., None]
-    rotation, place, axis = np.empty((n, k, dof, 3, 3)), np.empty((n, k, dof, 3)), np.empty((n, k, dof, 3))
+    rotation, position, axis = np.empty((n, k, dof, 3, 3)), np.empty((n, k, dof, 3)), np.empty((n, k, dof, 3))
     frame = np.broadcast_to(np.eye(3), (n, k, 3, 3))
     at = np.broadcast_to(arms.base.astype(np.float64)[:, None], (n, k, 3))
     offset = arms.offset.astype(np.float64)
     for j in range(dof):
         axis[:, :, j] = (frame @ local[:, None, j, :, None])[..., 0]
-        place[:, :, j] = at + axis[:, :, j] * displacement[:, :, j]
+        position[:, :, j] = at + axis[:, :, j] * displacement[:, :, j]
         frame = rotation[:, :, j] = frame @ rotated[:, :, j]
-        at = place[:, :, j] + (frame @ offset[:, None, j, :, None])[..., 0]
-    return Frames(rotation, place, axis, at)
+        at = position[:, :, j] + (frame @ offset[:, None, j, :, None])[..., 0]
+    return Frames(rotation, position, axis, at)
 
 
 def joint_positions(arm: Arm, q: Sequence[float] | Array) -> Array:
     """Return the (J + 1, 3) positions of the joints and, last, of the tip [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
-    return np.vstack([frames.place[0, 0], frames.tip[0]])
+    return np.vstack([frames.position[0, 0], frames.tip[0]])
 
 
 def link_lines(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
     """Return start and end (2, 3) of each link and, last, of the tool [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
-    starts = frames.place[0, 0]  # (J, 3)
+    starts = frames.position[0, 0]  # (J, 3)
     offsets = np.array([link.offset for link in arm.links])
     ends = starts + (frames.rotation[0, 0] @ offsets[..., None])[..., 0]
     return [*np.stack([starts, ends], axis=1), np.vstack([ends[-1:], frames.tip[0]])]
@@ -64,10 +64,10 @@ def link_lines(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
 def rails(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
     """Return start and end (2, 3) of the rail of each prismatic joint [m]; q: (J,) [rad] or [m]."""
     frames = _frames(arm, q)
-    joints = zip(arm.joints, q, frames.place[0, 0], frames.axis[0, 0], strict=True)
+    joints = zip(arm.joints, q, frames.position[0, 0], frames.axis[0, 0], strict=True)
     return [
-        np.array([place + (limit - value) * axis for limit in (joint.lower, joint.upper)])
-        for joint, value, place, axis in joints
+        np.array([position + (limit - value) * axis for limit in (joint.lower, joint.upper)])
+        for joint, value, position, axis in joints
         if joint.kind == "prismatic"
     ]
 

@@ -15,7 +15,7 @@ def jacobians(arms: ArmArrays, q: Array) -> Array:
 
 def jacobian_of(arms: ArmArrays, frames: Frames) -> Array:
     """Return the (N, K, 3, D) derivative of the tip position by the joints, from known frames."""
-    turning = np.cross(frames.axis, frames.tip[:, :, None] - frames.place)
+    turning = np.cross(frames.axis, frames.tip[:, :, None] - frames.position)
     return np.where(_translates(arms), frames.axis, turning).swapaxes(-1, -2)
 
 
@@ -26,7 +26,7 @@ def jacobian_rate(arms: ArmArrays, frames: Frames, velocity: Array) -> Array:
     turning = np.cumsum(np.where(translates, 0.0, along), axis=2)  # (N, K, D, 3) angular velocity of each link
     spin = np.zeros(turning.shape)  # of the link that each joint stands on
     spin[:, :, 1:] = turning[:, :, :-1]
-    lever = frames.tip[:, :, None] - frames.place
+    lever = frames.tip[:, :, None] - frames.position
     share = np.where(translates, along, np.cross(along, lever))  # of each joint in the tip's velocity
     # The tip's velocity relative to a joint: from the spin of the joint's link and from the joints after it.
     after = np.cumsum(share[:, :, ::-1], axis=2)[:, :, ::-1] - share

@@ -32,7 +32,7 @@ class ArmBuilder:
         every = range(len(self._modules))
         return Arm(
             base=self._design.origin,
-            joints=tuple(self._joint(i, place) for i in every for place in range(len(self._modules[i].joints))),
+            joints=tuple(self._joint(i, slot) for i in every for slot in range(len(self._modules[i].joints))),
             links=tuple(link for i in every for link in self._links(i)),
             tool=mounted_vector(self._space.tool, self._mount),
             tool_axis=mounted_vector(DIRECTIONS["+z"], self._mount),
@@ -40,8 +40,8 @@ class ArmBuilder:
             base_mass=self._carried_mass(0),
         )
 
-    def _joint(self, i: int, place: int) -> Joint:
-        kind, local_axis = self._modules[i].joints[place]
+    def _joint(self, i: int, slot: int) -> Joint:
+        kind, local_axis = self._modules[i].joints[slot]
         axis, sign = mounted(local_axis, self._mount)
         if kind == "fixed":
             return Joint(kind, axis)

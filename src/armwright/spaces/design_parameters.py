@@ -23,7 +23,6 @@ from armwright.spaces.parameters import (
 )
 from armwright.spaces.space_schema import MAX_LENGTH, Restriction, SpaceSchema
 
-CACHED_SPACES = 64  # whose parameters are kept
 GRID_KINDS = ("origin", "link", "stroke", "limit")
 
 
@@ -55,8 +54,8 @@ class ConditionalParameter:
         return self.types is None or params.get(f"joint_{self.module}") in self.types
 
 
-# The caches are outside the model: a copy of a space with other ranges would inherit a cached property.
-@lru_cache(maxsize=CACHED_SPACES)
+# The cache is outside the model: a copy of a space with other ranges would inherit a cached property.
+@lru_cache(maxsize=64)
 def conditional_parameters(space: SpaceSchema) -> dict[str, ConditionalParameter]:
     """Return all parameters of a space by name, in their fixed order, restrictions and grids applied."""
     steps, restrictions = dict(space.grid), dict(space.restrict)
