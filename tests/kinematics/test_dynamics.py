@@ -360,11 +360,11 @@ def test_move_time_is_one_value_or_one_per_move() -> None:
 @pytest.mark.parametrize(
     ("how", "words"),
     {
-        "{move_time: 0}": "move_time = 0 s is outside 0 < move_time <= 10000 s",
-        "{move_time: [1, -2]}": "move_time = -2 s is outside",
-        "{move_time: [1, 2, 3]}": "move_time has 3 values for 2 moves; give one or all",
+        "{move_time: 0}": "move_time: expected above 0 and at most 10000 s, got 0 s",
+        "{move_time: [1, -2]}": "move_time: expected above 0 and at most 10000 s, got -2 s",
+        "{move_time: [1, 2, 3]}": "move_time: expected 1 or 2 values [s], got 3",
         "{move_time: .nan}": "move_time",
-        "{move_time: 1, moves: []}": "move_time is of moves, and there are none",
+        "{move_time: 1, moves: []}": "move_time needs moves; try moves: in_order",
         "{move_time: soon}": "move_time",
     }.items(),
 )
