@@ -52,7 +52,7 @@ def designs(run: StudyResult) -> list[object]:
     return [(trial.source, trial.design, trial.values, trial.proposal) for trial in run.trials]
 
 
-def test_schedule() -> None:
+def test_first_trial_of_each_block_is_the_proposers() -> None:
     """n_init random trials, then blocks of n_step whose first trial is the proposer's."""
     run = short(proposer=Listed())
     assert [trial.source for trial in run.trials] == ["random"] * 5 + ["listed", "bbo", "bbo", "bbo"] * 2
@@ -64,7 +64,7 @@ def test_every_trial_can_be_the_proposers() -> None:
     assert [trial.source for trial in run.trials] == ["random"] * 2 + ["listed"] * 3
 
 
-def test_values_are_those_of_the_problem_and_the_curve_is_moocores() -> None:
+def test_hypervolume_curve_matches_moocore() -> None:
     run = short(n_total=30)
     values = np.array([trial.values for trial in run.trials])
     assert values == pytest.approx(PROBLEM.evaluate([trial.design for trial in run.trials]).values, abs=0)
@@ -87,13 +87,13 @@ def test_front_members_are_the_non_dominated_trials_with_their_arms() -> None:
     assert run.front[0].arm == PROBLEM.arm(run.front[0].design)
 
 
-def test_the_same_seed_gives_the_same_run() -> None:
+def test_equal_seeds_give_equal_runs() -> None:
     assert designs(short()) == designs(short())
     other = optimize(PROBLEM, proposer="none", n_init=5, n_total=8, seed=1)
     assert other.trials[0].design != short().trials[0].design
 
 
-def test_a_reference_point_that_the_task_leaves_open_is_frozen(tmp_path: Path) -> None:
+def test_open_reference_point_is_frozen(tmp_path: Path) -> None:
     run = short(tmp_path / "run", OPEN)
     first = np.array([trial.values for trial in run.trials[:5]])
     expected = 1.1 * first[moocore.is_nondominated(first)].max(axis=0)
@@ -103,13 +103,13 @@ def test_a_reference_point_that_the_task_leaves_open_is_frozen(tmp_path: Path) -
     assert more.hypervolume[:8] == pytest.approx(run.hypervolume)
 
 
-def test_a_proposal_that_fails_becomes_a_black_box_trial() -> None:
+def test_failed_proposal_becomes_black_box_trial() -> None:
     run = short(proposer=Listed(faulty=(9,)))
     assert (run.trials[9].source, run.trials[9].fault, run.trials[9].proposal) == ("bbo", "timeout", None)
     assert run.summary["proposer"]["failures"] == {"timeout": 1}
 
 
-def test_a_proposer_that_fails_from_the_first_is_marked_counted_and_flagged() -> None:
+def test_failing_proposer_is_counted_and_flagged() -> None:
     run = short(proposer=Listed(faulty=(5, 9)))
     assert [trial.fault for trial in run.trials] == [None] * 5 + ["timeout", None, None, None] * 2
     assert {trial.source for trial in run.trials[5:]} == {"bbo"}
@@ -130,7 +130,7 @@ class Repeating(Proposer):
         return Proposal(history.problem.space.sample(1, 0)[0], f"repeating-{number}")
 
 
-def test_a_trial_that_repeats_an_arm_is_recorded_before_the_next_begins(tmp_path: Path) -> None:
+def test_duplicate_is_recorded_before_the_next_trial(tmp_path: Path) -> None:
     """Else the next one would be drawn without it, and after a kill between the two with it."""
     proposer = Repeating()
     run = optimize(PROBLEM, proposer=proposer, n_init=2, n_step=1, n_total=5, out=tmp_path / "run")
@@ -160,7 +160,7 @@ class Odd(Proposer):
     ("values", "words"),
     [((), "the proposer gave no design"), ((9.0,), "link_1 = 9 m is outside 0.03 <= link_1 <= 0.3 m")],
 )
-def test_an_answer_without_a_usable_design_becomes_a_black_box_trial(
+def test_answer_without_usable_design_becomes_black_box_trial(
     values: tuple[float, ...], words: str, in_flight: int | None
 ) -> None:
     notes: list[str] = []
@@ -177,7 +177,7 @@ def test_an_answer_without_a_usable_design_becomes_a_black_box_trial(
     assert [note for note in notes if note] == [words] * 2
 
 
-def test_of_several_designs_the_usable_ones_count() -> None:
+def test_usable_designs_of_an_answer_count() -> None:
     run = optimize(PROBLEM, proposer=Odd(0.2, 9.0, 0.1), n_init=5, n_step=4, n_total=12)
     assert [trial.fault or trial.proposal for trial in run.trials[5::4]] == ["odd-5.0", "answer", "odd-5.2"]
 
@@ -194,14 +194,14 @@ def qmc(seed: int) -> BaseSampler:
 @pytest.mark.parametrize("sampler", ["tpe", "tpe-multivariate", "nsga2", nsga2, qmc])
 @pytest.mark.parametrize("proposer", ["none", "rules", Listed()])
 @pytest.mark.parametrize("stop", [3, 5, 6, 12])
-def test_a_resumed_run_equals_an_uninterrupted_one(
+def test_resumed_run_equals_uninterrupted_one(
     tmp_path: Path, proposer: Proposer | str, stop: int, sampler: str | SamplerFactory
 ) -> None:
     check_resume(tmp_path / "run", stop, proposer=proposer, sampler=sampler, n_init=5, n_step=4, n_total=20)
 
 
 @pytest.mark.parametrize("proposer", [pytest.param(name, marks=NEEDS_GP) for name in ("none", "rules")])
-def test_a_resumed_run_with_gp_equals_an_uninterrupted_one(tmp_path: Path, proposer: str) -> None:
+def test_resumed_run_with_gp_equals_uninterrupted_one(tmp_path: Path, proposer: str) -> None:
     """It draws by its model from the 11th trial on, some 0.3 s each: few trials, and a stop among them."""
     check_resume(tmp_path / "run", 12, proposer=proposer, sampler="gp", n_init=5, n_step=4, n_total=12)
 
@@ -220,7 +220,7 @@ def check_resume(out: Path, stop: int, **settings: Any) -> None:
     assert designs(resumed) == designs(whole)
 
 
-def test_a_larger_n_total_extends_and_a_finished_run_is_only_read(tmp_path: Path) -> None:
+def test_larger_n_total_extends_a_finished_run(tmp_path: Path) -> None:
     short(tmp_path / "run", n_total=8)
     content = (tmp_path / "run" / "trials.jsonl").read_bytes()
     again = short(tmp_path / "run", n_total=8)
@@ -232,7 +232,7 @@ def test_a_larger_n_total_extends_and_a_finished_run_is_only_read(tmp_path: Path
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["n_trials"] == 17
 
 
-def test_other_settings_are_refused_with_their_differences(tmp_path: Path) -> None:
+def test_changed_settings_are_refused_with_differences(tmp_path: Path) -> None:
     short(tmp_path / "run", n_total=8)
     with pytest.raises(RunConflictError) as refusal:
         optimize(PROBLEM, proposer=Listed(), n_init=5, n_step=2, n_total=6, seed=3, out=tmp_path / "run")
@@ -245,7 +245,7 @@ def test_other_settings_are_refused_with_their_differences(tmp_path: Path) -> No
         assert difference in str(refusal.value)
 
 
-def test_the_order_of_a_proposals_parameters_means_nothing(tmp_path: Path) -> None:
+def test_parameter_order_of_proposals_is_irrelevant(tmp_path: Path) -> None:
     class Backwards(Listed):
         def propose(self, history: History, seed: int, number: int) -> Proposal:
             proposal = super().propose(history, seed, number)
@@ -256,7 +256,7 @@ def test_the_order_of_a_proposals_parameters_means_nothing(tmp_path: Path) -> No
     assert [t.values for t in read_run(tmp_path / "run")[1]] == [t.values for t in run.trials]
 
 
-def test_a_folder_without_a_finished_trial_takes_any_settings(tmp_path: Path) -> None:
+def test_folder_without_trials_accepts_any_settings(tmp_path: Path) -> None:
     def fail(progress: Progress) -> None:
         raise KeyboardInterrupt
 
@@ -266,7 +266,7 @@ def test_a_folder_without_a_finished_trial_takes_any_settings(tmp_path: Path) ->
     assert len(short(tmp_path / "run").trials) == 13
 
 
-def test_other_versions_are_noted(tmp_path: Path) -> None:
+def test_changed_versions_are_recorded(tmp_path: Path) -> None:
     short(tmp_path / "run")
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text().replace("  optuna: ", "  optuna: 0."))
@@ -276,7 +276,7 @@ def test_other_versions_are_noted(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_two_processes_cannot_write_one_run(tmp_path: Path) -> None:
+def test_second_writer_of_a_run_is_refused(tmp_path: Path) -> None:
     def second(progress: Progress) -> None:
         with pytest.raises(RunFolderError, match="in use by another"):
             short(tmp_path / "run")
@@ -284,7 +284,7 @@ def test_two_processes_cannot_write_one_run(tmp_path: Path) -> None:
     optimize(PROBLEM, proposer="none", n_init=2, n_total=1, out=tmp_path / "run", watch=second)
 
 
-def test_any_optuna_sampler_by_a_factory(tmp_path: Path) -> None:
+def test_sampler_factory_is_used_and_named(tmp_path: Path) -> None:
     def uniform(seed: int) -> BaseSampler:
         return RandomSampler(seed=seed)
 
@@ -293,11 +293,11 @@ def test_any_optuna_sampler_by_a_factory(tmp_path: Path) -> None:
     assert designs(run) == designs(named)
     assert run.config.method.sampler.startswith("line ")
     assert run.config.method.sampler.endswith(
-        " of tests.study.test_study, test_any_optuna_sampler_by_a_factory.<locals>.uniform"
+        " of tests.study.test_study, test_sampler_factory_is_used_and_named.<locals>.uniform"
     )
 
 
-def test_another_factory_is_another_run(tmp_path: Path) -> None:
+def test_changed_sampler_factory_is_refused(tmp_path: Path) -> None:
     def go_on(sampler: SamplerFactory, n_total: int) -> StudyResult:
         return optimize(PROBLEM, proposer="none", sampler=sampler, n_init=2, n_total=n_total, out=tmp_path / "run")
 
@@ -310,14 +310,14 @@ def test_another_factory_is_another_run(tmp_path: Path) -> None:
         go_on(qmc, 3)
 
 
-def test_a_sampler_or_proposer_of_the_wrong_kind_is_refused() -> None:
+def test_sampler_instance_and_proposer_class_are_refused() -> None:
     with pytest.raises(SettingsError, match=r"or a factory seed -> sampler, got .*RandomSampler"):
         optimize(PROBLEM, proposer="none", sampler=RandomSampler())  # type: ignore[arg-type]
     with pytest.raises(SettingsError, match=r"Listed is a class; give an instance of it: Listed\(\)"):
         optimize(PROBLEM, proposer=Listed)  # type: ignore[arg-type]
 
 
-def test_a_folder_that_is_deleted_while_the_run_goes_on_is_said_at_once(tmp_path: Path) -> None:
+def test_deleted_run_folder_is_reported_at_once(tmp_path: Path) -> None:
     def delete(progress: Progress) -> None:
         if progress.number == 6:
             shutil.rmtree(tmp_path / "run")
@@ -326,7 +326,7 @@ def test_a_folder_that_is_deleted_while_the_run_goes_on_is_said_at_once(tmp_path
         optimize(PROBLEM, proposer="none", n_init=2, n_total=50, out=tmp_path / "run", watch=delete)
 
 
-def test_progress_tells_the_standing() -> None:
+def test_progress_reports_hypervolume_and_front_size() -> None:
     seen: list[Progress] = []
     run = optimize(OPEN, proposer=Listed(), n_init=3, n_step=2, n_total=4, watch=seen.append)
     finished = [progress for progress in seen if progress.doing == "finished"]
@@ -341,25 +341,25 @@ def test_progress_tells_the_standing() -> None:
     "settings",
     [{"seed": 2**31}, {"n_step": 0}, {"n_init": 0}, {"n_total": 0}, {"seed": -1}, {"n_total": 1.5}, {"n_step": True}],
 )
-def test_settings_that_make_no_sense_are_refused(settings: dict[str, int]) -> None:
+def test_settings_out_of_range_are_refused(settings: dict[str, int]) -> None:
     with pytest.raises(SettingsError, match=f"{next(iter(settings))} = "):
         optimize(PROBLEM, proposer="none", **settings)
 
 
-def test_a_front_outside_the_reference_box_counts_nothing() -> None:
+def test_front_outside_reference_box_has_no_hypervolume() -> None:
     problem = Problem(Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0)))
     run = short(problem=problem)
     assert run.hypervolume.tolist() == [0.0] * 8
     assert run.front
 
 
-def test_more_joints_and_other_masses_run_too() -> None:
+def test_study_runs_with_one_and_eight_joints() -> None:
     for joints in (1, 8):
         space = PROBLEM.space.model_copy(update={"joints": joints})
         run = optimize(Problem(PROBLEM.task, space), proposer="rules", n_init=3, n_step=2, n_total=4)
         assert len(run.trials) == 7
 
 
-def test_history_evaluates_finished_trials_again_to_the_same_values() -> None:
+def test_history_reevaluates_trials_to_equal_values() -> None:
     history = short().history
     assert PROBLEM.outcomes(history.evaluation(range(13))).values.tolist() == [list(trial.values) for trial in history]
