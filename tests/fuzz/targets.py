@@ -347,14 +347,16 @@ class _Answered:
 
 @cache
 def drafter(written: bool) -> tuple[Any, _Answered]:
-    from armwright.llm.configuration import ModelName
+    from armwright.llm.configuration import ConfiguredModel
     from armwright.llm.draft import Drafter
+    from armwright.llm.model_options import ModelOptions
 
     made = Drafter(
-        ModelName("openai-chat:stand-in", "http://127.0.0.1:9/v1", "--model"),
+        ConfiguredModel(
+            ModelOptions(model="openai-chat:stand-in", base_url="http://127.0.0.1:9/v1", origin="scripted"), "--model"
+        ),
         folder() / "drafts" / "in" if written else None,
         force=True,
-        origin="scripted",
     )
     answers = _Answered()
     made.backend = answers  # type: ignore[assignment]
