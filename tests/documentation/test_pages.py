@@ -22,6 +22,7 @@ import armwright as aw
 from armwright.cli.app import app
 from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import ExperimentPlan, load_experiment
+from armwright.llm.configuration import load_model_options
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 from tests import ROOT
@@ -263,6 +264,9 @@ def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
         plan, beside = load_experiment("shown.yaml")
         cells, skipped = plan_cells(plan, beside, in_folder / "out")
         assert len(cells) + len(skipped) == len(plan.methods) * len(plan.task_list) * len(plan.seed_list)
+    elif "model" in content:
+        file.write_text(block.text)
+        assert load_model_options("shown.yaml").model == content["model"]
     elif content.keys() & (Task.model_fields.keys() - DesignSpace.model_fields.keys()):
         named = "" if "name" in content else "name: shown\n"  # a part of a file
         some = "" if {"targets", "workspace"} & content.keys() else "targets: [[0.3, 0.0, 0.2]]\n"
