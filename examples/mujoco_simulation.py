@@ -23,7 +23,7 @@ SECONDS = 1.0  # for each target
 
 @aw.evaluator("distance [m]", "work [J]", worst=(10.0, 100.0))
 def follow(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
-    """what becomes of the arm in a simulation: its distance from the targets, and the work of its motors"""
+    """Simulate the arm at its targets; return its total distance from them and the work of its motors."""
     model = mujoco.MjModel.from_xml_string(aw.to_mjcf(arm))
     model.opt.timestep = 0.002
     model.dof_armature[:] = 1e-4  # [kg m²] of the rotors, without which joints of so light arms are stiff to compute

@@ -31,13 +31,13 @@ print(len(sys.argv) - 1, "files load in MuJoCo", mujoco.__version__)
 
 
 def run(*command: str | Path, folder: Path = ROOT) -> None:
-    """A command, told; CalledProcessError where it fails."""
+    """Print and run a command; raises CalledProcessError if it fails."""
     print("$", *command, flush=True)
     subprocess.run([str(part) for part in command], cwd=folder, check=True)
 
 
 def build() -> tuple[Path, Path]:
-    """The sdist, and the wheel that was built from it."""
+    """Build the sdist and, from it, the wheel; return both."""
     shutil.rmtree(DIST, ignore_errors=True)
     run(sys.executable, "-m", "build", "--outdir", DIST)
     (sdist,), (wheel,) = DIST.glob("*.tar.gz"), DIST.glob("*.whl")
@@ -45,7 +45,7 @@ def build() -> tuple[Path, Path]:
 
 
 def check_sdist(sdist: Path) -> None:
-    """It holds what git holds, and nothing else."""
+    """Check that the sdist holds exactly the files of git."""
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     tracked = {name for name in listed.splitlines() if not name.startswith(NOT_PACKED)}
     with tarfile.open(sdist) as archive:
@@ -54,7 +54,7 @@ def check_sdist(sdist: Path) -> None:
 
 
 def check_wheel(wheel: Path) -> None:
-    """It holds src/armwright whole, its metadata and the licences, and nothing else."""
+    """Check that the wheel holds src/armwright, its metadata and the licences, and nothing else."""
     listed = subprocess.run(["git", "ls-files", "src"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     tracked = {name.removeprefix("src/") for name in listed.splitlines()}
     info = "-".join(wheel.name.split("-")[:2]) + ".dist-info/"
@@ -104,7 +104,7 @@ def try_lowest(wheel: Path, python: str, folder: Path) -> None:
 
 
 def environment(python: str, folder: Path) -> Path:
-    """The Python of a bare environment."""
+    """Create a bare environment and return its Python."""
     run(python, "-m", "venv", folder)
     return folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 

@@ -76,7 +76,7 @@ FORMATS = ("urdf", "xacro", "srdf", "ros2_control", "sdf", "mjcf", "sheet", "she
 
 
 def python(*args: str, code: int = 0, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A process of this Python, whose end is as it must be."""
+    """Run a process of this Python and check its exit code."""
     # Deprecations in libraries are theirs; those in our own lines are told by the file that the warning names.
     env = {**os.environ, "PYTHONWARNINGS": "default", "ARMWRIGHT_MODEL": "", "NO_COLOR": "1", **environment}
     done = subprocess.run([sys.executable, "-P", *args], capture_output=True, encoding="utf-8", env=env)
@@ -89,7 +89,7 @@ def python(*args: str, code: int = 0, **environment: str) -> subprocess.Complete
 
 
 def armwright(*args: str, code: int = 0, **environment: str) -> subprocess.CompletedProcess[str]:
-    """The command line, told."""
+    """Print and run an armwright command."""
     print("armwright", *args, flush=True)
     return python("-m", "armwright", *args, code=code, **environment)
 

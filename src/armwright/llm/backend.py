@@ -76,7 +76,7 @@ class LlmBackend(Protocol):
     origin: str
 
     def begin(self) -> None:
-        """A session begins; what was cancelled before is past."""
+        """Start a session; an earlier cancellation no longer counts."""
         ...
 
     def check(self, question: Question = CHECK) -> Reply:
@@ -84,13 +84,13 @@ class LlmBackend(Protocol):
         ...
 
     def ask(self, question: Question) -> Reply:
-        """The free answer; CallError where there is none."""
+        """Return the free answer; raises CallError if there is none."""
         ...
 
     def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
-        """The answer as JSON of `schema` that `read` takes; what it refuses is asked again in its words."""
+        """Return an answer as JSON of `schema` that `read` accepts; its refusals are sent back to the model."""
         ...
 
     def cancel(self) -> None:
-        """Ends all that is under way, at once; until the next session nothing more begins."""
+        """Cancel all calls at once; none starts before the next session."""
         ...

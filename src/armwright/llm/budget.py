@@ -26,14 +26,14 @@ class CallBudget:
         self._forget()
 
     def begin(self, calls: Iterable[Call]) -> None:
-        """A session begins; these calls were made before."""
+        """Start a session, given the calls of earlier ones."""
         with self._change:
             self._forget()
         for call in calls:
             self.spend(call)
 
     def spend(self, call: Call) -> None:
-        """A call was made."""
+        """Count a call."""
         with self._change:
             self._requests += max(1, call.requests)
             if call.requests:  # else nothing was answered, and nothing is to be paid
@@ -49,7 +49,7 @@ class CallBudget:
 
     @contextmanager
     def reserved(self, is_over: Callable[[], bool]) -> Generator[int | None]:
-        """Sets aside what a question may take, and gives the number of its requests; None for no bound.
+        """Reserve what a prompt may cost and return its number of requests; None if there is no limit.
 
         Waits where what is left is set aside for others, until they have come back, or the session is over.
         ProposalError where nothing is left.
@@ -97,7 +97,7 @@ class CallBudget:
             raise ProposalError("budget", f"max_cost {self.max_cost:g} USD is used up", final=True)
 
     def _left(self, set_aside: int) -> int:
-        """Requests of the next question, where so many are set aside for others."""
+        """Return the requests left for the next prompt while this many are reserved for others."""
         left = MOST_REQUESTS
         if self.max_calls is not None:
             left = min(left, self.max_calls - self._requests - set_aside)

@@ -119,7 +119,7 @@ class ModelClient(LlmBackend):
         self._cancelled = False
 
     def begin(self) -> None:
-        """A session begins."""
+        """Start a session."""
         self._cancelled = False
 
     def check(self, question: Question = CHECK) -> Reply:
@@ -127,15 +127,14 @@ class ModelClient(LlmBackend):
         return self._run(Agent(self._model), question, CHECK_SECONDS)
 
     def ask(self, question: Question) -> Reply:
-        """The free answer to a prompt."""
+        """Return the free answer to a prompt."""
         reply = self._run(Agent(self._model, retries=REASKS), question, self.timeout)
         if not reply.text.strip():
             raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
 
     def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
-        """The answer as JSON of `schema` that `read` takes; its refusal goes back in its words."""
-
+        """Return an answer as JSON of `schema` that `read` accepts; its refusals are sent back to the model."""
         accepted: list[str] = []
 
         def accept(answer: dict[str, Any]) -> dict[str, Any]:
@@ -152,7 +151,7 @@ class ModelClient(LlmBackend):
         return replace(self._run(agent, question, self.timeout), text=accepted[-1])
 
     def cancel(self) -> None:
-        """Ends all calls under way, and those that are about to begin."""
+        """Cancel all calls, including those about to start."""
         self._cancelled = True
         for future in list(self._pending):
             future.cancel()
@@ -189,7 +188,7 @@ class ModelClient(LlmBackend):
         )
 
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
-        """The coroutine's result, from an event loop in a thread of its own.
+        """Run the coroutine in the event-loop thread and return its result.
 
         One loop serves all callers: connections are kept open in it, and it works from any thread, also inside
         a notebook's running loop.
@@ -255,7 +254,7 @@ class _Place:
 
 
 def _place(model: str, base_url: str | None) -> _Place | None:
-    """The server of a model; None where it is the vendor's."""
+    """Return the address of a model's server; None for the vendor's own."""
     vendor, _, bare = model.partition(":")
     if base_url:
         return _Place(base_url, model.removeprefix("openai-chat:"), SERVER_KEY)
@@ -266,7 +265,7 @@ def _place(model: str, base_url: str | None) -> _Place | None:
 
 
 def _model(name: str) -> Model:
-    """A vendor's model by its name; SettingsError where that is unknown, or its key is not set."""
+    """Return a vendor's model; raises SettingsError if its name is unknown or its key is not set."""
     if ":" not in name:
         raise SettingsError(f'model "{name}": a vendor is needed before it, like openai-chat:{name}; or set base_url')
     try:
@@ -280,7 +279,7 @@ def _model(name: str) -> Model:
 
 
 def _own_server(at: _Place) -> Model:
-    """A model behind an OpenAI-compatible server. Nothing that belongs to a vendor goes there."""
+    """Return a model behind an OpenAI-compatible server, which never receives a vendor's key."""
     base_url = at.address
     if not base_url.startswith(("http://", "https://")):
         raise SettingsError(f"base_url {base_url}: an address that begins with http:// or https:// is needed")
@@ -307,7 +306,7 @@ def _is_address(url: str) -> bool:
 
 
 def _json_alone(response: ModelResponse) -> ModelResponse:
-    """The response without the words around its JSON; `_text` finds them in its metadata."""
+    """Return the response without the text around its JSON; `_text` reads that from its metadata."""
     parts = [
         replace(p, content=without_words_around(p.content)) if isinstance(p, TextPart) else p for p in response.parts
     ]
@@ -315,7 +314,7 @@ def _json_alone(response: ModelResponse) -> ModelResponse:
 
 
 def _text(response: ModelResponse) -> str:
-    """What the model wrote, the arguments of a tool call included, so that a refused answer can be read later."""
+    """Return all text of the model, tool-call arguments included, so that a refused answer can be inspected."""
     if response.metadata and _WRITTEN in response.metadata:
         return response.metadata[_WRITTEN]
     written = [str(part.content or "") for part in response.parts if isinstance(part, TextPart)]  # null, from some

@@ -53,7 +53,7 @@ PASSING = (
 
 
 def kind_of_fault(fault: Exception) -> str:
-    """One word: key, quota, rate_limit, server, timeout, connection, context, refused, answer, …"""
+    """Classify a failed call in one word, such as key, quota, rate_limit, server, timeout, context or answer."""
     if _key_cannot_be_sent(fault):
         return "key"
     if isinstance(fault, _MALFORMED):
@@ -62,7 +62,7 @@ def kind_of_fault(fault: Exception) -> str:
 
 
 def describe_fault(fault: Exception) -> str:
-    """What went wrong, in the server's own words where it gave some, else with the reason behind it."""
+    """Describe an error by the server's own message, or else by its cause."""
     if _key_cannot_be_sent(fault):
         return "its key cannot be sent: it holds a line break, or a letter that no key has"
     if isinstance(fault, faults.ModelHTTPError):
@@ -76,7 +76,7 @@ def describe_fault(fault: Exception) -> str:
 
 
 def _message(body: Any) -> str | None:
-    """The message of an error's body: OpenAI's {"message": …}, Anthropic's {"error": {"message": …}}."""
+    """Return the message of an error body: {"message": …} (OpenAI) or {"error": {"message": …}} (Anthropic)."""
     for _ in range(2):
         if isinstance(body, dict):
             content = cast("dict[str, Any]", body)
@@ -94,7 +94,7 @@ def _key_cannot_be_sent(fault: BaseException) -> bool:
 
 
 def _causes(fault: BaseException) -> list[BaseException]:
-    """The fault, and what is behind it."""
+    """Yield the exception and its causes."""
     causes = [fault]
     while (cause := causes[-1].__cause__) is not None and cause not in causes:
         causes.append(cause)

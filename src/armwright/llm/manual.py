@@ -31,7 +31,7 @@ class ManualBackend(LlmBackend):
         self._seen: dict[Path, tuple[int, int]] = {}  # files' sizes and times when last looked at
 
     def begin(self) -> None:
-        """A session begins."""
+        """Start a session."""
         self._cancelled.clear()
 
     def check(self, question: Question = CHECK) -> Reply:
@@ -39,7 +39,7 @@ class ManualBackend(LlmBackend):
         return Reply("")
 
     def ask(self, question: Question) -> Reply:
-        """The free answer."""
+        """Return the free answer."""
         return self.ask_text(question, lambda text: text)
 
     def ask_for(self, question: Question, schema: Mapping[str, Any], read: Any) -> Reply:
@@ -47,11 +47,11 @@ class ManualBackend(LlmBackend):
         raise NotImplementedError
 
     def cancel(self) -> None:
-        """Waits no longer."""
+        """Stop waiting."""
         self._cancelled.set()
 
     def files(self, number: int) -> tuple[Path, Path]:
-        """The question for trial `number`, and its answer."""
+        """Return the paths of the question and the answer for trial `number`."""
         return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
 
     def is_answered(self, number: int) -> bool:
@@ -59,7 +59,7 @@ class ManualBackend(LlmBackend):
         return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
 
     def ask_text(self, question: Question, read: TextReader) -> Reply:
-        """The answer as `read` gives it; what it refuses (DesignError) is put aside, with the reason, for another."""
+        """Return the answer read by `read`; a refused one (DesignError) is moved aside with the reason."""
         started = time.perf_counter()
         number = int(question.proposal.rpartition("-")[2])
         asked, _ = self.files(number)

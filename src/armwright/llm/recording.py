@@ -28,15 +28,15 @@ class ReplayBackend(LlmBackend):
         """Nothing to begin."""
 
     def check(self, question: Question = CHECK) -> Reply:
-        """The first recorded check."""
+        """Return the first recorded check."""
         return self._play(next(call for call in self.calls if call.step == "check"))
 
     def ask(self, question: Question) -> Reply:
-        """The recorded answer to this step of the proposal."""
+        """Return the recorded answer to this step of the proposal."""
         return self._answer(question)
 
     def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
-        """The recorded answer, in the form in which it was kept."""
+        """Return the recorded answer in its stored form."""
         return self._answer(question)
 
     def cancel(self) -> None:

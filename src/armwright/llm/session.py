@@ -31,7 +31,7 @@ class LlmSession:
         self._over = threading.Event()  # set when no more answers are wanted in this session
 
     def summary(self) -> ProposerSummary:
-        """Calls, tokens and cost of the whole run, earlier sessions included."""
+        """Return calls, tokens and cost of the whole run, earlier sessions included."""
         return self._summary(self._transcript.calls)
 
     def _summary(self, calls: Sequence[Call]) -> ProposerSummary:
@@ -49,20 +49,20 @@ class LlmSession:
         )
 
     def cancel(self) -> None:
-        """Ends the calls under way, and begins no more in this session."""
+        """Cancel all calls and start no more in this session."""
         self._over.set()
         self._budget.wake()
         self.backend.cancel()
 
     def _begin(self, transcript: Path | None) -> None:
-        """A session begins; what was said before lies in `transcript`."""
+        """Start a session; `transcript` holds the earlier ones."""
         self._transcript = Transcript(transcript)
         self._budget.begin(self._transcript.calls)
         self._over = threading.Event()
         self.backend.begin()
 
     def _call(self, question: Question, ask: Callable[[Question], Reply], over: threading.Event) -> str:
-        """The answer; what came back is kept, and what it cost, even if the call was cut short by Ctrl-C."""
+        """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call."""
         with self._budget.reserved(over.is_set) as requests:
             try:
                 reply = ask(replace(question, most_requests=requests))

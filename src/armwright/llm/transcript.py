@@ -70,7 +70,7 @@ class Transcript:
         return tuple(self._calls)
 
     def add(self, call: Call) -> None:
-        """Keeps a call; on disk before this returns, because its answer was paid for."""
+        """Record a call on disk before returning, because its answer was paid for."""
         with self._lock:
             self._calls.append(call)
             if self._path is None:
@@ -82,13 +82,13 @@ class Transcript:
                 raise RunFolderError(f"cannot write {self._path}: {fault.strerror or fault}") from fault
 
     def answered(self, proposal: str, step: str) -> Call | None:
-        """The call that answered this step of a proposal, if one did."""
+        """Return the call that answered this step of a proposal, if any."""
         found = [c for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.fault is None]
         return found[-1] if found else None
 
 
 def used_hints(calls: Iterable[Call]) -> dict[Hint, str]:
-    """The hints that were used, and for which proposals.
+    """Return the used hints and their proposals.
 
     A hint is used by the call that carried it to the model, whatever came back. Where nothing was read (no connection,
     no answer in time, Ctrl-C), it goes with the next question.
@@ -97,13 +97,13 @@ def used_hints(calls: Iterable[Call]) -> dict[Hint, str]:
 
 
 def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
-    """The hints that the question for a proposal went with; where it was asked again, the last time."""
+    """Return the hints in the latest prompt for a proposal."""
     asked = (call for call in reversed(calls) if call.proposal == proposal and call.step in FIRST_STEPS)
     return next((call.hints for call in asked), ())
 
 
 def _append(file: FileIO, line: bytes) -> None:
-    """Adds a line to a file, or nothing: a part of one would spoil the next, which another thread may write."""
+    """Append a whole line or nothing: a partial line would corrupt the next one, perhaps of another thread."""
     before = os.fstat(file.fileno()).st_size
     try:
         if file.write(line) != len(line):
@@ -122,7 +122,7 @@ def _record(call: Call) -> dict[str, Any]:
 
 
 def _read(path: Path, mend: bool) -> Iterator[Call]:
-    """The calls of a file; mend: a last line that a crash cut short is dropped from the file, too."""
+    """Read the calls of a file; `mend` removes a last line that a crash cut short."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
