@@ -141,7 +141,7 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
         ("- a\n- list", "keys and values"),
         ("a: [", "not valid YAML"),
         ("a: &x 1\nb: *x", "aliases"),
-        ("joints: 4\njoints: 5", "twice"),
+        ("joints: 4\njoints: 5", "duplicate key"),
     ],
 )
 def test_invalid_space_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
