@@ -293,5 +293,5 @@ def test_every_key_of_an_experiment_s_method_is_an_option() -> None:
     options = {parameter.name for parameter in cli()["optimize"].params}
     assert set(ExperimentPlan.model_fields["methods"].annotation.__args__[1].model_fields) <= options | {
         "label",
-        "front",
+        "design",
     }  # type: ignore[union-attr]
