@@ -2,6 +2,8 @@
 
 import re
 import unicodedata
+from collections.abc import Callable
+from typing import Any, cast
 
 _ESCAPE = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]")  # terminal colours and other escape sequences
 
@@ -10,11 +12,11 @@ def one_line(text: str, most: int) -> str:
     """Return `text` on one line of at most `most` characters, without invisible characters."""
     if len(text) > 8 * most:
         text = text[: 8 * most]  # an upper bound for blanks and colour codes
-    text = " ".join(_visible(text).split())
+    text = " ".join(visible(text).split())
     return text if len(text) <= most else text[: most - 2].rstrip() + " …"
 
 
-def _visible(text: str) -> str:
+def visible(text: str) -> str:
     """Replace control characters by blanks and drop characters without width."""
     kinds = ((letter, unicodedata.category(letter)) for letter in _ESCAPE.sub("", text))
     return "".join(" " if kind == "Cc" else letter for letter, kind in kinds if kind not in ("Cf", "Cs"))
@@ -31,9 +33,20 @@ def without_thoughts(text: str) -> str:
 
 def end_of(text: str, most: int) -> str:
     """Return the last `most` characters of `text`, where the answer is, without invisible characters."""
-    return "\n".join(map(_visible, text[-most:].splitlines()))
+    return "\n".join(map(visible, text[-most:].splitlines()))
 
 
 def fence(text: str) -> str:
     """Return a line of dashes that is longer than any in `text`."""
     return "-" * max([9, *map(len, re.findall(r"-+", text))]) + "-"
+
+
+def map_text(content: Any, change: Callable[[str], str]) -> Any:
+    """Return JSON content with every text in it changed; names and numbers stay."""
+    if isinstance(content, str):
+        return change(content)
+    if isinstance(content, list):
+        return [map_text(item, change) for item in cast("list[Any]", content)]
+    if isinstance(content, dict):
+        return {name: map_text(value, change) for name, value in cast("dict[Any, Any]", content).items()}
+    return content

@@ -1,6 +1,6 @@
 """Untrusted YAML documents: read safely, checked against a schema, refused with a one-line error."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -58,6 +58,11 @@ def check_document(data: dict[Any, Any], schema: type[Schema], error: type[Excep
         message = first["msg"].removeprefix("Value error, ")
         got = "" if first["type"] in ("missing", "value_error") else f" (got {_shorten(first['input'])})"
         raise error(f"{where}: {at + ': ' if at else ''}{message}{got}") from fault
+
+
+def dump_document(content: Mapping[str, Any]) -> str:
+    """Return content as YAML, without aliases, and with points on one line."""
+    return yaml.dump(dict(content), Dumper=_DocumentDumper, sort_keys=False, allow_unicode=True)
 
 
 # libyaml, if PyYAML was built with it, is five times as fast.
@@ -130,3 +135,17 @@ def _shorten(value: object) -> str:
     except ValueError:  # an integer of more than 4300 digits
         text = "a huge number"
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+class _DocumentDumper(yaml.SafeDumper):
+    """YAML without aliases, points on one line."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+    def represent_sequence(self, tag: str, sequence: Any, flow_style: bool | None = None) -> yaml.SequenceNode:
+        plain = all(not isinstance(item, (dict, list)) for item in sequence)
+        return super().represent_sequence(tag, sequence, flow_style=plain)
+
+
+_DocumentDumper.add_representer(list, _DocumentDumper.represent_list)

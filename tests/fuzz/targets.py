@@ -314,50 +314,50 @@ def any_of(reads: Iterable[Callable[[], object]]) -> None:
 
 
 def draft_seeds() -> list[bytes]:
-    task, space = RICH_TASK.decode(), RICH_SPACE.decode()
-    plain = (ROOT / "examples" / "2-assembly-task.yaml").read_text()
-    plain_space = (ROOT / "examples" / "2-assembly-space.yaml").read_text()
-    small = "name: drafted\ntargets: [[0.4, 0, 0.1], [0.4, 0.2, 0.1]]\nprovenance: made up\n"
-    return [
-        f"TASK\n```yaml\n{task}```\nSPACE\n```yaml\n{space}```\nASSUMED\n- one\n- two\n".encode(),
-        f"Here it is:\n\n```\n{plain}```\n\n```\n{plain_space}```\n".encode(),
-        f"{small}\n---\n{plain_space}\nASSUMPTIONS:\n1. all\n".encode(),
-        f"TASK:\n{small}".encode(),
-        small.encode(),
+    rich = {"task": yaml.safe_load(RICH_TASK), "space": yaml.safe_load(RICH_SPACE)}
+    names = ("task", "space")
+    plain = {name: yaml.safe_load((ROOT / "examples" / f"2-assembly-{name}.yaml").read_text()) for name in names}
+    small = {"name": "drafted", "targets": [[0.4, 0, 0.1], [0.4, 0.2, 0.1]], "provenance": "made up"}
+    answers = [
+        {**rich, "assumptions": ["one", "two"], "questions": ["three"]},
+        {"reasoning": "so", **plain},
+        {"task": small, "space": None, "assumptions": "all"},
+        {"task": small},
     ]
+    return [json.dumps(answer).encode() for answer in answers]
 
 
 class _Answered:
-    """A model that says one thing."""
+    """A model that gives one answer."""
 
     model, origin = "stand-in", "scripted"
 
     def __init__(self) -> None:
-        self.words = ""
+        self.text = ""
 
     def begin(self) -> None: ...
 
     def cancel(self) -> None: ...
 
-    def ask(self, question: Any) -> Any:
-        from armwright.llm.backend import Reply
+    def ask_for(self, question: Any, schema: Any, read: Any) -> Any:
+        from armwright.llm.backend import CallError, Reply
 
-        return Reply(self.words, requests=1)
+        try:
+            content = json.loads(self.text)
+        except (ValueError, RecursionError):
+            content = None
+        if not isinstance(content, dict):
+            raise CallError("answer", "no object", Reply(self.text, requests=1))
+        return Reply(read(content), requests=1)
 
 
 @cache
 def drafter(written: bool) -> tuple[Any, _Answered]:
     from armwright.llm.configuration import ConfiguredModel
     from armwright.llm.draft import Drafter
-    from armwright.llm.model_options import ModelOptions
 
-    made = Drafter(
-        ConfiguredModel(
-            ModelOptions(model="openai-chat:stand-in", base_url="http://127.0.0.1:9/v1", origin="scripted"), "--model"
-        ),
-        folder() / "drafts" / "in" if written else None,
-        force=True,
-    )
+    options = aw.ModelOptions(model="openai-chat:stand-in", base_url="http://127.0.0.1:9/v1", origin="scripted")
+    made = Drafter(ConfiguredModel(options, "--model"), folder() / "drafts" / "in" if written else None, force=True)
     answers = _Answered()
     made.backend = answers  # type: ignore[assignment]
     return made, answers
@@ -370,7 +370,7 @@ def run_draft(data: bytes) -> None:
     is_written = len(data) % 8 == 0
     made, answers = drafter(is_written)
     made._transcript = Transcript(None)
-    answers.words = text
+    answers.text = text
     try:
         draft = made.draft("put it down there")
     finally:

@@ -115,29 +115,32 @@ def actuators(json_: Json = False) -> None:
 
 
 def draft(
-    words: Annotated[list[str], typer.Argument(metavar="WORDS...", help="The task of the arm, in any language.")],
+    description: Annotated[
+        list[str], typer.Argument(metavar="DESCRIPTION...", help="The task of the arm, in any language.")
+    ],
     model: ModelName = None,
     max_cost: MaxCost = None,
     model_options: ModelOptionsFile = None,
     out: Annotated[Path, typer.Option(help="Folder for the files.")] = Path("."),
     force: Annotated[bool, typer.Option("--force", help="Replace files of the same name.")] = False,
     print_prompt: Annotated[
-        bool, typer.Option("--print-prompt", help="Print exactly what would be sent, and exit.")
+        bool, typer.Option("--print-prompt", help="Print the prompt and the schema that would be sent, and exit.")
     ] = False,
     json_: Annotated[bool, typer.Option("--json", help="Print only a JSON record to stdout.")] = False,
 ) -> None:
-    """Have a language model draft a task file, and a space file if needed, from WORDS.
+    """Have a language model draft a task file, and a space file if needed, from DESCRIPTION.
 
     Nothing is run.
     """
     from armwright.cli.show_inputs import show_draft
     from armwright.llm.configuration import load_model_options
     from armwright.llm.draft import Drafter, drafting_model
-    from armwright.llm.draft_prompt import draft_prompt
+    from armwright.llm.draft_prompt import draft_prompt, draft_schema
 
-    request = " ".join(words)
+    request = " ".join(description)
     if print_prompt:
-        print(draft_prompt(request), end="")
+        print(draft_prompt(request))
+        print_json(draft_schema())
         return
     console = stderr_console() if json_ else stdout_console()
     options = load_model_options(model_options, model=model, max_cost=max_cost)

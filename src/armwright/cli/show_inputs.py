@@ -99,17 +99,19 @@ def show_draft(console: Console, draft: Draft) -> None:
         console.print("design space: the default; no space file is needed")
     else:
         console.print("design space, other values are the defaults:")
-        console.print(textwrap.indent(draft.space_body, "  "), end="")
+        console.print(textwrap.indent(draft.space_yaml, "  "), end="")
     console.print(
-        "assumed:" if draft.assumed else f"{draft.by} lists no assumptions; check the files all the more carefully"
+        "assumed:" if draft.assumptions else f"{draft.by} lists no assumptions; check the files all the more carefully"
     )
-    for line in draft.assumed:
+    for line in draft.assumptions:
         console.print(f"  - {line}")
-    account = draft.account
-    cost = "cost unknown" if account.cost_usd is None else f"{account.cost_usd:.4f} USD"
+    for line in draft.questions:
+        console.print(f"  ? {line}")
+    usage = draft.usage
+    cost = "cost unknown" if usage.cost_usd is None else f"{usage.cost_usd:.4f} USD"
     console.print(
-        f"{draft.by}: {account.calls} {'call' if account.calls == 1 else 'calls'}, {account.input_tokens:,} tokens in, "
-        f"{account.output_tokens:,} out, {cost}, {account.seconds:.1f} s"
+        f"{draft.by}: {usage.calls} {'call' if usage.calls == 1 else 'calls'}, {usage.input_tokens:,} tokens in, "
+        f"{usage.output_tokens:,} out, {cost}, {usage.seconds:.1f} s"
     )
     console.print(f"wrote {' and '.join(map(str, draft.files))}: a draft. Check and edit the numbers, then run:")
     console.print(f"  armwright tasks {shlex.quote(str(draft.files[0]))}\n  {draft.command}")

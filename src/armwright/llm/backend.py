@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from armwright.exceptions import ProposalError
 from armwright.runs.control import Hint
 
-# Turns an answer's JSON into the text that is kept of it; DesignError, in the design space's words, refuses it.
+# Turns an answer's JSON into the text that is kept of it; UsageError, in its own words, refuses it.
 Reader = Callable[[Mapping[str, Any]], str]
 TextReader = Callable[[str], str]  # the same for an answer in free text
 

@@ -15,7 +15,7 @@ from ipaddress import ip_address
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
-from armwright.exceptions import DesignError, MissingExtraError, SettingsError
+from armwright.exceptions import MissingExtraError, SettingsError, UsageError
 from armwright.extras import requires_extra
 from armwright.llm.answer import without_words_around
 from armwright.llm.backend import CHECK, MOST_REQUESTS, CallError, Interrupted, LlmBackend, Question, Reader, Reply
@@ -136,19 +136,28 @@ class ModelClient(LlmBackend):
     def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
         """Return an answer as JSON of `schema` that `read` accepts; its refusals are sent back to the model."""
         accepted: list[str] = []
+        refusals: list[str] = []
 
         def accept(answer: dict[str, Any]) -> dict[str, Any]:
             try:
                 # Keys are blotted out before, not after: what is kept is what was read, and can be read again.
                 accepted.append(_printable(read(without_keys(answer))))
-            except DesignError as refusal:
+            except UsageError as refusal:
+                refusals.append(str(refusal))
                 raise ModelRetry(str(refusal)) from refusal
             return answer
 
         output = self._output(StructuredDict(dict(schema)))
         agent: Agent[None, Any] = Agent(self._model, output_type=output, retries=REASKS)
         agent.output_validator(accept)
-        return replace(self._run(agent, question, self.timeout), text=accepted[-1])
+        try:
+            reply = self._run(agent, question, self.timeout)
+        except CallError as fault:
+            if fault.kind != "limit" or not refusals:
+                raise
+            message = f"{self.model}: max_calls leaves no request after an invalid answer ({_one_line(refusals[-1])})"
+            raise CallError(fault.kind, message, fault.reply) from fault
+        return replace(reply, text=accepted[-1])
 
     def cancel(self) -> None:
         """Cancel all calls, including those about to start."""

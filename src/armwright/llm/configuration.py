@@ -19,10 +19,14 @@ class ConfiguredModel:
     options: ModelOptions
     named_by: str
 
+    @property
+    def place(self) -> str:
+        """The server in words; empty for the vendor's."""
+        return f" at {self.options.base_url}" if self.options.base_url else ""
+
     def __str__(self) -> str:
-        """Return model, server and origin of the name in one phrase."""
-        server = f" at {self.options.base_url}" if self.options.base_url else ""
-        return f"{self.options.model}{server}, named by {self.named_by}"
+        """Return the model, its server and who named it, in one phrase."""
+        return f"{self.options.model}{self.place}, named by {self.named_by}"
 
 
 def configuration_path() -> Path:

@@ -69,7 +69,8 @@ def describe_fault(fault: Exception) -> str:
         said = _message(fault.body)
         return f"{said} (HTTP {fault.status_code})" if said else str(fault)
     if isinstance(fault, faults.UnexpectedModelBehavior | faults.ModelConnectionError):
-        behind = _causes(fault)[-1]
+        causes = _causes(fault)
+        behind = next((cause for cause in causes if isinstance(cause, faults.ModelRetry)), causes[-1])
         reason = str(behind) or type(behind).__name__
         return fault.message if reason in str(fault) else f"{fault.message.rstrip('.')}: {reason}"
     return str(fault)

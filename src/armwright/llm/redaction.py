@@ -4,7 +4,9 @@ import logging
 import os
 import re
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any
+
+from armwright.text import map_text
 
 _NAMES = re.compile(r"(^|_)(KEY|TOKEN|SECRET|PASSWORD)$")
 _SENT = re.compile(r"(^|_)API_(KEY|TOKEN)$")  # what vendors' clients read, and send
@@ -39,14 +41,8 @@ def redacted(text: str) -> str:
 
 
 def without_keys(content: Any) -> Any:
-    """JSON with every key of the environment blotted out of its texts; names and numbers stay as they are."""
-    if isinstance(content, str):
-        return redacted(content)
-    if isinstance(content, list):
-        return [without_keys(item) for item in cast("list[Any]", content)]
-    if isinstance(content, dict):
-        return {name: without_keys(value) for name, value in cast("dict[Any, Any]", content).items()}
-    return content
+    """Return JSON content with the keys of the environment redacted in every text."""
+    return map_text(content, redacted)
 
 
 def _keys() -> Iterator[tuple[str, str]]:

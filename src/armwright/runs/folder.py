@@ -17,9 +17,8 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Self, cast
+from typing import BinaryIO, Self, cast
 
-import yaml
 from filelock import FileLock, Timeout
 
 from armwright.exceptions import RunConflictError, RunFolderError
@@ -32,7 +31,7 @@ from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial, trial_line
 from armwright.runs.trials_file import TRIALS, read_trials
 from armwright.spaces.design_space import DesignSpace
-from armwright.yaml_documents import parse_document
+from armwright.yaml_documents import dump_document, parse_document
 
 LOCK = ".lock"  # held by whoever writes; the system lets go of a dead process's, and the file stays
 LOCK_SECONDS = 2.0  # that a command waits for it: the workers of a killed experiment take a moment to end
@@ -129,7 +128,7 @@ class RunFolder:
     def write_config(self, config: RunConfig) -> None:
         """Replace config.yaml atomically."""
         content = config.model_dump(mode="json")
-        self.write_text(CONFIG, yaml.dump(content, Dumper=_ConfigDumper, sort_keys=False, allow_unicode=True))
+        self.write_text(CONFIG, dump_document(content))
 
     def open_trials(
         self, space: DesignSpace, n_objectives: int = len(PAPER_OBJECTIVES), n_constraints: int = 0
@@ -209,20 +208,6 @@ def is_held(folder: Path) -> bool:
     finally:
         os.close(lock)  # and with it what was taken
     return False
-
-
-class _ConfigDumper(yaml.SafeDumper):
-    """YAML without aliases, points on one line."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-    def represent_sequence(self, tag: str, sequence: Any, flow_style: bool | None = None) -> yaml.SequenceNode:
-        plain = all(not isinstance(item, (dict, list)) for item in sequence)
-        return super().represent_sequence(tag, sequence, flow_style=plain)
-
-
-_ConfigDumper.add_representer(list, _ConfigDumper.represent_list)
 
 
 def read_config(path: Path) -> RunConfig:
