@@ -13,14 +13,8 @@ from typer.testing import CliRunner
 from armwright.cli.app import app
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError, TaskError, UsageError
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import (
-    OBJECTIVES,
-    PAPER_OBJECTIVES,
-    POSITION_ERROR,
-    RENAMED,
-    Objective,
-    named_objectives,
-)
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, POSITION_ERROR, RENAMED, named_objectives
 from armwright.problem.problem import Problem
 from armwright.report.figures import chosen_members, write_figures
 from armwright.report.page_content import RunContent

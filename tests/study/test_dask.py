@@ -18,7 +18,7 @@ from armwright.exceptions import ClusterError, EvaluatorError, SettingsError, St
 from armwright.experiments.cells import Cell, plan_cells
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.runner import _outcome_of, finished_before, run_cells
-from armwright.problem.objectives import Objective
+from armwright.problem.objective import Objective
 from armwright.runs.control import stop_study
 from armwright.study.cluster import Finished
 from armwright.study.progress import Progress

@@ -9,7 +9,8 @@ from armwright.arrays import Array
 from armwright.kinematics.paths import Paths
 from armwright.pareto import default_reference_point
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objectives import PAPER_OBJECTIVES, POSITION_ERROR, Objective
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import PAPER_OBJECTIVES, POSITION_ERROR
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial

@@ -19,6 +19,7 @@ from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
 from armwright.problem.constraints import Quantity
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     OF_CLEARANCE,
     PEAK_TORQUE,
@@ -28,7 +29,6 @@ from armwright.problem.objectives import (
     TORQUE_UTILISATION,
     UNREACHED_TARGETS,
     WORST_ERROR,
-    Objective,
 )
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Vector

@@ -10,6 +10,7 @@ from armwright.kinematics.ik import UPDATES
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.llm.answer_format import module_lists
 from armwright.llm.feedback import Feedback, Record, points, vector
+from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     OF_CLEARANCE,
     OF_MOVES,
@@ -19,7 +20,6 @@ from armwright.problem.objectives import (
     POSITION_ERROR,
     UNCOVERED_FRACTION,
     UNREACHED_TARGETS,
-    Objective,
 )
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY

@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
 from armwright.problem.evaluation import Evaluation
-from armwright.problem.objectives import MOST_OBJECTIVES, OBJECTIVES, Objective
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import MOST_OBJECTIVES, OBJECTIVES
 from armwright.robot.arm import Arm
 from armwright.tasks.task import Task
 

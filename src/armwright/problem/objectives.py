@@ -1,8 +1,6 @@
 """Objectives: functions of an evaluation, all minimised."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -10,53 +8,13 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.arm_arrays import FIXED, Actuation
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.objective import Objective
 from armwright.tasks.targets import REACHED
 
 TORQUE_SCALE = 40.0  # α of the paper
 FAR = 1.0  # [m]; a clearance counts as no more
 COMFORTABLE = 0.1  # [m] of clearance, beyond which more of it is worth nothing
 MOST_OBJECTIVES = 5  # of which the hypervolume is still computed in no time
-
-Over = Literal["sum", "max", "min", "mean square", "arm"]
-
-
-@dataclass(frozen=True)
-class Objective:
-    """A number per arm that should be small.
-
-    symbol: its name in formulas and prompts.
-    description: what its share of one target is, for a reader who knows nothing of this program; of "arm", what it is.
-    each: its share per target, (N, T); of "arm" what the arm itself is, (N,), whatever the targets.
-    over: what is made of the shares: their sum, the largest, the least, or the root of their mean square.
-    """
-
-    name: str
-    label: str
-    unit: str
-    symbol: str
-    description: str
-    each: Callable[[Evaluation], Array]
-    over: Over = "sum"
-
-    def __call__(self, evaluation: Evaluation) -> Array:
-        """One value per arm, (N,)."""
-        each = self.each(evaluation)
-        match self.over:
-            case "sum":
-                return each.sum(axis=1)
-            case "max":
-                return each.max(axis=1)
-            case "min":
-                return each.min(axis=1)
-            case "mean square":
-                return np.sqrt(np.mean(each**2, axis=1))
-            case "arm":
-                return each
-
-    @property
-    def is_of_targets(self) -> bool:
-        """Whether each target has a share in it."""
-        return self.over != "arm"
 
 
 def _position_error(evaluation: Evaluation) -> Array:

@@ -13,13 +13,8 @@ from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, Quantity, read_constraints
 from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
 from armwright.problem.evaluators import Evaluator
-from armwright.problem.objectives import (
-    OF_ORIENTATION,
-    ORIENTATION_ERROR,
-    PAPER_OBJECTIVES,
-    Objective,
-    named_objectives,
-)
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import OF_ORIENTATION, ORIENTATION_ERROR, PAPER_OBJECTIVES, named_objectives
 from armwright.robot.arm import Arm
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space

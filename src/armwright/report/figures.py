@@ -13,7 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from armwright.exceptions import RunFolderError
 from armwright.experiments.compare_arms import ComparedArm, read_existing_arms
 from armwright.pareto import front_indices, hypervolume, knee_index, paper_solution_indices
-from armwright.problem.objectives import POSITION_ERROR, TORQUE, Objective
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import POSITION_ERROR, TORQUE
 from armwright.report.arm_figures import draw_arm, draw_arms
 from armwright.report.drawing import front_steps, one_panel, several_panels, write_drawn
 from armwright.report.style import (

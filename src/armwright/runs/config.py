@@ -14,7 +14,8 @@ from armwright.exceptions import RunConflictError, RunFolderError
 from armwright.kinematics.devices import Device, usable_device
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.evaluators import Evaluator
-from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES, Objective
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import OBJECTIVES, PAPER_OBJECTIVES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task

@@ -1,0 +1,52 @@
+"""An objective: a number for each target, made from an evaluation, and how these become one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.problem.evaluation import Evaluation
+
+Over = Literal["sum", "max", "min", "mean square", "arm"]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A quantity per arm to minimise.
+
+    Attributes:
+        symbol: Its name in formulas and prompts.
+        description: The quantity at one target, or for `over="arm"` of the arm, for readers new to this program.
+        each: Its value per target, (N, T); for `over="arm"` of the arm itself, (N,).
+        over: How the values become one: their sum, maximum, minimum or root mean square.
+    """
+
+    name: str
+    label: str
+    unit: str
+    symbol: str
+    description: str
+    each: Callable[[Evaluation], Array]
+    over: Over = "sum"
+
+    def __call__(self, evaluation: Evaluation) -> Array:
+        """One value per arm, (N,)."""
+        each = self.each(evaluation)
+        match self.over:
+            case "sum":
+                return each.sum(axis=1)
+            case "max":
+                return each.max(axis=1)
+            case "min":
+                return each.min(axis=1)
+            case "mean square":
+                return np.sqrt(np.mean(each**2, axis=1))
+            case "arm":
+                return each
+
+    @property
+    def is_of_targets(self) -> bool:
+        """Whether each target has a share in it."""
+        return self.over != "arm"
