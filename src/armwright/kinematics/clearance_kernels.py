@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Precision
-from armwright.kinematics.lane_math import kernel
+from armwright.kinematics.ik_math import kernel
 from armwright.tasks.obstacles import SHAPES
 
 HALVINGS = 20  # of a link, in the search for its point nearest to an obstacle: to 1e-6 of its length

@@ -13,7 +13,7 @@ from functools import cache
 import warp as wp
 
 from armwright.kinematics.arm_arrays import Motions, Precision
-from armwright.kinematics.lane_math import kernel, lane_math
+from armwright.kinematics.ik_math import kernel, ik_math
 from armwright.kinematics.pose_math import pose_math
 from armwright.kinematics.position_kernels import Kernels, position_kernels
 
@@ -21,7 +21,7 @@ from armwright.kinematics.position_kernels import Kernels, position_kernels
 @cache
 def pose_kernels(precision: Precision, lanes: int, motions: Motions) -> Kernels:
     """Return the variant of `position_kernels` for targets with an axis or an orientation."""
-    base, pose = lane_math(precision, lanes, motions), pose_math(precision, lanes, motions)
+    base, pose = ik_math(precision, lanes, motions), pose_math(precision, lanes, motions)
     real, Vector3, Lane, Wide, Joints, Arms = base.real, base.Vector3, base.Lane, base.Wide, base.Joints, base.Arms
     roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
     advance, column, limit, damping = base.advance, base.column, base.limit, base.damping

@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 
 from armwright.kinematics.arm_arrays import PRISMATIC, Motions, Precision
-from armwright.kinematics.lane_math import lane_math
+from armwright.kinematics.ik_math import ik_math
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class PoseMath:
 
 @cache
 def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
-    """Return the functions for a precision, a number of lanes and joint motions, as in `lane_math`."""
-    base = lane_math(precision, lanes, motions)
+    """Return the functions for a precision, a number of lanes and joint motions, as in `ik_math`."""
+    base = ik_math(precision, lanes, motions)
     real, Vector3, Lane, Wide = base.real, base.Vector3, base.Lane, base.Wide
     roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
 

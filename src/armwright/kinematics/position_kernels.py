@@ -36,7 +36,7 @@ from typing import Any
 import warp as wp
 
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Motions, Precision
-from armwright.kinematics.lane_math import kernel, lane_math
+from armwright.kinematics.ik_math import kernel, ik_math
 from armwright.robot.arm import GRAVITY
 
 
@@ -58,7 +58,7 @@ def position_kernels(precision: Precision, lanes: int, motions: Motions) -> Kern
     One long function on purpose: code that Warp compiles takes its types and constants from the enclosing function.
     T targets form G groups: target g x lanes + i is in lane i of group g; the last target fills its group.
     """
-    base = lane_math(precision, lanes, motions)
+    base = ik_math(precision, lanes, motions)
     real, Lane, Wide, Joints, Arms = base.real, base.Lane, base.Wide, base.Joints, base.Arms
     roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
     advance, column, limit, damping = base.advance, base.column, base.limit, base.damping

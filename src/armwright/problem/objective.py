@@ -9,7 +9,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.problem.evaluation import Evaluation
 
-Over = Literal["sum", "max", "min", "mean square", "arm"]
+Over = Literal["sum", "max", "min", "rms", "arm"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Objective:
                 return each.max(axis=1)
             case "min":
                 return each.min(axis=1)
-            case "mean square":
+            case "rms":
                 return np.sqrt(np.mean(each**2, axis=1))
             case "arm":
                 return each

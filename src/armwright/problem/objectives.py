@@ -148,7 +148,7 @@ RMS_TORQUE = Objective(
     symbol="E_rms",
     description="the Euclidean norm of the joint torques [N m] that hold the kept posture up against gravity",
     each=_torque_norm,
-    over="mean square",
+    over="rms",
 )
 MASS = Objective(
     name="mass",

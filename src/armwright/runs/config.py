@@ -66,7 +66,7 @@ class Method(BaseModel, frozen=True, extra="forbid"):
 
 
 class FrontMethod(BaseModel, frozen=True, extra="forbid"):
-    """How a search for the whole front searches (front.py): there is nothing to choose but what it begins with."""
+    """The settings of a direct search (study/front_run.py): its initial designs."""
 
     search: Literal["front_search"] = "front_search"
     initial_designs: dict[str, Any] | None = None

@@ -4,7 +4,7 @@
     trials.jsonl       one line a finished trial, written before the next begins: the truth
     transcripts.jsonl  every call to a language model (llm/transcript.py)
     control.json, status.json  between a running study and whoever watches it (control.py)
-    search.npz, proposals/  where a search for the whole front stands, and what it began with (front.py)
+    search.npz, proposals/  state and initial designs of a direct search (study/front_run.py)
     trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), and figures/ (report/figures.py)
 
 What stands in the last lines is made from the finished trials, and can be made again.

@@ -1,6 +1,6 @@
 """Warp functions that all kernels of inverse kinematics share.
 
-`lane_math` makes variants: in single or double precision, and with some lanes or one. A lane is one target of an arm.
+`ik_math` makes variants: in single or double precision, and with some lanes or one. A lane is one target of an arm.
 What differs between lanes is arithmetic, never a branch: a condition is a mask of zeros and ones. The joints of an arm
 are the same in all lanes, so they may branch, in functions that return at once. Prismatic joints cost an eighth of the
 time, so arms of revolute joints alone have a variant.
@@ -25,7 +25,7 @@ kernel = partial(wp.kernel, enable_backward=False, module="unique", module_optio
 
 
 @dataclass(frozen=True)
-class LaneMath:
+class IkMath:
     """Types and functions of one variant."""
 
     real: Any  # the number type
@@ -45,7 +45,7 @@ class LaneMath:
 
 
 @cache
-def lane_math(precision: Precision, lanes: int, motions: Motions) -> LaneMath:
+def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
     """Return the variant for a precision, a number of lanes and what the joints of the arms do.
 
     One long function on purpose: what Warp compiles takes its types and constants from the function around it.
@@ -237,7 +237,7 @@ def lane_math(precision: Precision, lanes: int, motions: Motions) -> LaneMath:
         """Return the square of a vector's length."""
         return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
 
-    return LaneMath(
+    return IkMath(
         real, Vector3, Lane, Wide, Joints, Arms,
         roots, at_least, select, advance, column, limit, damping, norm_squared,
     )  # fmt: skip
