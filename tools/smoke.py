@@ -37,7 +37,7 @@ if __name__ == "__main__":
     assert [path for path in aw.write_figures("python") if path.suffix == ".png"]
     for ask in (
         lambda: aw.LlmProposer("openai-chat:gpt-4o"),
-        lambda: aw.draft("reach a shelf", model="openai-chat:gpt-4o"),
+        lambda: aw.draft("reach a shelf", "openai-chat:gpt-4o"),
         lambda: aw.optimize(problem, sampler="gp"),
         lambda: aw.compare_arms("target-1", ["ur5e"]),
     ):

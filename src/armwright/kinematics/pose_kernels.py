@@ -13,7 +13,7 @@ from functools import cache
 import warp as wp
 
 from armwright.kinematics.arm_arrays import Motions, Precision
-from armwright.kinematics.ik_math import kernel, ik_math
+from armwright.kinematics.ik_math import ik_math, kernel
 from armwright.kinematics.pose_math import pose_math
 from armwright.kinematics.position_kernels import Kernels, position_kernels
 

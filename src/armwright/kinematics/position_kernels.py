@@ -36,7 +36,7 @@ from typing import Any
 import warp as wp
 
 from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Motions, Precision
-from armwright.kinematics.ik_math import kernel, ik_math
+from armwright.kinematics.ik_math import ik_math, kernel
 from armwright.robot.arm import GRAVITY
 
 
