@@ -99,6 +99,14 @@ def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> No
         ({"methods": {"bbo": {"label": "BBO", "proposer": "ruls"}}}, 'Did you mean "rules"'),
         ({"baseline": "bob"}, 'Did you mean "bbo"'),
         ({"samples": ["x"]}, 'samples names the unknown method "x"'),
+        (
+            {"methods": {"llm": {"label": "L", "proposer": "llm", "model_options": {"temprature": 0}}}},
+            r'methods\.llm\.model_options: unknown key "temprature"\. Did you mean "temperature"\?',
+        ),
+        (
+            {"methods": {"llm": {"label": "L", "proposer": "llm", "model_options": {"memory": "owm"}}}},
+            r'methods\.llm\.model_options\.memory: unknown memory "owm"\. Did you mean "own"\?',
+        ),
         ({"seeds": []}, "seeds"),
         ({"seeds": [1, 1]}, "each once"),
         ({"tasks": []}, "tasks is empty"),

@@ -15,6 +15,7 @@ from armwright.llm import client as chat
 from armwright.llm.backend import CHECK, LlmBackend, Question, Reply
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
+from armwright.llm.servers import server_of
 from armwright.llm.session import LlmSession
 from armwright.problem.problem import Problem
 from armwright.proposers.llm import LlmProposer
@@ -128,7 +129,7 @@ def test_the_budget_is_the_whole_runs(chat_server: ChatServer, tmp_path: Path) -
 
 
 def test_a_bound_on_cost_needs_a_price(chat_server: ChatServer) -> None:
-    with pytest.raises(ModelError, match="price of m is not known, so max_cost cannot hold; use max_calls"):
+    with pytest.raises(ModelError, match="price of m is unknown, so max_cost cannot hold; use max_calls"):
         run(llm_proposer(chat_server.url, model="m", max_cost=1.0))
 
 
@@ -137,7 +138,7 @@ def test_what_a_run_will_take_is_said_before_it_begins(chat_server: ChatServer) 
     run(llm_proposer(chat_server.url, model="m"), seen=seen)
     assert seen[0].doing == "beginning"
     assert seen[0].note.startswith("4 proposals: about 9 calls, ")
-    assert seen[0].note.endswith("; on a server of your own")
+    assert seen[0].note.endswith("; on a local server")
 
 
 def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,40 +149,40 @@ def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPa
     half = LlmProposer(ModelOptions(model="openai-chat:gpt-4o", answer="one-step", proposals=4)).forecast(PROBLEM, 20)
     assert half.startswith("20 proposals: about 6 calls, ")
     unknown = LlmProposer("openai-chat:a-model-of-tomorrow").forecast(PROBLEM, 20)
-    assert unknown.endswith("price not known")
+    assert unknown.endswith("price unknown")
 
 
 def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatServer) -> None:
     """Whatever it is called: forecast, summary and bound agree."""
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="openai-chat:gpt-4o"), seen=seen, n_total=3)
-    assert seen[0].note.endswith("; on a server of your own")
+    assert seen[0].note.endswith("; on a local server")
     assert result.summary["proposer"]["cost_usd"] is None
-    with pytest.raises(ModelError, match="price of gpt-4o is not known"):
+    with pytest.raises(ModelError, match="price of gpt-4o is unknown"):
         run(llm_proposer(chat_server.url, model="gpt-4o", max_cost=1.0))
 
 
 @pytest.mark.parametrize(
     ("model", "address", "words"),
     [
-        ("qwen3", "http://192.168.0.7:8080/v1", "on a server of your own"),
-        ("qwen3", "http://gpu-box:8080/v1", "on a server of your own"),
-        ("qwen3", "https://models.example.com/v1", "at https://models.example.com/v1; its price is not known"),
-        ("gpt-4o", "https://models.example.com/v1", "at https://models.example.com/v1; its price is not known"),
+        ("qwen3", "http://192.168.0.7:8080/v1", "on a local server"),
+        ("qwen3", "http://gpu-box:8080/v1", "on a local server"),
+        ("qwen3", "https://models.example.com/v1", "at https://models.example.com/v1, price unknown"),
+        ("gpt-4o", "https://models.example.com/v1", "at https://models.example.com/v1, price unknown"),
         ("gpt-4o", "https://api.openai.com/v1", "about 12.50 USD by public prices"),
         ("openai-chat:gpt-4o", "https://api.openai.com/v1", "about 12.50 USD by public prices"),
-        ("ollama:qwen3:8b", None, "on a server of your own"),
+        ("ollama:qwen3:8b", None, "on a local server"),
         ("openai-chat:gpt-4o", None, "about 12.50 USD by public prices"),
-        ("openai-chat:a-model-of-tomorrow", None, "price not known"),
+        ("openai-chat:a-model-of-tomorrow", None, "price unknown"),
     ],
 )
 def test_the_price_is_that_of_the_host(model: str, address: str | None, words: str) -> None:
     assert chat.describe_cost(ModelOptions(model=model, base_url=address), 10**6, 10**6) == words
-    place = chat._place(model, address)
-    if place is not None:
+    server = server_of(ModelOptions(model=model, base_url=address))
+    if server is not None:
         usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)
-        response = ModelResponse([], usage=usage, model_name=place.name, provider_url=address)
-        assert chat._cost(response, place) == (12.5 if "12.50" in words else None)
+        response = ModelResponse([], usage=usage, model_name=server.model, provider_url=address)
+        assert chat._cost(response, server) == (12.5 if "12.50" in words else None)
 
 
 def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatServer, tmp_path: Path) -> None:
@@ -189,7 +190,7 @@ def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatS
     seen: list[Progress] = []
     run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=12, seen=seen)
     # the server counts 100 tokens in and 20 out for each of two calls
-    assert seen[0].note == "2 proposals: about 5 calls, 400 tokens in, 80 out; on a server of your own"
+    assert seen[0].note == "2 proposals: about 5 calls, 400 tokens in, 80 out; on a local server"
 
 
 @pytest.mark.parametrize("wire", ["openai", "anthropic"])

@@ -356,7 +356,7 @@ def test_the_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert lines[0].startswith(f"asking test-model at {chat_server.url}, named by --model: about ")
-    assert lines[0].endswith("up to 3 times; on a server of your own")
+    assert lines[0].endswith("up to 3 times; on a local server")
     assert "  6 targets [m]: (0.6, -1, 0.4) (0.6, 0, 0.4)" in done.stdout
     assert "  origin_z: [0.3, 0.3]\n" in done.stdout
     assert "  - the wall stands 0.6 m in front of the cart\n" in done.stdout

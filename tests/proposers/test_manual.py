@@ -193,11 +193,11 @@ def test_people_are_not_asked_while_trials_go_on(tmp_path: Path) -> None:
 
 def test_a_folder_with_what_is_left_of_another_run_is_refused(tmp_path: Path) -> None:
     pending(tmp_path / "ask", tmp_path / "run")
-    with pytest.raises(FailureError, match=r"004-prompt\.md holds a question of another run"):
+    with pytest.raises(FailureError, match=r"004-prompt\.md is a question of another run"):
         run(ManualProposer(tmp_path / "ask", PromptOptions(prompt="minus"), wait=False), tmp_path / "other")
     (tmp_path / "ask" / "004-answer.md").write_text(LINES, encoding="utf-8")
     (tmp_path / "ask" / "007-answer.md").write_text(LINES, encoding="utf-8")
-    with pytest.raises(FailureError, match=r"007-answer\.md lies there before its question"):
+    with pytest.raises(FailureError, match=r"007-answer\.md exists before its question"):
         run(ManualProposer(tmp_path / "ask", wait=False), tmp_path / "run")
     assert not (tmp_path / "ask" / "007-prompt.md").exists()
 

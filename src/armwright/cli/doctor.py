@@ -59,7 +59,7 @@ def try_model(options: ModelOptions | None = None) -> str:
         reply = ModelClient(configured.options).check()
     except CallError as fault:
         raise ModelError(f"{fault} ({fault.kind})") from fault
-    cost = "price not known" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
+    cost = "price unknown" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
     answer = " ".join(reply.text.split())[:60]
     return (
         f'{OK} call: {configured.options.model} answered "{answer}" in {reply.seconds:.1f} s, '

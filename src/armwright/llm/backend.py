@@ -1,4 +1,4 @@
-"""Whom a proposer asks: a model (chat.py), a recording (recording.py) or people (people.py)."""
+"""What answers questions: a model (client.py), a recording of one (recording.py) or a person (manual.py)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,22 +7,24 @@ from typing import Any, Protocol
 from armwright.exceptions import ProposalError
 from armwright.runs.control import Hint
 
-# Turns an answer's JSON into the text that is kept of it; UsageError, in its own words, refuses it.
+# Turn an answer, as JSON or as text, into the text to record; UsageError refuses it.
 Reader = Callable[[Mapping[str, Any]], str]
-TextReader = Callable[[str], str]  # the same for an answer in free text
+TextReader = Callable[[str], str]
 
-MOST_REQUESTS = 3  # of a question: a refused answer goes back with the reason, at most twice
-FINAL = frozenset({"key", "quota", "unknown_model", "budget"})  # faults that asking again does not mend
+MOST_REQUESTS = 3  # per question: an invalid answer goes back with the reason, at most twice
+FINAL = frozenset({"key", "quota", "unknown_model", "budget"})  # faults that a repeated call does not cure
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked.
+    """A question.
 
-    proposal: the id of the proposal it is for.  step: its part of the dialogue.
-    known: how many finished trials it was made from.
-    most_requests: how often the server may be asked, answers that are refused included; None for no bound.
-    hints: that stand in the prompt.
+    Attributes:
+        proposal: Id of the proposal it is for.
+        step: Its part of the session, as in `Call`.
+        known: Number of finished trials that the prompt was made from.
+        most_requests: Limit of requests, those after invalid answers included; None for no limit.
+        hints: Hints in the prompt.
     """
 
     proposal: str
@@ -38,7 +40,7 @@ CHECK = Question("", "check", "Answer with one word: ready")
 
 @dataclass(frozen=True)
 class Reply:
-    """What came back, and what it took. text: the answer; cost_usd: None where the price is not known."""
+    """An answer and its cost; `cost_usd` is None if the price is unknown."""
 
     text: str
     requests: int = 0
@@ -49,7 +51,7 @@ class Reply:
 
 
 class CallError(ProposalError):
-    """A call that gave no usable answer; `reply` says what it cost all the same."""
+    """A call without a usable answer; `reply` holds its cost."""
 
     def __init__(self, kind: str, message: str, reply: Reply, final: bool | None = None) -> None:
         super().__init__(kind, message, final=kind in FINAL if final is None else final)
@@ -57,7 +59,7 @@ class CallError(ProposalError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C while an answer was waited for; `reply` says what the call cost all the same."""
+    """Ctrl-C during a call; `reply` holds its cost."""
 
     kind = "cancelled"
 
@@ -67,9 +69,11 @@ class Interrupted(KeyboardInterrupt):
 
 
 class LlmBackend(Protocol):
-    """Answers questions, several at a time if asked from several threads.
+    """Answer questions; several threads may ask at a time.
 
-    model: who answers, in words.  origin: what answers: `model`, `manual` (people), `scripted` (a stand-in).
+    Attributes:
+        model: Who answers, for the user.
+        origin: What answers: `model`, `manual` (a person) or `scripted` (a stand-in).
     """
 
     model: str
@@ -80,7 +84,7 @@ class LlmBackend(Protocol):
         ...
 
     def check(self, question: Question = CHECK) -> Reply:
-        """One tiny question, before any work is done; CallError where no answers are to be had."""
+        """Ask one tiny question before any work is done; raises CallError if there is no answer."""
         ...
 
     def ask(self, question: Question) -> Reply:

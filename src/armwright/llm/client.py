@@ -1,4 +1,4 @@
-"""Talking to a language model. Only this file and faults.py import pydantic-ai."""
+"""Calls to a language model. Only this file and errors.py import pydantic-ai."""
 
 import asyncio
 import logging
@@ -9,18 +9,18 @@ import time
 import warnings
 from collections.abc import Coroutine, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
-from ipaddress import ip_address
 from typing import Any, TypeVar
-from urllib.parse import urlsplit
 
 from armwright.exceptions import MissingExtraError, SettingsError, UsageError
 from armwright.extras import requires_extra
+from armwright.files import replace_surrogates
 from armwright.llm.answer import without_words_around
 from armwright.llm.backend import CHECK, MOST_REQUESTS, CallError, Interrupted, LlmBackend, Question, Reader, Reply
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
 from armwright.llm.redaction import WithoutKeys, redacted, without_keys
+from armwright.llm.servers import Server, server_of
 
 with requires_extra("llm", "a language model"):
     from genai_prices import Usage, calc_price
@@ -38,38 +38,30 @@ with requires_extra("llm", "a language model"):
 
     from armwright.llm.errors import CALL_FAULTS, PASSING, describe_fault, kind_of_fault
 
-# A price that cannot be known is no news to the user, who is told of costs by `describe_cost` and the budget.
+# `describe_cost` and the budget report unknown prices.
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
 
-CHECK_SECONDS = 60.0  # a server of one's own may have to load the model first
-REASKS = MOST_REQUESTS - 1  # after a refused answer
+CHECK_SECONDS = 60.0  # timeout of a check; a local server may have to load the model first
+REASKS = MOST_REQUESTS - 1  # after an invalid answer
 RETRIES = 2  # after a fault that may pass
-RETRY_SECONDS = 0.5  # before the first retry, where the server says nothing; doubled before the next
-SERVER_KEY = "ARMWRIGHT_API_KEY"  # for base_url, if the server wants a key
-NEAR = (".local", ".lan", ".home", ".internal")  # endings of names in a network of one's own
+RETRY_SECONDS = 0.5  # before the first retry, unless the server states it; doubled before the next
 
 _OUTPUTS: Mapping[str, Any] = {"tool": ToolOutput, "native": NativeOutput, "prompted": PromptedOutput}
 
-# Servers of one's own that have a name: where they listen, and the environment's words for address and key.
-_LOCAL = {
-    "ollama": ("http://localhost:11434/v1", "OLLAMA_BASE_URL", "OLLAMA_API_KEY"),
-    "vllm": ("http://localhost:8000/v1", "VLLM_BASE_URL", "VLLM_API_KEY"),
-}
-
-# OPENAI_LOG=debug and its like show what a server sent, and what it was sent.
+# With OPENAI_LOG=debug and the like, libraries log requests and responses.
 for _logger in ("openai._base_client", "anthropic._base_client", "httpx2", "httpcore2.http11"):
     logging.getLogger(_logger).addFilter(WithoutKeys())
 
-_WRITTEN = "armwright: written"  # in a response's metadata: its text, where only its JSON was kept
+_WRITTEN = "armwright: written"  # key of the full text in the metadata of a response reduced to its JSON
 
 Result = TypeVar("Result")
 
 
-class _Server(WrapperModel):
-    """A model that is asked again after a fault that may pass, and whose JSON may stand among words.
+class _RetryingModel(WrapperModel):
+    """A model with retries after faults that may pass, and with answers reduced to their JSON.
 
-    Vendors' clients ask again, too, but also after a spent quota, and wait for an hour if they are told to; here a
-    server that wants more patience than the deadline leaves has failed.
+    Vendors' clients retry, too, but also after a spent quota, and wait for an hour if the server says so. Here a server
+    that wants a longer pause than the deadline allows has failed.
     """
 
     async def request(
@@ -94,22 +86,25 @@ class _Server(WrapperModel):
 
 
 class ModelClient(LlmBackend):
-    """One model behind one server. Every call is new: the model remembers nothing between calls.
+    """Call one model; it remembers nothing between calls.
 
-    By "auto", an answer is held to its schema by a tool call with hosted models, and natively with other servers.
+    With `output: auto`, hosted models receive the schema as a tool and other servers as a native response format.
+
+    Args:
+        options: The model and how it is called.
     """
 
     def __init__(self, options: ModelOptions) -> None:
         model = options.model or ""
         if not model.rpartition(":")[2].strip():
-            raise SettingsError(f'model "{model}" names no model: openai-chat:gpt-4o would')
+            raise SettingsError(f'model "{model}" names no model; expected a name such as openai-chat:gpt-4o')
         self.model = model
         self.origin = options.origin
         self.timeout = options.timeout
-        self._place = _place(model, options.base_url)
-        self._model = _Server(_model(model) if self._place is None else _own_server(self._place))
-        hosted = "tool" if self._place is None else "native"
-        self._output = _OUTPUTS[hosted if options.output == "auto" else options.output]
+        self._server = server_of(options)
+        self._model = _RetryingModel(_vendor_model(model) if self._server is None else _model_on(self._server))
+        auto = "tool" if self._server is None else "native"
+        self._output = _OUTPUTS[auto if options.output == "auto" else options.output]
         self._settings = ModelSettings()
         if options.temperature is not None:
             self._settings["temperature"] = options.temperature
@@ -123,7 +118,7 @@ class ModelClient(LlmBackend):
         self._cancelled = False
 
     def check(self, question: Question = CHECK) -> Reply:
-        """One tiny question, so that a wrong name, key or address is known before any work is done."""
+        """Ask one tiny question, so that a wrong name, key or address is reported before any work is done."""
         return self._run(Agent(self._model), question, CHECK_SECONDS)
 
     def ask(self, question: Question) -> Reply:
@@ -140,8 +135,8 @@ class ModelClient(LlmBackend):
 
         def accept(answer: dict[str, Any]) -> dict[str, Any]:
             try:
-                # Keys are blotted out before, not after: what is kept is what was read, and can be read again.
-                accepted.append(_printable(read(without_keys(answer))))
+                # Keys are redacted before reading, so that the recorded text can be read again.
+                accepted.append(replace_surrogates(read(without_keys(answer))))
             except UsageError as refusal:
                 refusals.append(str(refusal))
                 raise ModelRetry(str(refusal)) from refusal
@@ -174,7 +169,7 @@ class ModelClient(LlmBackend):
                 self._wait(agent.run(question.prompt, model_settings=settings, usage_limits=limits))
             except CancelledError as fault:
                 reply = self._reply(messages, time.perf_counter() - started)
-                raise CallError("cancelled", f"{self.model}: the call was ended", reply) from fault
+                raise CallError("cancelled", f"{self.model}: the call was cancelled", reply) from fault
             except KeyboardInterrupt as fault:
                 raise Interrupted(self._reply(messages, time.perf_counter() - started)) from fault
             except CALL_FAULTS as fault:
@@ -186,7 +181,7 @@ class ModelClient(LlmBackend):
 
     def _reply(self, messages: Sequence[ModelMessage], seconds: float) -> Reply:
         responses = [message for message in messages if isinstance(message, ModelResponse)]
-        costs = [_cost(response, self._place) for response in responses]
+        costs = [_cost(response, self._server) for response in responses]
         return Reply(
             text=_text(responses[-1]) if responses else "",
             requests=len(responses),
@@ -199,17 +194,17 @@ class ModelClient(LlmBackend):
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
         """Run the coroutine in the event-loop thread and return its result.
 
-        One loop serves all callers: connections are kept open in it, and it works from any thread, also inside
-        a notebook's running loop.
+        One loop serves all callers: it keeps connections open and works from any thread, also inside the running loop
+        of a notebook.
         """
         future = asyncio.run_coroutine_threadsafe(coroutine, _loop())
         self._pending.add(future)
-        if self._cancelled:  # asked for only after the future was listed: `cancel` misses none
+        if self._cancelled:  # checked after the future was listed, so that `cancel` misses none
             future.cancel()
         try:
             return future.result()
         except BaseException:
-            future.cancel()  # Ctrl-C: the request ends, too
+            future.cancel()  # on Ctrl-C, end the request, too
             raise
         finally:
             self._pending.discard(future)
@@ -217,14 +212,14 @@ class ModelClient(LlmBackend):
 
 def estimated_cost(options: ModelOptions, input_tokens: int, output_tokens: int) -> float | None:
     """Return about what so many tokens cost [USD], by the prices that calls are accounted with; None if unknown."""
-    place = _place(options.model or "", options.base_url)
+    server = server_of(options)
     vendor, _, name = (options.model or "").partition(":")
     usage = Usage(input_tokens=input_tokens, output_tokens=output_tokens)
     try:
-        if place is None:
+        if server is None:
             price = calc_price(usage, model_ref=name, provider_id=vendor.removesuffix("-chat"))
         else:
-            price = calc_price(usage, model_ref=place.name, provider_api_url=place.address)
+            price = calc_price(usage, model_ref=server.model, provider_api_url=server.address)
     except LookupError:
         return None
     return float(price.total_price)
@@ -235,83 +230,35 @@ def describe_cost(options: ModelOptions, input_tokens: int, output_tokens: int) 
     cost = estimated_cost(options, input_tokens, output_tokens)
     if cost is not None:
         return f"about {cost:.2f} USD by public prices"
-    place = _place(options.model or "", options.base_url)
-    if place is None:
-        return "price not known"
-    return "on a server of your own" if place.is_near else f"at {place.address}; its price is not known"
+    server = server_of(options)
+    if server is None:
+        return "price unknown"
+    return "on a local server" if server.is_local else f"at {server.address}, price unknown"
 
 
-@dataclass(frozen=True)
-class _Place:
-    """A server that is not found by the vendor's name: where it listens, and what it calls the model.
-
-    key: the environment's word for its key.
-    """
-
-    address: str
-    name: str
-    key: str
-
-    @property
-    def is_near(self) -> bool:
-        """Whether it is this machine or one of the same network, where nobody sends a bill that we know of."""
-        host = urlsplit(self.address).hostname or ""
-        try:
-            return ip_address(host).is_private
-        except ValueError:
-            return "." not in host or host.endswith(NEAR)
-
-
-def _place(model: str, base_url: str | None) -> _Place | None:
-    """Return the address of a model's server; None for the vendor's own."""
-    vendor, _, bare = model.partition(":")
-    if base_url:
-        return _Place(base_url, model.removeprefix("openai-chat:"), SERVER_KEY)
-    if vendor in _LOCAL:
-        default, address, key = _LOCAL[vendor]
-        return _Place(os.environ.get(address) or default, bare, key if os.environ.get(key) else SERVER_KEY)
-    return None
-
-
-def _model(name: str) -> Model:
+def _vendor_model(name: str) -> Model:
     """Return a vendor's model; raises SettingsError if its name is unknown or its key is not set."""
     if ":" not in name:
-        raise SettingsError(f'model "{name}": a vendor is needed before it, like openai-chat:{name}; or set base_url')
+        raise SettingsError(f'model "{name}": expected a vendor before it, such as openai-chat:{name}; or set base_url')
     try:
         return infer_model(name)
     except faults.UserError as fault:
         key = re.search(r"\b[A-Z_]+_(?:API_KEY|ENDPOINT)\b", str(fault))
-        words = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_one_line(fault)}"
-        raise SettingsError(f"model {name} {words}") from fault
+        reason = f"needs {key[0]}: set it in the environment" if key else f"cannot be used: {_one_line(fault)}"
+        raise SettingsError(f"model {name} {reason}") from fault
     except ImportError as fault:
         raise MissingExtraError(f"model {name} needs another package: {_one_line(fault)}") from fault
 
 
-def _own_server(at: _Place) -> Model:
+def _model_on(server: Server) -> Model:
     """Return a model behind an OpenAI-compatible server, which never receives a vendor's key."""
-    base_url = at.address
-    if not base_url.startswith(("http://", "https://")):
-        raise SettingsError(f"base_url {base_url}: an address that begins with http:// or https:// is needed")
-    place = base_url.partition("://")[2]
-    if "@" in place.partition("/")[0] or "?" in place or "#" in place:
-        raise SettingsError(f"base_url holds more than an address; put the server's key into {SERVER_KEY}")
-    if not _is_address(base_url):
-        raise SettingsError(f"base_url {base_url} is no address, such as http://localhost:8080/v1")
+    server.check_address()
     client = AsyncOpenAI(
-        base_url=base_url,
-        api_key=os.environ.get(at.key) or "no-key",
+        base_url=server.address,
+        api_key=os.environ.get(server.key_variable) or "no-key",
         default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
     )
-    return OpenAIChatModel(at.name, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
-
-
-def _is_address(url: str) -> bool:
-    """Whether a host, and a port if there is one, can be told from it."""
-    try:
-        place = urlsplit(url)
-        return bool(place.hostname) and place.port != 0 and url.isascii() and url.isprintable() and " " not in url
-    except ValueError:  # of brackets or ports that are none
-        return False
+    return OpenAIChatModel(server.model, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
 
 
 def _json_alone(response: ModelResponse) -> ModelResponse:
@@ -326,42 +273,34 @@ def _text(response: ModelResponse) -> str:
     """Return all text of the model, tool-call arguments included, so that a refused answer can be inspected."""
     if response.metadata and _WRITTEN in response.metadata:
         return response.metadata[_WRITTEN]
-    written = [str(part.content or "") for part in response.parts if isinstance(part, TextPart)]  # null, from some
+    written = [
+        str(part.content or "") for part in response.parts if isinstance(part, TextPart)
+    ]  # some servers send null
     calls = [part for part in response.parts if isinstance(part, ToolCallPart)]
     written += [call.args if isinstance(call.args, str) else call.args_as_json_str() for call in calls]
-    return _clean("\n".join(written))
+    return redacted(replace_surrogates("\n".join(written)))
 
 
-def _cost(response: ModelResponse, place: _Place | None) -> float | None:
-    """[USD], where the price of the model is known."""
-    name: Any = response.model_name  # as the server says it, which may be anything
+def _cost(response: ModelResponse, server: Server | None) -> float | None:
+    """Return the cost of a response [USD]; None if the price is unknown."""
+    name: Any = response.model_name  # stated by the server: may be anything
     if name is not None and not isinstance(name, str):
         return None
     try:
-        if place is not None:  # else a model would have its price by its name alone, wherever it runs
-            calc_price(Usage(), model_ref=response.model_name or place.name, provider_api_url=place.address)
+        if server is not None:  # refuses a price by the model's name alone, wherever it runs
+            calc_price(Usage(), model_ref=response.model_name or server.model, provider_api_url=server.address)
         return float(response.cost().total_price)
     except (LookupError, ValueError, AssertionError):
         return None
 
 
-def _clean(text: str) -> str:
-    """Without keys, and printable."""
-    return redacted(_printable(text))
-
-
-def _printable(text: str) -> str:
-    """Without lone surrogates, which JSON can carry and UTF-8 cannot."""
-    return text.encode("utf-8", "replace").decode("utf-8")
-
-
 def _one_line(text: object) -> str:
-    line = _clean(" ".join(str(text).split())).rstrip(".")
+    line = redacted(replace_surrogates(" ".join(str(text).split()))).rstrip(".")
     return line if len(line) <= 300 else line[:297] + "..."
 
 
 @cache
 def _loop() -> asyncio.AbstractEventLoop:
     loop = asyncio.new_event_loop()
-    threading.Thread(target=loop.run_forever, name="armwright-chat", daemon=True).start()
+    threading.Thread(target=loop.run_forever, name="armwright-llm", daemon=True).start()
     return loop

@@ -1,11 +1,11 @@
-"""What goes wrong in a call to a model: in one word for statistics, and in words for people."""
+"""Classify and describe the errors of a call to a model."""
 
 from typing import Any, cast
 
 import httpx2
 from pydantic_ai import exceptions as faults
 
-# The word for statistics, by the most specific class first.
+# Kind of fault by exception; subclasses first.
 _KINDS: tuple[tuple[type[Exception], str], ...] = (
     (faults.ModelAuthenticationError, "key"),
     (faults.ModelQuotaExceededError, "quota"),
@@ -18,8 +18,8 @@ _KINDS: tuple[tuple[type[Exception], str], ...] = (
     (faults.ModelConnectionError, "connection"),
     (faults.ModelUnavailableError, "server"),
     (faults.ModelServerError, "server"),
-    (faults.ModelHTTPError, "rejected"),  # another status than the usual ones
-    (faults.ModelAPIError, "answer"),  # no error of the server's, but nothing that can be read
+    (faults.ModelHTTPError, "rejected"),  # any other status
+    (faults.ModelAPIError, "answer"),  # an unreadable response
     (faults.ContentFilterError, "refused"),
     (faults.UnexpectedModelBehavior, "answer"),
     (faults.UsageLimitExceeded, "limit"),
@@ -27,8 +27,8 @@ _KINDS: tuple[tuple[type[Exception], str], ...] = (
     (httpx2.TransportError, "connection"),
 )
 
-# What pydantic-ai trips over in some malformed responses: an empty list of choices, a stream without a beginning,
-# JSON that never ends its brackets, what is not compressed though it says so.
+# pydantic-ai raises these for some malformed responses: an empty list of choices, a truncated stream, deeply nested
+# JSON, a wrong Content-Encoding.
 _MALFORMED = (
     LookupError,
     TypeError,
@@ -40,10 +40,10 @@ _MALFORMED = (
     httpx2.DecodingError,
 )
 
-# All that a call may end with, a bug of ours excepted.
+# Every exception of a failed call.
 CALL_FAULTS = (faults.AgentRunError, faults.UserError, httpx2.TransportError, *_MALFORMED)
 
-# What may be gone a moment later.
+# Faults that may pass: the request is repeated.
 PASSING = (
     faults.ModelRateLimitError,
     faults.ModelUnavailableError,
@@ -64,10 +64,10 @@ def kind_of_fault(fault: Exception) -> str:
 def describe_fault(fault: Exception) -> str:
     """Describe an error by the server's own message, or else by its cause."""
     if _key_cannot_be_sent(fault):
-        return "its key cannot be sent: it holds a line break, or a letter that no key has"
+        return "its key cannot be sent: it contains a line break or a character outside ASCII"
     if isinstance(fault, faults.ModelHTTPError):
-        said = _message(fault.body)
-        return f"{said} (HTTP {fault.status_code})" if said else str(fault)
+        message = _message(fault.body)
+        return f"{message} (HTTP {fault.status_code})" if message else str(fault)
     if isinstance(fault, faults.UnexpectedModelBehavior | faults.ModelConnectionError):
         causes = _causes(fault)
         behind = next((cause for cause in causes if isinstance(cause, faults.ModelRetry)), causes[-1])
@@ -86,7 +86,7 @@ def _message(body: Any) -> str | None:
 
 
 def _key_cannot_be_sent(fault: BaseException) -> bool:
-    """Headers hold no line breaks, and ASCII alone."""
+    """Return whether a header refused the key: headers are ASCII without line breaks."""
     return any(
         (isinstance(cause, UnicodeEncodeError) and cause.encoding == "ascii")
         or str(cause).startswith("Illegal header value")
@@ -95,7 +95,7 @@ def _key_cannot_be_sent(fault: BaseException) -> bool:
 
 
 def _causes(fault: BaseException) -> list[BaseException]:
-    """Yield the exception and its causes."""
+    """Return the exception and its causes."""
     causes = [fault]
     while (cause := causes[-1].__cause__) is not None and cause not in causes:
         causes.append(cause)

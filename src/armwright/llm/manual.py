@@ -1,4 +1,4 @@
-"""People in the model's place: each question is a file, and so is its answer."""
+"""Manual answers in place of a model: each question and each answer is a file."""
 
 import os
 import threading
@@ -16,9 +16,11 @@ LARGEST_FILE = 10_000_000  # characters
 
 
 class ManualBackend(LlmBackend):
-    """Writes DIR/NNN-prompt.md and takes DIR/NNN-answer.md (or .json), where NNN is the trial's number.
+    """Write DIR/NNN-prompt.md and read DIR/NNN-answer.md (or .json, .txt), where NNN is the trial's number.
 
-    wait: whether to wait for an answer that is not there; else AnswerPendingError.
+    Args:
+        folder: The folder DIR.
+        wait: Wait for a missing answer; if false, raise AnswerPendingError.
     """
 
     model = "people"
@@ -28,14 +30,14 @@ class ManualBackend(LlmBackend):
         self.folder = folder
         self.wait = wait
         self._cancelled = threading.Event()
-        self._seen: dict[Path, tuple[int, int]] = {}  # files' sizes and times when last looked at
+        self._seen: dict[Path, tuple[int, int]] = {}  # sizes and times of files at the last look
 
     def begin(self) -> None:
         """Start a session."""
         self._cancelled.clear()
 
     def check(self, question: Question = CHECK) -> Reply:
-        """People are not asked before there is a question."""
+        """Return an empty reply: there is nothing to check before the first question."""
         return Reply("")
 
     def ask(self, question: Question) -> Reply:
@@ -43,7 +45,7 @@ class ManualBackend(LlmBackend):
         return self.ask_text(question, lambda text: text)
 
     def ask_for(self, question: Question, schema: Mapping[str, Any], read: Any) -> Reply:
-        """People are asked for text, not for a schema."""
+        """Not supported: manual answers are text."""
         raise NotImplementedError
 
     def cancel(self) -> None:
@@ -55,7 +57,7 @@ class ManualBackend(LlmBackend):
         return self.folder / f"{number:03d}-prompt.md", self.folder / f"{number:03d}-answer.md"
 
     def is_answered(self, number: int) -> bool:
-        """Whether an answer lies there that has not been refused."""
+        """Return whether there is an answer that has not been refused."""
         return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
 
     def ask_text(self, question: Question, read: TextReader) -> Reply:
@@ -74,11 +76,11 @@ class ManualBackend(LlmBackend):
                 except DesignError as refusal:
                     refused = str(refusal)
                     self._refuse(number, answer, refused)
-                    continue  # another file may hold another answer
+                    continue  # another file may hold a valid answer
             if not self.wait:
                 raise AnswerPendingError(asked, answers[0], refused)
             if self._cancelled.wait(LOOK_EVERY):
-                raise CallError("cancelled", "the wait for an answer was ended", Reply(""))
+                raise CallError("cancelled", "waiting for the answer was cancelled", Reply(""))
 
     def _answers(self, number: int) -> list[Path]:
         return [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]
@@ -88,16 +90,16 @@ class ManualBackend(LlmBackend):
             if self._read(file) == prompt:
                 return
             raise FailureError(
-                f"{file} holds a question of another run, or of another version; give an empty folder, or move "
-                f"{file.name} and its answer away"
+                f"{file} is a question of another run or version; use an empty folder, or move {file.name} and its "
+                "answer away"
             )
         early = next((answer for answer in answers if answer.exists()), None)
         if early is not None:
-            raise FailureError(f"{early} lies there before its question; give an empty folder, or move it away")
+            raise FailureError(f"{early} exists before its question was asked; use an empty folder, or move it away")
         self._write(file, prompt)
 
     def _is_ready(self, answer: Path) -> bool:
-        """Whether the answer has something in it and, where there is time to look twice, rests."""
+        """Return whether the answer is not empty and, if `wait`, did not change since the last look."""
         if not os.path.isfile(answer):
             return False
         found = answer.stat()

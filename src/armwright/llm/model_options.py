@@ -5,9 +5,9 @@ The same model validates `--model-options`, the user's config.yaml, the methods 
 
 import json
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, Self, cast
 
-from pydantic import BaseModel, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_validator
 
 from armwright.exceptions import did_you_mean
 from armwright.llm.prompt import MEMORIES, Form
@@ -43,6 +43,16 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     memory: str = "none"
     answer: str = "two-step"
     proposals: int = Field(default=1, ge=1, le=MOST_PROPOSALS)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_keys(cls, data: Any) -> Any:
+        keys = cast("dict[Any, Any]", data) if isinstance(data, dict) else {}
+        for key in keys:
+            if key not in cls.model_fields:
+                known = ", ".join(cls.model_fields)
+                raise ValueError(f'unknown key "{key}".{did_you_mean(str(key), cls.model_fields)} Allowed: {known}')
+        return cast("Any", data)
 
     @field_validator(*_CHOICES, check_fields=False)
     @classmethod

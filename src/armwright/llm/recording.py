@@ -1,4 +1,4 @@
-"""A recorded transcript, played again: no network, no cost, the same answers to the same questions."""
+"""Replay of a transcript: no network, no cost, the same answers to the same questions."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,10 +10,15 @@ from armwright.llm.transcript import Call
 
 
 class ReplayBackend(LlmBackend):
-    """Answers as the calls of a record did, failures included.
+    """Answer as recorded calls did, failures included.
 
-    strict: whether a question in other words than the recorded one is an error.
-    differing: ids of the proposals that were asked for in other words.
+    Args:
+        calls: The recorded calls.
+        source: Their file, for messages.
+        strict: Treat a prompt that differs from the recorded one as an error.
+
+    Attributes:
+        differing: Ids of the proposals whose prompts differ.
     """
 
     def __init__(self, calls: Sequence[Call], source: Path, strict: bool = False) -> None:
@@ -25,7 +30,7 @@ class ReplayBackend(LlmBackend):
         self.differing: list[str] = []
 
     def begin(self) -> None:
-        """Nothing to begin."""
+        """Do nothing."""
 
     def check(self, question: Question = CHECK) -> Reply:
         """Return the first recorded check."""
@@ -40,15 +45,14 @@ class ReplayBackend(LlmBackend):
         return self._answer(question)
 
     def cancel(self) -> None:
-        """Nothing is ever under way."""
+        """Do nothing: no call is ever in flight."""
 
     def _answer(self, question: Question) -> Reply:
         place = question.proposal, question.step
         calls = [call for call in self.calls if (call.proposal, call.step) == place]
         if not calls:
             raise CallError("missing", f"{self.source} holds no {question.step} for {question.proposal}", Reply(""))
-        # Of several, one was made by each session of the recorded run; the last is what it came to.
-        call = calls[-1]
+        call = calls[-1]  # an interrupted run may have asked again; the last call counts
         if call.prompt != question.prompt:
             if self.strict:
                 raise ReplayError(
@@ -61,6 +65,5 @@ class ReplayBackend(LlmBackend):
     def _play(self, call: Call) -> Reply:
         reply = Reply(call.answer, call.requests, call.input_tokens, call.output_tokens, call.cost_usd, call.seconds)
         if call.fault is not None:
-            words = call.error or call.fault
-            raise CallError(call.fault, words, reply, final=False)
+            raise CallError(call.fault, call.error or call.fault, reply, final=False)
         return reply

@@ -1,4 +1,4 @@
-"""Keys live in the environment alone: what is written or shown passes through here."""
+"""Redaction of API keys in everything that is written or shown; keys are only read from the environment."""
 
 import logging
 import os
@@ -9,16 +9,16 @@ from typing import Any
 from armwright.text import map_text
 
 _NAMES = re.compile(r"(^|_)(KEY|TOKEN|SECRET|PASSWORD)$")
-_SENT = re.compile(r"(^|_)API_(KEY|TOKEN)$")  # what vendors' clients read, and send
+_SENT = re.compile(r"(^|_)API_(KEY|TOKEN)$")  # read and sent by vendors' clients
 _MIXED = re.compile(r"[A-Za-z][0-9]|[0-9][A-Za-z]")
-SHORTEST = 8  # a shorter value is no key, and would be found in ordinary words
-LONG = 20  # from so many characters on, a value is no word
-PART = 12  # so much of a key's beginning or end tells it
+SHORTEST = 8  # shorter values occur in ordinary text
+LONG = 20  # longer values are not words
+PART = 12  # a beginning or an end of this length identifies a key
 _MASKED = re.compile(r"([\w-]*)(?:\*{2,}|\.{3,}|…)([\w-]*)")  # sk-abcd****wxyz, as vendors show it
 
 
 class WithoutKeys(logging.Filter):
-    """For loggers of packages that write what a server sent."""
+    """Redact keys in the loggers of packages that log what a server sent."""
 
     def filter(self, record: logging.LogRecord) -> bool:
         record.msg, record.args = redacted(record.getMessage()), ()
@@ -26,9 +26,9 @@ class WithoutKeys(logging.Filter):
 
 
 def redacted(text: str) -> str:
-    """`text` with every key of the environment blotted out: a server may repeat in its errors what it was sent.
+    """Return `text` with every key of the environment redacted, since errors of a server may repeat it.
 
-    Also where it shows only the beginning or the end, or masks the middle.
+    This includes its beginning, its end, and forms with a masked middle.
     """
     for name, key in _keys():
         blot = f"<{name}>"
@@ -46,7 +46,7 @@ def without_keys(content: Any) -> Any:
 
 
 def _keys() -> Iterator[tuple[str, str]]:
-    """Names and values; of a value with line breaks or blanks each piece, as errors write these in other ways."""
+    """Yield names and values of keys; a value with white space in pieces, since errors write it in other ways."""
     for name, value in os.environ.items():
         if _NAMES.search(name) and (_SENT.search(name) or _looks_secret(value)):
             pieces = value.split()
@@ -56,7 +56,7 @@ def _keys() -> Iterator[tuple[str, str]]:
 
 
 def _looks_secret(value: str) -> bool:
-    """Whether a value is no word or name that an answer could hold by itself, as in SORT_KEY=position_error."""
+    """Return whether a value is not an ordinary word, as in SORT_KEY=position_error."""
     return len(value) >= LONG or bool(_MIXED.search(value))
 
 

@@ -11,7 +11,7 @@ from armwright.llm.budget import CallBudget
 from armwright.llm.transcript import Call, Transcript
 from armwright.runs.summary import ProposerSummary
 
-NEVER_MADE = ("missing", "cancelled")  # faults of calls that cost nothing, as long as no request was answered
+UNBILLED = ("missing", "cancelled")  # faults of calls that cost nothing unless a request was answered
 
 
 class LlmSession:
@@ -67,7 +67,7 @@ class LlmSession:
             try:
                 reply = ask(replace(question, most_requests=requests))
             except (CallError, Interrupted) as fault:
-                if fault.kind not in NEVER_MADE or fault.reply.requests:
+                if fault.kind not in UNBILLED or fault.reply.requests:
                     self._keep(self._record(question, fault.reply, fault))
                 raise
             self._keep(self._record(question, reply, None))

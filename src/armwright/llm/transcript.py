@@ -1,4 +1,4 @@
-"""Every call to a language model, one JSON line each: what was asked, what came back, what it cost."""
+"""The transcript of a run: every call with its prompt, answer and cost, as one JSON line."""
 
 import errno
 import json
@@ -16,8 +16,8 @@ from armwright.exceptions import RunFolderError
 from armwright.runs.control import Hint
 
 TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
-FIRST_STEPS = ("reasoning", "answer")  # the steps whose questions are made from the history, and go with hints
-READ = (None, "answer", "limit", "refused", "rejected", "context")  # how calls end whose question was read
+FIRST_STEPS = ("reasoning", "answer")  # steps whose prompts show the history and hints
+READ = (None, "answer", "limit", "refused", "rejected", "context")  # faults of calls whose prompt was read
 
 Count = Annotated[int, Field(ge=0, lt=2**53)]
 
@@ -26,14 +26,16 @@ Count = Annotated[int, Field(ge=0, lt=2**53)]
 class Call:
     """One call.
 
-    proposal: the id of the proposal that it belongs to, its asker and its trial's number; empty for a check.
-    step: check (may the model be used at all), reasoning (the free answer), parameters (that answer as values), or
-        answer (both at once), draft (a task and a space from words).
-    known: how many finished trials the question was made from.
-    origin: who answered: `model`, `manual` (people) or `scripted` (a stand-in, in tests and examples).
-    requests: requests sent to the server; above 1 where an answer was refused and asked for again.
-    fault, error: the fault's kind and words, where there was one; then the answer may be empty.
-    hints: of the engineer who watches the run, that stand in the prompt.
+    Attributes:
+        proposal: Id of its proposal, made of the source and the trial's number; empty for a check.
+        step: `check` (is the model available), `reasoning` (the free answer), `parameters` (that answer as values),
+            `answer` (both at once) or `draft` (a task and a space).
+        known: Number of finished trials that the prompt was made from.
+        origin: What answered: `model`, `manual` (a person) or `scripted` (a stand-in).
+        requests: Requests that the server answered; above 1 if an answer was invalid.
+        fault: Kind of fault, if there was one; then the answer may be empty.
+        error: Its message.
+        hints: Hints of the user in the prompt.
     """
 
     proposal: Annotated[str, Field(pattern=r"^(.*-\d{1,9})?$")]
@@ -54,9 +56,11 @@ class Call:
 
 
 class Transcript:
-    """The calls of one run, kept in a file where the run has a folder; several threads may add to it.
+    """The calls of one run, recorded in a file if the run has a folder; several threads may add to it.
 
-    read_only: for a record that is none of this run's; a last line that a crash cut short stays in its file.
+    Args:
+        path: The file; None to keep calls in memory.
+        read_only: Leave a last line that a crash cut short in the file.
     """
 
     def __init__(self, path: Path | None, read_only: bool = False) -> None:
@@ -66,7 +70,7 @@ class Transcript:
 
     @property
     def calls(self) -> tuple[Call, ...]:
-        """All calls so far, those of earlier sessions of the run included."""
+        """All calls, earlier sessions included."""
         return tuple(self._calls)
 
     def add(self, call: Call) -> None:
@@ -90,8 +94,8 @@ class Transcript:
 def used_hints(calls: Iterable[Call]) -> dict[Hint, str]:
     """Return the used hints and their proposals.
 
-    A hint is used by the call that carried it to the model, whatever came back. Where nothing was read (no connection,
-    no answer in time, Ctrl-C), it goes with the next question.
+    A hint is used by the call that carried it to the model, whatever came back. If the model read nothing (no
+    connection, timeout, Ctrl-C), the hint goes with the next question.
     """
     return {hint: call.proposal for call in calls if call.fault in READ for hint in call.hints}
 

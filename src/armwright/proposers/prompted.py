@@ -91,7 +91,7 @@ class PromptedProposer(LlmSession, Proposer):
             ) from fault
         if self._budget.price_is_missing:
             raise ModelError(
-                f"the price of {self.backend.model} is not known, so max_cost cannot hold; use max_calls",
+                f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls",
                 final="budget",
             )
 

@@ -238,7 +238,7 @@ def test_the_budget_holds(chat_server: ChatServer) -> None:
 def test_a_bound_on_cost_needs_a_price(chat_server: ChatServer) -> None:
     """Where nobody checks, the first call tells, and it is the last."""
     chat_server.answer = answering()
-    with pytest.raises(ModelError, match="price of test-model is not known, so max_cost cannot hold; use max_calls"):
+    with pytest.raises(ModelError, match="price of test-model is unknown, so max_cost cannot hold; use max_calls"):
         proposer(chat_server, max_cost=1.0).check()
     chat_server.requests.clear()
     callback = ProposalCallback(proposer(chat_server, max_cost=1.0, answer="one-step"), every=5)

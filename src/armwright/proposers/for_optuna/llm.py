@@ -62,7 +62,7 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         except ProposalError as error:
             raise ModelError(f"{error}. Check the model, its key and base_url") from error
         if self._budget.price_is_missing:
-            raise ModelError(f"the price of {self.backend.model} is not known, so max_cost cannot hold; use max_calls")
+            raise ModelError(f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls")
 
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """Ask the model for the next trial, from the trials so far."""

@@ -1,0 +1,75 @@
+"""The server of a model, if it is not the vendor's: its address, its name for the model, and its key."""
+
+import os
+from dataclasses import dataclass
+from ipaddress import ip_address
+from urllib.parse import urlsplit
+
+from armwright.exceptions import SettingsError
+from armwright.llm.model_options import ModelOptions
+
+SERVER_KEY = "ARMWRIGHT_API_KEY"  # for base_url, if the server wants a key
+LOCAL_NAMES = (".local", ".lan", ".home", ".internal")  # endings of host names in a local network
+
+# Local servers with a vendor name: default address, and the environment variables of address and key.
+_LOCAL = {
+    "ollama": ("http://localhost:11434/v1", "OLLAMA_BASE_URL", "OLLAMA_API_KEY"),
+    "vllm": ("http://localhost:8000/v1", "VLLM_BASE_URL", "VLLM_API_KEY"),
+}
+
+
+@dataclass(frozen=True)
+class Server:
+    """An OpenAI-compatible server.
+
+    Attributes:
+        address: Its base URL.
+        model: Its name for the model.
+        key_variable: Environment variable of its key.
+    """
+
+    address: str
+    model: str
+    key_variable: str
+
+    @property
+    def is_local(self) -> bool:
+        """True for this machine and its network, whose costs are unknown."""
+        host = urlsplit(self.address).hostname or ""
+        try:
+            return ip_address(host).is_private
+        except ValueError:
+            return "." not in host or host.endswith(LOCAL_NAMES)
+
+    def check_address(self) -> None:
+        """Raise SettingsError if the address is not a plain HTTP URL; a key or a password does not belong there."""
+        scheme, _, rest = self.address.partition("://")
+        if scheme not in ("http", "https"):
+            raise SettingsError(f"base_url {self.address}: expected an address that begins with http:// or https://")
+        if "@" in rest.partition("/")[0] or "?" in rest or "#" in rest:
+            raise SettingsError(f"base_url holds more than an address; put the server's key into {SERVER_KEY}")
+        if not _is_url(self.address):
+            raise SettingsError(
+                f"base_url {self.address} is not an address; expected one such as http://localhost:8080/v1"
+            )
+
+
+def server_of(options: ModelOptions) -> Server | None:
+    """Return the server of a model; None for the vendor's own."""
+    model = options.model or ""
+    vendor, _, bare = model.partition(":")
+    if options.base_url:
+        return Server(options.base_url, model.removeprefix("openai-chat:"), SERVER_KEY)
+    if vendor in _LOCAL:
+        default, address, key = _LOCAL[vendor]
+        return Server(os.environ.get(address) or default, bare, key if os.environ.get(key) else SERVER_KEY)
+    return None
+
+
+def _is_url(text: str) -> bool:
+    """Return whether a URL has a host and, if any, a valid port."""
+    try:
+        parts = urlsplit(text)
+        return bool(parts.hostname) and parts.port != 0 and text.isascii() and text.isprintable() and " " not in text
+    except ValueError:  # invalid brackets or port
+        return False
