@@ -282,7 +282,7 @@ def test_arm_names_without_network_or_package_are_refused(tmp_path: Path, monkey
     monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path))
     for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "all_proxy"):
         monkeypatch.setenv(name, "http://127.0.0.1:9")
-    with pytest.raises(FailureError, match=r"cannot give the URDF of z1: fatal: .*a URDF file of your own") as fault:
+    with pytest.raises(FailureError, match=r"cannot give the URDF of z1: fatal: .*a local URDF file") as fault:
         find_urdf("z1")
     assert "\n" not in str(fault.value)
     monkeypatch.setitem(sys.modules, "robot_descriptions", None)
