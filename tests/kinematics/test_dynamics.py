@@ -385,7 +385,7 @@ def test_move_time_on_the_command_line(in_folder: Path) -> None:
     words = ["optimize", "line.yaml", "--proposer", "rules", "--n-total", "15", "--out", "run"]
     told = CliRunner().invoke(app, words)
     assert told.exit_code == 0, told.output
-    assert "in 1.5 s" in CliRunner().invoke(app, ["tasks", "line.yaml"]).output
+    assert "durations 1.5 s" in CliRunner().invoke(app, ["tasks", "line.yaml"]).output
     prompt = CliRunner().invoke(app, ["prompt", "line.yaml"]).output
     assert "from rest to rest" in prompt
     (in_folder / "line.yaml").write_text(f"{text}move_time: 2\n")
