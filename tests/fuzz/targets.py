@@ -191,11 +191,11 @@ def used(problem: Problem) -> None:
 
 def same_when_kept(value: Task | DesignSpace) -> None:
     """What is written into a run's settings is read back as the same."""
-    from armwright.runs.folder import _ConfigDumper
+    from armwright.yaml_documents import dump_document
 
     content = value.model_dump(mode="json")
     json.dumps(content, allow_nan=False)
-    text = yaml.dump(content, Dumper=_ConfigDumper, sort_keys=False, allow_unicode=True)
+    text = dump_document(content)
     path = folder() / "kept.yaml"
     path.write_text(text, encoding="utf-8")
     again = load_task(path) if isinstance(value, Task) else load_space(path)

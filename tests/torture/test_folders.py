@@ -230,7 +230,7 @@ def test_no_cache_for_the_kernels(tmp_path: Path) -> None:
     nowhere = {"HOME": "/proc/self/nowhere", "XDG_CACHE_HOME": None, "WARP_CACHE_PATH": None}
     words = one_line(study(tmp_path / "run", environment=nowhere))
     assert "cannot write compiled kernels" in words
-    assert "set WARP_CACHE_PATH to a folder that can be written" in words
+    assert "set WARP_CACHE_PATH to a writable folder" in words
 
 
 def test_a_cache_that_is_full_and_read_only(tmp_path: Path, whole: Path, cache: Path) -> None:
