@@ -196,7 +196,7 @@ def test_study_survives_a_killed_server(tmp_path: Path, tab: Tab, live: ExitStac
     children = [int(pid) for pid in _children(study.process.pid)]
     assert len(children) == 1
     os.kill(children[0], signal.SIGKILL)
-    expect(tab.page.locator("#doing")).to_have_text(re.compile("No connection to the run"))
+    expect(tab.page.locator("#doing")).to_have_text(re.compile("Connection lost"))
     assert study.end() == 0
     assert [t.values for t in read_run(study.folder)[1]] == [t.values for t in plain.trials]
 
