@@ -9,7 +9,7 @@
     │   ├── SettingsError       the settings of a run
     │   ├── RunConflictError    the run folder holds a run with other settings
     │   └── MissingExtraError   an optional dependency that is not installed
-    ├── AnswerPendingError      a question waits for an answer (--proposer manual:DIR --once)   (exit code 0)
+    ├── AnswerPendingError      a question waits for an answer (manual:DIR, wait: false)        (exit code 0)
     ├── StoppedError            a study ended on request                    (exit code 130, as after Ctrl-C)
     └── FailureError            something failed during the work            (exit code 1)
         ├── RunFolderError      a run folder that cannot be written, or whose content is damaged

@@ -187,7 +187,7 @@ def test_only_files_that_wait_are_announced(tmp_path: Path) -> None:
 
 
 def test_people_are_not_asked_while_trials_go_on(tmp_path: Path) -> None:
-    with pytest.raises(SettingsError, match="--overlap does not go with the proposer manual"):
+    with pytest.raises(SettingsError, match="in_flight does not go with the proposer manual"):
         run(ManualProposer(tmp_path / "ask"), None, in_flight=1)
 
 

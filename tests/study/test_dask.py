@@ -344,7 +344,7 @@ def test_an_objective_s_exception_on_a_worker_arrives_with_its_traceback(shell: 
         (
             lambda: aw.optimize(PAPER, proposer="rules", in_flight=1, workers=aw.Workers(1)),
             SettingsError,
-            "--overlap does not go with --workers",
+            "in_flight does not go with --workers",
         ),
         (
             lambda: aw.optimize(PAPER, workers=aw.Workers(scheduler="tcp://127.0.0.1:9")),

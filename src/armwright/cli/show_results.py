@@ -238,7 +238,7 @@ def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
     if proposer.get("differing_prompts"):
         console.print(
             f"replay: the prompts of {proposer['differing_prompts']} proposals differ from the recorded ones; "
-            "--replay-strict makes that an error"
+            "the model option `replay_strict: true` makes that an error"
         )
     overlap = proposer["overlap"]
     if overlap is not None:

@@ -63,7 +63,7 @@ class Proposer(Protocol):
     Attributes:
         name: the `source` of its trials.
         per_call: number of designs per call of `propose`, at most.
-        overlaps: True if other threads may call it while black-box trials run (--overlap).
+        overlaps: True if other threads may call it while black-box trials run (`in_flight`).
     """
 
     name: str
@@ -110,7 +110,7 @@ class Proposer(Protocol):
     def propose(self, history: History, seed: int, number: int) -> Proposal | Sequence[Proposal]:
         """Propose the next design, or several to evaluate one after the other.
 
-        The result must depend on the arguments alone, so that a killed run resumes identically. With --overlap, other
+        The result must depend on the arguments alone, so that a killed run resumes identically. With `in_flight`, other
         threads call this.
 
         Args:

@@ -288,7 +288,7 @@ def _proposer_record(history: History, config: RunConfig, proposer: ProposerSumm
 
 
 def _overlap_record(history: History, config: RunConfig, turns: Sequence[FinishedTrial]) -> dict[str, Any] | None:
-    """With --overlap: which share of the counted trials proposals were, and how old [trials] what they knew was.
+    """Return the share of proposals among the counted trials and the age of their feedback [trials] (`in_flight`).
 
     ratio_with_failures: the share of the proposer's turns, those included that became black-box trials.
     """

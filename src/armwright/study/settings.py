@@ -37,7 +37,7 @@ def study_method(
             f"{len(initial_designs)} initial designs do not fit into the n_init = {n_init} first trials"
         )
     if in_flight is not None and proposer is not None and not proposer.overlaps:
-        raise SettingsError(f"--overlap does not go with the proposer {proposer.name}, which is asked one by one")
+        raise SettingsError(f"in_flight does not go with the proposer {proposer.name}, which is asked one by one")
     return Method(
         proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
         sampler=sampler_name(sampler),
@@ -84,7 +84,7 @@ def check_settings(problem: Problem, method: Method, workers: Workers | None, on
     if problem.evaluator is not None and method.refine_every is not None:
         raise SettingsError("--refine-every does not go with an evaluator: a refinement takes a thousand evaluations")
     if workers is not None and method.in_flight is not None:
-        raise SettingsError("--overlap does not go with --workers: these go on while a question is asked")
+        raise SettingsError("in_flight does not go with --workers, which evaluate while a question is asked anyway")
 
 
 def check_integer(name: str, value: Any, least: int) -> int:
