@@ -54,9 +54,13 @@ def serve(
     settings = uvicorn.Config(
         app, log_config=None, access_log=False, lifespan="on", timeout_graceful_shutdown=1, server_header=False
     )
-    server = uvicorn.Server(settings)
-    tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/")
 
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            tell(f"http://{f'[{host}]' if ':' in host else host}:{port}/")  # from here on Ctrl-C ends it in order
+
+    server = Server(settings)
     is_alone = threading.Event()
     if study is not None:
         threading.Thread(target=lambda: (study.read(), is_alone.set()), daemon=True).start()
