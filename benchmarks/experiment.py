@@ -41,7 +41,7 @@ def run(seeds: int, n_workers: int) -> tuple[float, str]:
         faults = [outcome.fault for outcome in run_cells(cells, Workers(n_workers), print) if outcome.fault]
         seconds = time.perf_counter() - started
         assert not faults, faults
-        return seconds, markdown(collect(plan, cells), "", published(plan), plan.published_in)
+        return seconds, markdown(collect(plan, cells), "", published(plan))
 
 
 if __name__ == "__main__":

@@ -5,12 +5,24 @@ import io
 import os
 import re
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from armwright.exceptions import ArmwrightError, RunFolderError
+
 # Windows reserves device names, whatever their suffix, and drops a dot at the end.
 _NO_FILE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?|.*\.", re.IGNORECASE)
+
+
+@contextmanager
+def naming_write_errors(path: Path, note: str = "", error: type[ArmwrightError] = RunFolderError) -> Generator[None]:
+    """Turn an OSError inside the block into an error that names the path; note: appended to its message."""
+    try:
+        yield
+    except OSError as fault:
+        raise error(f"cannot write {path}: {fault.strerror or fault}{note}") from fault
 
 
 def replace_file(target: Path, content: bytes) -> None:

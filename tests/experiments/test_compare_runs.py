@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from armwright.cli.app import app
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
+from armwright.experiments.outcome import Published
 from armwright.experiments.run_list import find_runs, list_runs
 from armwright.experiments.run_summary import RunSummary, read_run_summary
 from armwright.experiments.statistics import interval, paired_test
@@ -126,7 +127,7 @@ def test_times_count_the_runs_that_reached_the_target(comparison: Comparison) ->
         curves = comparison.curves(time.method, time.task)
         there = [next((i + 1 for i, v in enumerate(curve) if v >= time.hypervolume), None) for curve in curves]
         assert time.reached == sum(t is not None for t in there)
-        assert (time.median is None) == (time.reached < 2)
+        assert (time.median_trials is None) == (time.reached < 2)
 
 
 def test_flagged_runs_are_excluded(runs: Path, tmp_path: Path) -> None:
@@ -210,8 +211,8 @@ def test_front_search_is_compared_with_studies(runs: Path, tmp_path: Path) -> No
 
 
 def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: Path) -> None:
-    published = {("BBO (12 trials)", "target-1"): (6.7, 2.03)}
-    files = write_tables(tmp_path, comparison, "All", published, "The Paper", ["one cell is missing"])
+    published = Published({("BBO (12 trials)", "target-1"): (6.7, 2.03)}, "The Paper")
+    files = write_tables(tmp_path, comparison, "All", published, ["one cell is missing"])
     assert {path.name for path in files} >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "time-to.csv"}
     text = (tmp_path / "table.md").read_text()
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text().splitlines()))
@@ -220,7 +221,7 @@ def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: P
     assert "6.70 (2.03)" in text
     assert "The Paper" in text
     assert "one cell is missing" in text
-    assert "smallest possible p for 3 pairs of runs is 0.25" in text
+    assert "smallest possible p is 0.25 (seeds in common: 3)" in text
     for line in re.findall(r"(?m)^\|.*$", text):
         assert line.endswith("|")
     tex = (tmp_path / "table.tex").read_text()

@@ -57,7 +57,8 @@ def experiment(
     from armwright.experiments import runner as running
     from armwright.experiments.cells import plan_cells
     from armwright.llm.configuration import load_model_options
-    from armwright.report.experiment import write_experiment_figures, write_experiment_tables
+    from armwright.report.comparison_figures import write_experiment_figures
+    from armwright.report.tables import write_tables
 
     if print_:
         print(plan.builtin_text(name), end="")
@@ -87,7 +88,8 @@ def experiment(
             show_outcome(console, done, number, len(due))
             failed += [done] if done.fault else []
         found = outcome.collect(chosen, cells)
-        tables = write_experiment_tables(out, chosen, found, notes_on_cells(skipped, failed))
+        notes = notes_on_cells(skipped, failed)
+        tables = write_tables(out, found, f"Experiment {chosen.name}", outcome.published(chosen), notes)
         if figures:
             console.print("drawing the figures")
         drawn = write_experiment_figures(out, chosen, found) if figures else []

@@ -37,6 +37,7 @@ def init(
     ),
 ) -> None:
     """Write a commented task file to edit."""
+    from armwright.files import naming_write_errors
     from armwright.tasks.points_file import read_points
     from armwright.tasks.task import Task
     from armwright.tasks.task_template import task_template
@@ -48,10 +49,8 @@ def init(
         raise TaskError(f"{file} already exists; use another name, or delete it first")
     text = task_template(file) if points is None else task_template(file, read_points(points, unit, offset))
     task = parse_document(text, Task, TaskError, str(file))
-    try:
+    with naming_write_errors(file, error=FailureError):
         file.write_text(text, encoding="utf-8")
-    except OSError as fault:
-        raise FailureError(f"cannot write {file}: {fault.strerror or fault}") from fault
     print(
         f"wrote {file} with {len(task.targets)} targets; edit it, then run: armwright optimize {shlex.quote(str(file))}"
     )

@@ -65,16 +65,16 @@ class OverallContrast:
 class TimeToTarget:
     """Counted trials needed to reach a share of the best known hypervolume.
 
-    median: over the runs; None if fewer than half of them reached it. reached: number of runs that did.
+    reached: number of runs that did. median_trials: over the runs; None if fewer than half of them did.
     """
 
-    method: str
     task: str
+    method: str
     level: float
     hypervolume: float
     reached: int
     runs: int
-    median: float | None
+    median_trials: float | None
 
 
 class Comparison:
@@ -202,7 +202,7 @@ class Comparison:
         reached = sum(map(math.isfinite, trials))
         target = self._target(task, level)
         return TimeToTarget(
-            method, task, level, target, reached, len(trials), median if math.isfinite(median) else None
+            task, method, level, target, reached, len(trials), median if math.isfinite(median) else None
         )
 
     def _result(self, method: str, task: str) -> MethodResult:

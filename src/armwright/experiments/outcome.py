@@ -1,19 +1,34 @@
 """Collect the finished cells of an experiment, and store its plan."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
-from armwright.exceptions import FailureError, RunFolderError
+from armwright.exceptions import FailureError
 from armwright.experiments.cells import Cell
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.run_summary import read_run_summary
-from armwright.files import replace_file
+from armwright.files import naming_write_errors, replace_file
 from armwright.runs.results import read_summary
 
 PLAN = "experiment.yaml"  # in the experiment's folder
+
+
+@dataclass(frozen=True)
+class Published:
+    """Published results.
+
+    values: E_hv and σ_hv by the method's label and the task. source: the publication.
+    """
+
+    values: Mapping[tuple[str, str], tuple[float, float]]
+    source: str
+
+
+NOTHING_PUBLISHED = Published({}, "")
 
 
 def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
@@ -28,20 +43,19 @@ def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
     return Comparison(records, labels, tasks, plan.methods[plan.baseline_key].label)
 
 
-def published(plan: ExperimentPlan) -> dict[tuple[str, str], tuple[float, float]]:
-    """Return the published numbers (E_hv, σ_hv) by label and task."""
-    return {
+def published(plan: ExperimentPlan) -> Published:
+    """Return the published results of the plan's methods."""
+    values = {
         (plan.methods[key].label, task): numbers
         for key, by_task in plan.published.items()
         for task, numbers in by_task.items()
     }
+    return Published(values, plan.published_in)
 
 
 def write_plan(plan: ExperimentPlan, out: Path) -> None:
     """Store the plan, with the models that were used, next to the results."""
     text = yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True), sort_keys=False, allow_unicode=True)
-    try:
+    with naming_write_errors(out / PLAN):
         out.mkdir(parents=True, exist_ok=True)
         replace_file(out / PLAN, text.encode())
-    except OSError as fault:
-        raise RunFolderError(f"cannot write {out / PLAN}: {fault.strerror or fault}") from fault

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.run_summary import RunSummary
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.report.arm_figures import draw_arm, frame
@@ -50,6 +51,13 @@ def write_comparison_figures(
         samples: Methods to show in detail: the first one with runs is drawn; by default the last of all methods.
     """
     return write_drawn(place / FIGURES, _drawn(comparison, curves, samples))
+
+
+def write_experiment_figures(out: Path, plan: ExperimentPlan, found: Comparison) -> list[Path]:
+    """Draw the standard figures and those named in the plan; return the PNG files."""
+    labels = {key: method.label for key, method in plan.methods.items()}
+    curves = [Curves(key, f.title, [labels[method] for method in f.methods]) for key, f in plan.figures.items()]
+    return write_comparison_figures(out, found, curves, [labels[key] for key in plan.samples])
 
 
 def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[str]) -> Iterator[tuple[str, Figure]]:

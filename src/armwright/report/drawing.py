@@ -1,8 +1,7 @@
 """Figures without a display, written as PNG and PDF; a folder of figures is replaced in one step."""
 
 import shutil
-from collections.abc import Generator, Iterable, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from armwright.arrays import Array
-from armwright.exceptions import RunFolderError
 from armwright.experiments.compare_runs import Comparison
-from armwright.files import replace_folder
+from armwright.files import naming_write_errors, replace_folder
 from armwright.report.style import RC, line
 
 LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
@@ -69,7 +67,7 @@ def legend_below(figure: Figure, handles: Sequence[Any]) -> None:
 def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
     """Replace the folder `place` by these figures, as PNG and PDF, and return the PNG files."""
     part = place.with_name(f"{place.name}.part")
-    with matplotlib.rc_context(RC), _writing(place):
+    with matplotlib.rc_context(RC), naming_write_errors(place, "; the trials are safe"):
         if part.exists():
             shutil.rmtree(part)
         part.mkdir(parents=True)
@@ -82,11 +80,3 @@ def _save(figure: Figure, png: Path) -> str:
     figure.savefig(png)
     figure.savefig(png.with_suffix(".pdf"), metadata={"CreationDate": None})
     return png.name
-
-
-@contextmanager
-def _writing(path: Path) -> Generator[None]:
-    try:
-        yield
-    except OSError as fault:
-        raise RunFolderError(f"cannot write {path}: {fault.strerror or fault}; the trials are safe") from fault

@@ -14,6 +14,7 @@ from importlib import resources
 from pathlib import Path
 
 from armwright.exceptions import RunFolderError
+from armwright.files import naming_write_errors, replace_file
 from armwright.report.page_content import RunContent
 from armwright.runs.results import REPORT
 
@@ -34,12 +35,8 @@ def write_report(folder: str | Path) -> Path:
     task = content.config.task.name
     page = render_page(f"{task}, seed {content.config.seed}: armwright", data=data)
     path = folder / REPORT
-    part = path.with_name(f"{REPORT}.part")
-    try:
-        part.write_text(page, encoding="utf-8")
-        part.replace(path)
-    except OSError as fault:
-        raise RunFolderError(f"cannot write {path}: {fault.strerror or fault}; the trials are safe") from fault
+    with naming_write_errors(path, "; the trials are safe"):
+        replace_file(path, page.encode())
     return path
 
 

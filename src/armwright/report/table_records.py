@@ -1,21 +1,22 @@
 """Records of a comparison, one per row of its CSV tables."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from armwright.experiments.compare_runs import Comparison
+from armwright.experiments.compare_runs import Comparison, Contrast, OverallContrast
+from armwright.experiments.outcome import Published
 from armwright.experiments.run_summary import RunSummary
 from armwright.experiments.statistics import Interval, least_p
 
-Published = Mapping[tuple[str, str], tuple[float, float]]  # (method, task): (E_hv, σ_hv)
+BIASES = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats")  # of proposers, shown in tables
 
 
 def row_records(comparison: Comparison, published: Published) -> Iterable[dict[str, Any]]:
     """Yield one record per method and task."""
     for row in comparison.rows:
-        theirs = published.get((row.method, row.task))
+        e_hv, sigma_hv = published.values.get((row.method, row.task), (None, None))
         yield {
             "task": row.task,
             "method": row.method,
@@ -25,8 +26,8 @@ def row_records(comparison: Comparison, published: Published) -> Iterable[dict[s
             **_flat("final", row.final),
             **_flat("share_of_best_known", row.share),
             "best_known": comparison.best_known(row.task),
-            "published_e_hv": None if theirs is None else theirs[0],
-            "published_sigma_hv": None if theirs is None else theirs[1],
+            "published_e_hv": e_hv,
+            "published_sigma_hv": sigma_hv,
             "seconds": row.seconds,
             "scripted": any(run.is_scripted for run in comparison.runs_of(row.method, row.task)),
         }
@@ -35,18 +36,14 @@ def row_records(comparison: Comparison, published: Published) -> Iterable[dict[s
 def contrast_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
     """Yield one record per comparison with the baseline on a task."""
     for contrast in comparison.contrasts:
-        test = contrast.test
         yield {
             "task": contrast.task,
             "method": contrast.method,
             "baseline": comparison.baseline,
-            "pairs": test.n,
-            **_flat("difference", test.difference),
-            "better": test.better,
-            "effect": test.effect,
-            "p": test.p,
-            "p_holm": contrast.p_holm,
-            "least_p": least_p(test.n),
+            "pairs": contrast.test.n,
+            **_flat("difference", contrast.test.difference),
+            **_test_fields(contrast),
+            "least_p": least_p(contrast.test.n),
         }
 
 
@@ -58,24 +55,7 @@ def overall_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
             "baseline": comparison.baseline,
             "tasks": over.test.n,
             **_flat("ratio", over.ratio),
-            "better": over.test.better,
-            "effect": over.test.effect,
-            "p": over.test.p,
-            "p_holm": over.p_holm,
-        }
-
-
-def time_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
-    """Yield one record per method, task and share of the best known hypervolume."""
-    for time in comparison.times:
-        yield {
-            "task": time.task,
-            "method": time.method,
-            "level": time.level,
-            "hypervolume": time.hypervolume,
-            "reached": time.reached,
-            "runs": time.runs,
-            "median_trials": time.median,
+            **_test_fields(over),
         }
 
 
@@ -114,8 +94,12 @@ def _flat(name: str, value: Interval | None) -> dict[str, float | None]:
     return {name: value.mean, f"{name}_low": value.low, f"{name}_high": value.high}
 
 
+def _test_fields(contrast: Contrast | OverallContrast) -> dict[str, float]:
+    test = contrast.test
+    return {"better": test.better, "effect": test.effect, "p": test.p, "p_holm": contrast.p_holm}
+
+
 def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:
-    biases = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats")
     each: list[dict[str, Any]] = []
     for run in runs:
         summary, name = run.summary, run.proposer["name"]
@@ -131,7 +115,7 @@ def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:
         }
         for prefix, who in (("", "proposer"), ("black_box_", "black_box")):
             bias: dict[str, Any] = summary["proposer_bias"][who] or {}
-            found |= {f"{prefix}{key}": bias.get(key) for key in biases}
+            found |= {f"{prefix}{key}": bias.get(key) for key in BIASES}
         each.append(found)
     return {"runs": len(runs)} | {key: _mean([found[key] for found in each]) for key in each[0]}
 
