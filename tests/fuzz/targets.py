@@ -339,7 +339,7 @@ class _Answered:
 
     def cancel(self) -> None: ...
 
-    def ask_for(self, question: Any, schema: Any, read: Any) -> Any:
+    def ask(self, question: Any, output: Any = None, most_requests: Any = None) -> Any:
         from armwright.llm.backend import CallError, Reply
 
         try:
@@ -348,7 +348,7 @@ class _Answered:
             content = None
         if not isinstance(content, dict):
             raise CallError("answer", "no object", Reply(self.text, requests=1))
-        return Reply(read(content), requests=1)
+        return Reply(output.read(content), requests=1)
 
 
 @cache

@@ -12,7 +12,7 @@ from pydantic_ai.usage import RequestUsage
 
 from armwright.exceptions import ModelError, ProposalError
 from armwright.llm import client as chat
-from armwright.llm.backend import CHECK, LlmBackend, Question, Reply
+from armwright.llm.backend import CHECK, LlmBackend, OutputFormat, Question, Reply
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.servers import server_of
@@ -27,6 +27,7 @@ from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
+NO_FORMAT = OutputFormat({}, str)
 
 
 def run(
@@ -59,19 +60,16 @@ class Greedy(LlmBackend):
 
     def begin(self) -> None: ...
 
-    def check(self, question: Question = CHECK) -> Reply:
-        return self.ask(question)
+    def check(self) -> Reply:
+        return self.ask(CHECK)
 
-    def ask(self, question: Question) -> Reply:
-        taken = min(self.most, question.most_requests or self.most)
+    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+        taken = min(self.most, most_requests or self.most)
         with self._lock:
             self.requests += taken
         self.asking.set()
         self.go_on.wait()
         return Reply("so be it", taken, cost_usd=0.1 * taken)
-
-    def ask_for(self, question: Question, schema: object, read: object) -> Reply:
-        return self.ask(question)
 
     def cancel(self) -> None: ...
 
@@ -84,7 +82,7 @@ class Session(LlmSession):
 
         def ask() -> None:
             try:
-                came.append(self._call(Question("p-0001", "answer", "Which?"), self.backend.ask, self._over))
+                came.append(self._ask(Question("p-0001", "answer", "Which?"), NO_FORMAT))
             except ProposalError as fault:
                 came.append(fault)
 

@@ -351,7 +351,7 @@ def test_whatever_a_server_says_is_an_answer_or_a_fault(
         question = Question("llm-0004", step, "Which?")
         with suppress(CallError):
             if step == "answer":
-                asked.ask_designs(question, PROBLEM)
+                asked.backend.ask(question, asked.output_format(PROBLEM))
             else:
                 asked.backend.ask(question)
 

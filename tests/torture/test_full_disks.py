@@ -103,7 +103,7 @@ def test_no_room_for_a_search(tmp_path: Path) -> None:
 
 def test_no_room_for_an_answer(tmp_path: Path) -> None:
     """Half a line is taken back: what another thread adds when there is room again stands on a line of its own."""
-    calls = [Call(f"llm-{n}", "answer", 0, "model", "m", "?", "x" * 1000, 1, 1, 1, None, 1.0) for n in range(3)]
+    calls = [Call(f"llm-{n}", "answer", "?", answer="x" * 1000, origin="model", model="m") for n in range(3)]
     transcript = Transcript(tmp_path / "transcripts.jsonl")
     transcript.add(calls[0])
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)

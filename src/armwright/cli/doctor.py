@@ -60,7 +60,7 @@ def try_model(options: ModelOptions | None = None) -> str:
     except CallError as fault:
         raise ModelError(f"{fault} ({fault.kind})") from fault
     cost = "price unknown" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
-    answer = " ".join(reply.text.split())[:60]
+    answer = " ".join(reply.answer.split())[:60]
     return (
         f'{OK} call: {configured.options.model} answered "{answer}" in {reply.seconds:.1f} s, '
         f"{reply.input_tokens} tokens in, {reply.output_tokens} out, {cost}"

@@ -2,17 +2,18 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
+
+from pydantic import Field
 
 from armwright.exceptions import ProposalError
 from armwright.runs.control import Hint
 
-# Turn an answer, as JSON or as text, into the text to record; UsageError refuses it.
-Reader = Callable[[Mapping[str, Any]], str]
-TextReader = Callable[[str], str]
-
 MOST_REQUESTS = 3  # per question: an invalid answer goes back with the reason, at most twice
 FINAL = frozenset({"key", "quota", "unknown_model", "budget"})  # faults that a repeated call does not cure
+
+Count = Annotated[int, Field(ge=0, lt=2**53)]
+Amount = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
@@ -20,18 +21,17 @@ class Question:
     """A question.
 
     Attributes:
-        proposal: Id of the proposal it is for.
-        step: Its part of the session, as in `Call`.
+        proposal: Id of the proposal it is for, made of the source and the trial's number; empty for a check.
+        step: `check` (is the model available), `reasoning` (the free answer), `parameters` (that answer as values),
+            `answer` (both at once) or `draft` (a task and a space).
         known: Number of finished trials that the prompt was made from.
-        most_requests: Limit of requests, those after invalid answers included; None for no limit.
-        hints: Hints in the prompt.
+        hints: Hints of the user in the prompt.
     """
 
-    proposal: str
+    proposal: Annotated[str, Field(pattern=r"^(.*-\d{1,9})?$")]
     step: str
     prompt: str
-    known: int = 0
-    most_requests: int | None = None
+    known: Count = 0
     hints: tuple[Hint, ...] = ()
 
 
@@ -40,14 +40,32 @@ CHECK = Question("", "check", "Answer with one word: ready")
 
 @dataclass(frozen=True)
 class Reply:
-    """An answer and its cost; `cost_usd` is None if the price is unknown."""
+    """An answer and its cost.
 
-    text: str
-    requests: int = 0
-    input_tokens: int = 0
-    output_tokens: int = 0
-    cost_usd: float | None = None
-    seconds: float = 0.0
+    Attributes:
+        requests: Requests that the server answered; above 1 if an answer was invalid.
+        cost_usd: None if the price is unknown.
+    """
+
+    answer: str = ""
+    requests: Count = 0
+    input_tokens: Count = 0
+    output_tokens: Count = 0
+    cost_usd: Amount | None = None
+    seconds: Amount = 0.0
+
+
+@dataclass(frozen=True)
+class OutputFormat:
+    """The form of an answer that is not free text.
+
+    Attributes:
+        schema: JSON schema.
+        read: Turns an answer, as JSON or as text, into the text to record; UsageError refuses it.
+    """
+
+    schema: Mapping[str, Any]
+    read: Callable[[Mapping[str, Any] | str], str]
 
 
 class CallError(ProposalError):
@@ -83,16 +101,18 @@ class LlmBackend(Protocol):
         """Start a session; an earlier cancellation no longer counts."""
         ...
 
-    def check(self, question: Question = CHECK) -> Reply:
-        """Ask one tiny question before any work is done; raises CallError if there is no answer."""
+    def check(self) -> Reply:
+        """Ask CHECK before any work is done; raises CallError if there is no answer."""
         ...
 
-    def ask(self, question: Question) -> Reply:
-        """Return the free answer; raises CallError if there is none."""
-        ...
+    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+        """Return the answer, free text by default; raises CallError if there is none.
 
-    def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
-        """Return an answer as JSON of `schema` that `read` accepts; its refusals are sent back to the model."""
+        Args:
+            question: What is asked.
+            output: Form of the answer. Its refusals are sent back to the model.
+            most_requests: Limit of requests, those after invalid answers included; None for no limit.
+        """
         ...
 
     def cancel(self) -> None:

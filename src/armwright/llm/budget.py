@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from armwright.exceptions import ProposalError
 from armwright.llm.backend import MOST_REQUESTS
-from armwright.llm.transcript import Call
+from armwright.llm.transcript import Call, n_requests, total_cost
 
 
 class CallBudget:
@@ -23,29 +23,20 @@ class CallBudget:
         self.max_cost = max_cost
         self._change = threading.Condition()
         self._reserved = 0  # requests of the questions in flight
-        self._forget()
+        self._calls: list[Call] = []
 
     def begin(self, calls: Iterable[Call]) -> None:
         """Start a session, given the calls of earlier ones."""
-        with self._change:
-            self._forget()
-        for call in calls:
-            self.spend(call)
+        self._calls = list(calls)
 
     def spend(self, call: Call) -> None:
         """Count a call."""
-        with self._change:
-            self._requests += max(1, call.requests)
-            if call.requests:  # otherwise nothing was answered, and nothing is to be paid
-                self._cost = None if self._cost is None or call.cost_usd is None else self._cost + call.cost_usd
-            if call.requests and call.proposal:
-                self._priced += call.requests
-                self._priced_cost += call.cost_usd or 0.0
+        self._calls.append(call)
 
     @property
     def price_is_missing(self) -> bool:
         """True if the cost is limited but unknown for some answer."""
-        return self.max_cost is not None and self._cost is None
+        return self.max_cost is not None and total_cost(self._calls) is None
 
     @contextmanager
     def reserved(self, is_over: Callable[[], bool]) -> Generator[int | None]:
@@ -69,12 +60,6 @@ class CallBudget:
         with self._change:
             self._change.notify_all()
 
-    def _forget(self) -> None:
-        self._requests = 0
-        self._cost: float | None = 0.0  # of all requests; None if a price is unknown
-        self._priced = 0  # answered requests for proposals
-        self._priced_cost = 0.0  # of these
-
     def _reserve(self, is_over: Callable[[], bool]) -> int | None:
         with self._change:
             while not is_over():
@@ -92,7 +77,7 @@ class CallBudget:
         """Raise ProposalError if nothing would be left even if the questions in flight needed nothing."""
         if self.price_is_missing:
             reason = f"the cost of its calls is unknown, so max_cost {self.max_cost:g} cannot hold; use max_calls"
-        elif self.max_calls is not None and self._requests >= self.max_calls:
+        elif self.max_calls is not None and n_requests(self._calls) >= self.max_calls:
             reason = f"max_calls {self.max_calls} is used up"
         elif self._left(0) < 1:
             reason = f"max_cost {self.max_cost:g} USD is used up"
@@ -104,15 +89,15 @@ class CallBudget:
         """Return the requests left for the next prompt while this many are reserved for others."""
         left = MOST_REQUESTS
         if self.max_calls is not None:
-            left = min(left, self.max_calls - self._requests - reserved)
+            left = min(left, self.max_calls - n_requests(self._calls) - reserved)
         if self.max_cost is not None:
-            cost = self._cost or 0.0
-            if cost >= self.max_cost:
+            rest = self.max_cost - (total_cost(self._calls) or 0.0)
+            priced = [call for call in self._calls if call.requests and call.proposal]
+            each = (total_cost(priced) or 0.0) / max(1, n_requests(priced))
+            if rest <= 0.0:
                 left = 0
-            elif not self._priced:
+            elif not priced:
                 left = min(left, MOST_REQUESTS - reserved)
-            elif self._priced_cost:
-                each = self._priced_cost / self._priced
-                affordable = math.floor((self.max_cost - cost) / each + 1e-9)  # 5 of 5 despite rounding
-                left = min(left, affordable - reserved)
+            elif each:
+                left = min(left, math.floor(rest / each + 1e-9) - reserved)  # 5 of 5 despite rounding
         return left

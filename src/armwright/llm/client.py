@@ -17,7 +17,16 @@ from armwright.exceptions import MissingExtraError, SettingsError, UsageError
 from armwright.extras import requires_extra
 from armwright.files import replace_surrogates
 from armwright.llm.answer import without_words_around
-from armwright.llm.backend import CHECK, MOST_REQUESTS, CallError, Interrupted, LlmBackend, Question, Reader, Reply
+from armwright.llm.backend import (
+    CHECK,
+    MOST_REQUESTS,
+    CallError,
+    Interrupted,
+    LlmBackend,
+    OutputFormat,
+    Question,
+    Reply,
+)
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
 from armwright.llm.redaction import WithoutKeys, redacted, without_keys
 from armwright.llm.servers import Server, server_of
@@ -117,42 +126,43 @@ class ModelClient(LlmBackend):
         """Start a session."""
         self._cancelled = False
 
-    def check(self, question: Question = CHECK) -> Reply:
+    def check(self) -> Reply:
         """Ask one tiny question, so that a wrong name, key or address is reported before any work is done."""
-        return self._run(Agent(self._model), question, CHECK_SECONDS)
+        return self._run(Agent(self._model), CHECK, None, CHECK_SECONDS)
 
-    def ask(self, question: Question) -> Reply:
-        """Return the free answer to a prompt."""
-        reply = self._run(Agent(self._model, retries=REASKS), question, self.timeout)
-        if not reply.text.strip():
+    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+        """Return the answer to a prompt; refusals of its output format are sent back to the model."""
+        if output is not None:
+            return self._ask_for(question, output, most_requests)
+        reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, self.timeout)
+        if not reply.answer.strip():
             raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
 
-    def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
-        """Return an answer as JSON of `schema` that `read` accepts; its refusals are sent back to the model."""
+    def _ask_for(self, question: Question, output: OutputFormat, most_requests: int | None) -> Reply:
         accepted: list[str] = []
         refusals: list[str] = []
 
         def accept(answer: dict[str, Any]) -> dict[str, Any]:
             try:
                 # Keys are redacted before reading, so that the recorded text can be read again.
-                accepted.append(replace_surrogates(read(without_keys(answer))))
+                accepted.append(replace_surrogates(output.read(without_keys(answer))))
             except UsageError as refusal:
                 refusals.append(str(refusal))
                 raise ModelRetry(str(refusal)) from refusal
             return answer
 
-        output = self._output(StructuredDict(dict(schema)))
-        agent: Agent[None, Any] = Agent(self._model, output_type=output, retries=REASKS)
+        schema = self._output(StructuredDict(dict(output.schema)))
+        agent: Agent[None, Any] = Agent(self._model, output_type=schema, retries=REASKS)
         agent.output_validator(accept)
         try:
-            reply = self._run(agent, question, self.timeout)
+            reply = self._run(agent, question, most_requests, self.timeout)
         except CallError as fault:
             if fault.kind != "limit" or not refusals:
                 raise
             message = f"{self.model}: max_calls leaves no request after an invalid answer ({_one_line(refusals[-1])})"
             raise CallError(fault.kind, message, fault.reply) from fault
-        return replace(reply, text=accepted[-1])
+        return replace(reply, answer=accepted[-1])
 
     def cancel(self) -> None:
         """Cancel all calls, including those about to start."""
@@ -160,10 +170,10 @@ class ModelClient(LlmBackend):
         for future in list(self._pending):
             future.cancel()
 
-    def _run(self, agent: Agent[None, Any], question: Question, seconds: float) -> Reply:
+    def _run(self, agent: Agent[None, Any], question: Question, most_requests: int | None, seconds: float) -> Reply:
         started = time.perf_counter()
         settings: ModelSettings = {**self._settings, "request_timeout": seconds, "max_retries": 0}
-        limits = UsageLimits(request_limit=question.most_requests)
+        limits = UsageLimits(request_limit=most_requests)
         with capture_run_messages() as messages:
             try:
                 self._wait(agent.run(question.prompt, model_settings=settings, usage_limits=limits))
@@ -183,12 +193,12 @@ class ModelClient(LlmBackend):
         responses = [message for message in messages if isinstance(message, ModelResponse)]
         costs = [_cost(response, self._server) for response in responses]
         return Reply(
-            text=_text(responses[-1]) if responses else "",
+            answer=_text(responses[-1]) if responses else "",
             requests=len(responses),
             input_tokens=sum(response.usage.input_tokens for response in responses),
             output_tokens=sum(response.usage.output_tokens for response in responses),
             cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
-            seconds=seconds,
+            seconds=round(seconds, 3),
         )
 
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:

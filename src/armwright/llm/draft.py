@@ -26,7 +26,7 @@ from armwright.exceptions import (
     TaskError,
 )
 from armwright.files import replace_file
-from armwright.llm.backend import MOST_REQUESTS, CallError, Question
+from armwright.llm.backend import MOST_REQUESTS, CallError, OutputFormat, Question
 from armwright.llm.budget import CallBudget
 from armwright.llm.configuration import ConfiguredModel, configuration_path, configured_model
 from armwright.llm.draft_prompt import draft_prompt, draft_schema
@@ -152,12 +152,13 @@ class Drafter(LlmSession):
         self.backend.begin()
         drafts: list[Draft] = []
 
-        def read(content: Mapping[str, Any]) -> str:
+        def read(content: Mapping[str, Any] | str) -> str:
+            assert not isinstance(content, str)  # models answer in JSON
             drafts.append(self._read(map_text(content, visible), description))
             return json.dumps(content, ensure_ascii=False)
 
         try:
-            self._call(question, lambda asked: self.backend.ask_for(asked, draft_schema(), read), self._over)
+            self._ask(question, OutputFormat(draft_schema(), read))
         except ProposalError as fault:
             raise self._failure(fault) from fault
         draft = replace(drafts[-1], usage=self.summary())
@@ -224,7 +225,7 @@ class Drafter(LlmSession):
             raise SettingsError(f"a draft takes about {cost:.3f} USD, more than max_cost = {options.max_cost:g}")
 
     def _failure(self, fault: ProposalError) -> ModelError:
-        answered = isinstance(fault, CallError) and fault.reply.text.strip()
+        answered = isinstance(fault, CallError) and fault.reply.answer.strip()
         ways = "Describe it in other words" if answered else "Check the model, its key and base_url"
         return ModelError(
             f"no draft: {one_line(str(fault), LONGEST_FAULT).rstrip('.')}. {self._kept() if answered else ''}{ways}; "

@@ -3,12 +3,11 @@
 import os
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from armwright.exceptions import AnswerPendingError, DesignError, FailureError
-from armwright.llm.backend import CHECK, CallError, LlmBackend, Question, Reply, TextReader
+from armwright.exceptions import AnswerPendingError, FailureError, UsageError
+from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply
 
 LOOK_EVERY = 0.5  # [s]
 ENDINGS = ("md", "json", "txt")  # of an answer's file
@@ -36,17 +35,9 @@ class ManualBackend(LlmBackend):
         """Start a session."""
         self._cancelled.clear()
 
-    def check(self, question: Question = CHECK) -> Reply:
+    def check(self) -> Reply:
         """Return an empty reply: there is nothing to check before the first question."""
-        return Reply("")
-
-    def ask(self, question: Question) -> Reply:
-        """Return the free answer."""
-        return self.ask_text(question, lambda text: text)
-
-    def ask_for(self, question: Question, schema: Mapping[str, Any], read: Any) -> Reply:
-        """Not supported: manual answers are text."""
-        raise NotImplementedError
+        return Reply()
 
     def cancel(self) -> None:
         """Stop waiting."""
@@ -60,27 +51,29 @@ class ManualBackend(LlmBackend):
         """Return whether there is an answer that has not been refused."""
         return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
 
-    def ask_text(self, question: Question, read: TextReader) -> Reply:
-        """Return the answer read by `read`; a refused one (DesignError) is moved aside with the reason."""
+    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+        """Return the answer; one that is refused is moved aside with the reason."""
         started = time.perf_counter()
         number = int(question.proposal.rpartition("-")[2])
-        asked, _ = self.files(number)
+        prompt_file, _ = self.files(number)
         answers = self._answers(number)
-        self._ask(asked, answers, question.prompt)
+        self._ask(prompt_file, answers, question.prompt)
         refused = ""
         while True:
             answer = next(filter(self._is_ready, answers), None)
             if answer is not None:
+                text = self._read(answer)
                 try:
-                    return Reply(read(self._read(answer)), requests=1, seconds=time.perf_counter() - started)
-                except DesignError as refusal:
+                    accepted = text if output is None else output.read(text)
+                    return Reply(accepted, requests=1, seconds=round(time.perf_counter() - started, 3))
+                except UsageError as refusal:
                     refused = str(refusal)
                     self._refuse(number, answer, refused)
                     continue  # another file may hold a valid answer
             if not self.wait:
-                raise AnswerPendingError(asked, answers[0], refused)
+                raise AnswerPendingError(prompt_file, answers[0], refused)
             if self._cancelled.wait(LOOK_EVERY):
-                raise CallError("cancelled", "waiting for the answer was cancelled", Reply(""))
+                raise CallError("cancelled", "waiting for the answer was cancelled", Reply())
 
     def _answers(self, number: int) -> list[Path]:
         return [self.folder / f"{number:03d}-answer.{ending}" for ending in ENDINGS]

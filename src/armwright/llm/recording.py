@@ -1,11 +1,10 @@
 """Replay of a transcript: no network, no cost, the same answers to the same questions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from armwright.exceptions import ReplayError
-from armwright.llm.backend import CHECK, CallError, LlmBackend, Question, Reader, Reply
+from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply
 from armwright.llm.transcript import Call
 
 
@@ -32,26 +31,16 @@ class ReplayBackend(LlmBackend):
     def begin(self) -> None:
         """Do nothing."""
 
-    def check(self, question: Question = CHECK) -> Reply:
+    def check(self) -> Reply:
         """Return the first recorded check."""
         return self._play(next(call for call in self.calls if call.step == "check"))
 
-    def ask(self, question: Question) -> Reply:
-        """Return the recorded answer to this step of the proposal."""
-        return self._answer(question)
-
-    def ask_for(self, question: Question, schema: Mapping[str, Any], read: Reader) -> Reply:
-        """Return the recorded answer in its stored form."""
-        return self._answer(question)
-
-    def cancel(self) -> None:
-        """Do nothing: no call is ever in flight."""
-
-    def _answer(self, question: Question) -> Reply:
+    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+        """Return the recorded answer to this step of the proposal, in its stored form."""
         place = question.proposal, question.step
         calls = [call for call in self.calls if (call.proposal, call.step) == place]
         if not calls:
-            raise CallError("missing", f"{self.source} holds no {question.step} for {question.proposal}", Reply(""))
+            raise CallError("missing", f"{self.source} holds no {question.step} for {question.proposal}", Reply())
         call = calls[-1]  # an interrupted run may have asked again; the last call counts
         if call.prompt != question.prompt:
             if self.strict:
@@ -62,8 +51,10 @@ class ReplayBackend(LlmBackend):
                 self.differing.append(question.proposal)
         return self._play(call)
 
+    def cancel(self) -> None:
+        """Do nothing: no call is ever in flight."""
+
     def _play(self, call: Call) -> Reply:
-        reply = Reply(call.answer, call.requests, call.input_tokens, call.output_tokens, call.cost_usd, call.seconds)
         if call.fault is not None:
-            raise CallError(call.fault, call.error or call.fault, reply, final=False)
-        return reply
+            raise CallError(call.fault, call.error or call.fault, call, final=False)
+        return call

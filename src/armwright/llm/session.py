@@ -3,12 +3,14 @@
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 
-from armwright.llm.backend import CallError, Interrupted, LlmBackend, Question, Reply
+from armwright.exceptions import ModelError, ProposalError
+from armwright.llm.backend import CHECK, CallError, Interrupted, LlmBackend, OutputFormat, Question, Reply
 from armwright.llm.budget import CallBudget
-from armwright.llm.transcript import Call, Transcript
+from armwright.llm.transcript import Call, Transcript, n_requests, total_cost
 from armwright.runs.summary import ProposerSummary
 
 UNBILLED = ("missing", "cancelled")  # faults of calls that cost nothing unless a request was answered
@@ -35,16 +37,15 @@ class LlmSession:
         return self._summary(self._transcript.calls)
 
     def _summary(self, calls: Sequence[Call]) -> ProposerSummary:
-        costs = [call.cost_usd for call in calls if call.requests]
         return ProposerSummary(
             name=self.name,
             model=self.backend.model,
             origin=self.backend.origin,
-            calls=sum(max(1, call.requests) for call in calls),
+            calls=n_requests(calls),
             call_failures=dict(Counter(call.fault for call in calls if call.fault)),
             input_tokens=sum(call.input_tokens for call in calls),
             output_tokens=sum(call.output_tokens for call in calls),
-            cost_usd=sum(cost or 0.0 for cost in costs) if costs and None not in costs else None,
+            cost_usd=total_cost(calls) if any(call.requests for call in calls) else None,
             seconds=round(sum(call.seconds for call in calls), 3),
         )
 
@@ -61,37 +62,67 @@ class LlmSession:
         self._over = threading.Event()
         self.backend.begin()
 
-    def _call(self, question: Question, ask: Callable[[Question], Reply], over: threading.Event) -> str:
-        """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call."""
-        with self._budget.reserved(over.is_set) as requests:
+    def check(self) -> None:
+        """Ask a test question; an exhausted budget is reported at the first real question instead.
+
+        Raises:
+            ModelError: There is no answer, or its price is unknown under a cost limit.
+        """
+        try:
+            self._call(CHECK, lambda _: self.backend.check(), self._over)
+        except ProposalError as fault:
+            if fault.kind == "budget":
+                return
+            raise ModelError(
+                f"{fault}. Check the model, its key and base_url; --proposer rules needs none",
+                final=fault.kind if fault.final else None,
+            ) from fault
+        if self._budget.price_is_missing:
+            raise ModelError(
+                f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls",
+                final="budget",
+            )
+
+    def _ask(self, question: Question, output: OutputFormat, extraction: Callable[[str], str] = str) -> str:
+        """Return the answer in its output format.
+
+        Args:
+            question: What is asked. Its step is "reasoning" if a second question extracts the answer from the first.
+            output: Format of the final answer.
+            extraction: Returns the prompt of the second question, given the free answer.
+        """
+        over = self._over  # of this session, even if another one begins meanwhile
+        if question.step == "reasoning":
+            thoughts = self._call(question, partial(self.backend.ask, question, None), over)
+            question = replace(question, step="parameters", prompt=extraction(thoughts), hints=())
+        return self._call(question, partial(self.backend.ask, question, output), over)
+
+    def _call(self, question: Question, ask: Callable[[int | None], Reply], over: threading.Event) -> str:
+        """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call.
+
+        Args:
+            question: What is asked.
+            ask: Asks it with at most this number of requests.
+            over: Set once no answer is wanted any more.
+        """
+        with self._budget.reserved(over.is_set) as most_requests:
             try:
-                reply = ask(replace(question, most_requests=requests))
+                reply = ask(most_requests)
             except (CallError, Interrupted) as fault:
                 if fault.kind not in UNBILLED or fault.reply.requests:
-                    self._keep(self._record(question, fault.reply, fault))
+                    self._keep(question, fault.reply, fault)
                 raise
-            self._keep(self._record(question, reply, None))
-        return reply.text
+            self._keep(question, reply)
+        return reply.answer
 
-    def _keep(self, call: Call) -> None:
-        self._budget.spend(call)
-        self._transcript.add(call)
-
-    def _record(self, question: Question, reply: Reply, error: CallError | Interrupted | None) -> Call:
-        return Call(
-            proposal=question.proposal,
-            step=question.step,
-            known=question.known,
+    def _keep(self, question: Question, reply: Reply, error: CallError | Interrupted | None = None) -> None:
+        call = Call(
+            **{field.name: getattr(question, field.name) for field in fields(Question)},
+            **{field.name: getattr(reply, field.name) for field in fields(Reply)},
             origin=self.backend.origin,
             model=self.backend.model,
-            prompt=question.prompt,
-            answer=reply.text,
-            requests=reply.requests,
-            input_tokens=reply.input_tokens,
-            output_tokens=reply.output_tokens,
-            cost_usd=reply.cost_usd,
-            seconds=round(reply.seconds, 3),
             fault=None if error is None else error.kind,
             error=None if error is None else str(error),
-            hints=question.hints,
         )
+        self._budget.spend(call)
+        self._transcript.add(call)

@@ -5,54 +5,36 @@ import json
 import os
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from io import FileIO
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
+from armwright.llm.backend import Question, Reply
 from armwright.runs.control import Hint
 
 TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
 FIRST_STEPS = ("reasoning", "answer")  # steps whose prompts show the history and hints
 READ = (None, "answer", "limit", "refused", "rejected", "context")  # faults of calls whose prompt was read
 
-Count = Annotated[int, Field(ge=0, lt=2**53)]
-
 
 @dataclass(frozen=True)
-class Call:
-    """One call.
+class Call(Reply, Question):
+    """One call: the question, the reply, and who answered.
 
     Attributes:
-        proposal: Id of its proposal, made of the source and the trial's number; empty for a check.
-        step: `check` (is the model available), `reasoning` (the free answer), `parameters` (that answer as values),
-            `answer` (both at once) or `draft` (a task and a space).
-        known: Number of finished trials that the prompt was made from.
         origin: What answered: `model`, `manual` (a person) or `scripted` (a stand-in).
-        requests: Requests that the server answered; above 1 if an answer was invalid.
         fault: Kind of fault, if there was one; then the answer may be empty.
         error: Its message.
-        hints: Hints of the user in the prompt.
     """
 
-    proposal: Annotated[str, Field(pattern=r"^(.*-\d{1,9})?$")]
-    step: str
-    known: Count
-    origin: str
-    model: str
-    prompt: str
-    answer: str
-    requests: Count
-    input_tokens: Count
-    output_tokens: Count
-    cost_usd: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None
-    seconds: Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+    origin: str = field(kw_only=True)
+    model: str = field(kw_only=True)
     fault: str | None = None
     error: str | None = None
-    hints: tuple[Hint, ...] = ()
 
 
 class Transcript:
@@ -98,6 +80,17 @@ def used_hints(calls: Iterable[Call]) -> dict[Hint, str]:
     connection, timeout, Ctrl-C), the hint goes with the next question.
     """
     return {hint: call.proposal for call in calls if call.fault in READ for hint in call.hints}
+
+
+def n_requests(calls: Iterable[Call]) -> int:
+    """Return the number of requests, at least one per call."""
+    return sum(max(1, call.requests) for call in calls)
+
+
+def total_cost(calls: Iterable[Call]) -> float | None:
+    """Return the cost of all answers [USD]; None if a price is unknown."""
+    costs = [call.cost_usd for call in calls if call.requests]
+    return None if None in costs else sum(cost for cost in costs if cost is not None)
 
 
 def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:

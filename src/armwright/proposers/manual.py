@@ -3,11 +3,8 @@
 from pathlib import Path
 
 from armwright.exceptions import SettingsError
-from armwright.llm.answer import read_text, written_answers
-from armwright.llm.backend import Question, Reply
 from armwright.llm.manual import ManualBackend
 from armwright.llm.model_options import PromptOptions
-from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
 
 
@@ -38,11 +35,3 @@ class ManualProposer(PromptedProposer):
         if self.manual.is_answered(number):
             return ""
         return f"{question} waits for your answer in {answer}"
-
-    def ask_designs(self, question: Question, problem: Problem) -> Reply:
-        """Wait for an answer with designs; a refused answer is set aside with the reason."""
-
-        def read(text: str) -> str:
-            return written_answers(read_text(text, problem, self.options.proposals), problem)
-
-        return self.manual.ask_text(question, read)

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import DesignError, ModelError, ProposalError
+from armwright.exceptions import DesignError, ProposalError
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
-from armwright.llm.backend import CHECK, LlmBackend, Question, Reply
+from armwright.llm.backend import LlmBackend, OutputFormat, Question
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import Prompt, load_prompt, parameters_prompt
@@ -74,27 +75,6 @@ class PromptedProposer(LlmSession, Proposer):
         calls = [call for call in self._transcript.calls if call.proposal]
         return {int(call.proposal.rpartition("-")[2]): call.known for call in calls}
 
-    def check(self) -> None:
-        """Ask a test question; an exhausted budget is reported at the first real question instead.
-
-        Raises:
-            ModelError: The backend gives no answers.
-        """
-        try:
-            self._call(CHECK, self.backend.check, self._over)
-        except ProposalError as fault:
-            if fault.kind == "budget":
-                return
-            raise ModelError(
-                f"{fault}. Check the model, its key and base_url; --proposer rules needs none",
-                final=fault.kind if fault.final else None,
-            ) from fault
-        if self._budget.price_is_missing:
-            raise ModelError(
-                f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls",
-                final="budget",
-            )
-
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return recorded designs of a killed run that no trial has used yet."""
         used = {trial.proposal for trial in history}
@@ -108,22 +88,14 @@ class PromptedProposer(LlmSession, Proposer):
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """Propose the next designs; recorded thoughts of a killed run are used rather than asked for again."""
-        question = self.question(history, seed, number)
+        question, problem = self.question(history, seed, number), history.problem
         try:
-            return self._answered(question, history.problem)
-        finally:
-            self._hints.give_back(question.hints)
-
-    def _answered(self, question: Question, problem: Problem) -> Sequence[Proposal]:
-        over = self._over  # of this session, even if another one begins meanwhile
-        try:
-            if question.step == "reasoning":
-                thoughts = self._call(question, self.backend.ask, over)
-                question = self._extraction(problem, question.proposal, thoughts, question.known)
-            text = self._call(question, lambda asked: self.ask_designs(asked, problem), over)
+            text = self._ask(question, self.output_format(problem), partial(self._extraction_prompt, problem))
         except ProposalError as fault:
             fault.known = question.known
             raise
+        finally:
+            self._hints.give_back(question.hints)
         answers = read_text(text, problem, self.options.proposals)
         return self._proposals(question.proposal, answers, question.known)
 
@@ -133,7 +105,8 @@ class PromptedProposer(LlmSession, Proposer):
         in_steps = self.options.form == "then-schema"
         thoughts = self._transcript.answered(identity, "reasoning") if in_steps else None
         if thoughts is not None:
-            return self._extraction(history.problem, identity, thoughts.answer, thoughts.known)
+            prompt = self._extraction_prompt(history.problem, thoughts.answer)
+            return Question(identity, "parameters", prompt, thoughts.known)
         hints = self.next_hints(number)
         prompt = self.prompt_for(history, seed, hints)
         return Question(identity, "reasoning" if in_steps else "answer", prompt, len(history), hints=hints)
@@ -153,9 +126,8 @@ class PromptedProposer(LlmSession, Proposer):
         """Return the hints that the question for trial `number` contained."""
         return hints_of(self._transcript.calls, self.identity(number))
 
-    def _extraction(self, problem: Problem, identity: str, thoughts: str, known: int) -> Question:
-        prompt = parameters_prompt(problem, thoughts, proposals=self.options.proposals, expected=self.options.expects)
-        return Question(identity, "parameters", prompt, known)
+    def _extraction_prompt(self, problem: Problem, thoughts: str) -> str:
+        return parameters_prompt(problem, thoughts, proposals=self.options.proposals, expected=self.options.expects)
 
     def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
         """Return the prompt for the next designs."""
@@ -169,23 +141,19 @@ class PromptedProposer(LlmSession, Proposer):
             hints=[hint.text for hint in hints],
         )
 
-    def schema(self, problem: Problem) -> dict[str, Any]:
-        """Return the JSON schema of the answer that holds the designs."""
-        return answer_schema(
-            problem,
-            reasoning=self.options.form == "schema",
-            expected=self.options.expects,
-            proposals=self.options.proposals,
-        )
+    def output_format(self, problem: Problem) -> OutputFormat:
+        """Return the form of the answer that holds the designs; it is recorded as JSON that `read_text` reads."""
+        n = self.options.proposals
 
-    def ask_designs(self, question: Question, problem: Problem) -> Reply:
-        """Ask for the designs; the answer is JSON that `read_text` reads."""
-
-        def read(content: Mapping[str, Any]) -> str:
-            answers = read_answers(content, problem, self.options.proposals)
+        def read(content: Mapping[str, Any] | str) -> str:
+            if isinstance(content, str):
+                return written_answers(read_text(content, problem, n), problem)
+            answers = read_answers(content, problem, n)
             return written_answers(answers, problem, str(content.get("reasoning", "")))
 
-        return self.backend.ask_for(question, self.schema(problem), read)
+        reasoning = self.options.form == "schema"
+        schema = answer_schema(problem, reasoning=reasoning, expected=self.options.expects, proposals=n)
+        return OutputFormat(schema, read)
 
     def _proposals(self, identity: str, answers: Sequence[Answer], known: int) -> list[Proposal]:
         ids = [identity] if len(answers) == 1 else [f"{identity}.{i}" for i in range(1, len(answers) + 1)]

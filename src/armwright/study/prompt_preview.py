@@ -99,7 +99,7 @@ def preview_after(
 
 
 def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: str) -> Preview:
-    return Preview(number, text, estimated_tokens(text), proposer.schema(problem))
+    return Preview(number, text, estimated_tokens(text), dict(proposer.output_format(problem).schema))
 
 
 def _history_at(run: Path, config: RunConfig, history: History, asked: Mapping[int, int], number: int) -> History:

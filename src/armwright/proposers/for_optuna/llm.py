@@ -7,12 +7,12 @@ from typing import Any
 
 import optuna
 
-from armwright.exceptions import ModelError, ProposalError, SettingsError
-from armwright.llm.backend import CHECK, Question, Reply
+from armwright.exceptions import ProposalError, SettingsError
+from armwright.llm.backend import OutputFormat, Question
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.session import LlmSession
-from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
+from armwright.proposers.for_optuna.answer import answer_schema, read_answer, written_answer
 from armwright.proposers.for_optuna.parameters import Parameter, Space, study_parameters
 from armwright.proposers.for_optuna.prompt import StudyObjective, parameters_prompt, study_objectives, study_prompt
 from armwright.proposers.for_optuna.proposer import StudyProposal, StudyProposer
@@ -51,19 +51,6 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             raise SettingsError(f"transcript {path}: there is no folder {path.parent}; make it first")
         self._begin(path)
 
-    def check(self) -> None:
-        """Ask a test question before any trial.
-
-        Raises:
-            ModelError: The model gives no answers, or its price is unknown under a cost limit.
-        """
-        try:
-            self._call(CHECK, lambda _: self.backend.check(), self._over)
-        except ProposalError as error:
-            raise ModelError(f"{error}. Check the model, its key and base_url") from error
-        if self._budget.price_is_missing:
-            raise ModelError(f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls")
-
     def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
         """Ask the model for the next trial, from the trials so far."""
         trials = study.get_trials(deepcopy=False)
@@ -83,22 +70,21 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             form=self.options.form,
         )
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
-        step = "answer"
-        if self.options.form == "then-schema":
-            thoughts = self._call(Question(identity, "reasoning", prompt, known), self.backend.ask, self._over)
-            prompt, step = parameters_prompt(parameters, objectives, thoughts, self.options.expects), "parameters"
-        question = Question(identity, step, prompt, known)
-        text = self._call(question, lambda asked: self._ask_for(asked, parameters, objectives), self._over)
+        step = "reasoning" if self.options.form == "then-schema" else "answer"
+        text = self._ask(
+            Question(identity, step, prompt, known),
+            self._output_format(parameters, objectives),
+            lambda thoughts: parameters_prompt(parameters, objectives, thoughts, self.options.expects),
+        )
         answer = read_answer(json.loads(text), parameters, objectives)
         return StudyProposal(answer.params, identity, answer.reason, answer.expected)
 
-    def _ask_for(
-        self, question: Question, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]
-    ) -> Reply:
-        def read(content: Mapping[str, Any]) -> str:
-            answer: StudyAnswer = read_answer(content, parameters, objectives)
+    def _output_format(self, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]) -> OutputFormat:
+        def read(content: Mapping[str, Any] | str) -> str:
+            assert not isinstance(content, str)  # models answer in JSON
+            answer = read_answer(content, parameters, objectives)
             return written_answer(answer, parameters, objectives, str(content.get("reasoning") or ""))
 
         reasoning = self.options.form == "schema"
         schema = answer_schema(parameters, objectives, reasoning=reasoning, expected=self.options.expects)
-        return self.backend.ask_for(question, schema, read)
+        return OutputFormat(schema, read)
