@@ -517,10 +517,10 @@ def run_trials(data: bytes) -> None:
         place.mkdir()
         shutil.copy(a_run() / "config.yaml", place)
     (place / "trials.jsonl").write_bytes(data)
-    _, history = read_run(place)
+    config, history = read_run(place)
     history.front, history.hypervolume
     with RunFolder(place) as run:
-        if len(run.open_trials(a_problem().space)) != len(history):
+        if len(run.open_trials(config)) != len(history):
             raise DefectError("a resumed run has other trials than its readers")
 
 

@@ -201,8 +201,8 @@ def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Pa
         (["--after", "run", "--space", "space.yaml"], "run is a run of another space: paper"),
         (["--after", "run", "--seed", "1"], "--seed 1 is for a new run; run has its own"),
         (["--after", "run", "--n-init", "4"], "--n-init 4 is for a new run; run has its own"),
-        (["--after", "run", "--number", "5"], "--number 5: the proposals of run were asked for trials 4"),
-        (["--after", "run", "--number", "-1"], "--number -1: the proposals of run were asked for trials 4"),
+        (["--after", "run", "--number", "5"], "--number 5: the proposals of run were requested for trials 4"),
+        (["--after", "run", "--number", "-1"], "--number -1: the proposals of run were requested for trials 4"),
         (["--after", "run", *model_options(memory="all")], 'unknown memory "all"'),
     ],
 )

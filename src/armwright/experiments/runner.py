@@ -21,7 +21,8 @@ from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.study.cluster import MOST_LOSSES, Cluster, Finished, Workers
 from armwright.study.front_run import find_front
-from armwright.study.study import optimize, study_config, study_method
+from armwright.study.settings import run_config, study_method
+from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
 POLL = 1.0  # [s] between two checks of the cluster
@@ -100,7 +101,7 @@ def finished_before(cell: Cell) -> CellOutcome | None:
             plan.model_options.in_flight,
             plan.refine_every,
         )
-        check_same_run(cell.folder, read_config(cell.folder), study_config(_problem(cell), method, cell.seed))
+        check_same_run(cell.folder, read_config(cell.folder), run_config(_problem(cell), method, cell.seed))
     except ArmwrightError:
         return None  # `run_cell` reports it
     return CellOutcome(cell, 0.0, summary["hypervolume"]["final"], resumed=True)

@@ -61,8 +61,25 @@ class Method(BaseModel, frozen=True, extra="forbid"):
 
     @property
     def n_trials(self) -> int:
-        """Of the whole study, the random ones included."""
+        """The number of trials of the whole study, the random ones included."""
         return self.n_init + self.n_total
+
+    @property
+    def n_proposals(self) -> int:
+        """The number of proposals in the whole study: one in each block of n_step trials."""
+        return -(-self.n_total // self.n_step)
+
+    def first_trial(self, block: int) -> int:
+        """Return the number of the first trial of a block."""
+        return self.n_init + block * self.n_step
+
+    def n_started(self, number: int) -> int:
+        """Return how many blocks have started when trial `number` starts, its own included."""
+        return max(0, (number - self.n_init) // self.n_step + 1)
+
+    def is_first_trial(self, number: int) -> bool:
+        """Return whether trial `number` is the first of a block."""
+        return number >= self.n_init and (number - self.n_init) % self.n_step == 0
 
 
 class FrontMethod(BaseModel, frozen=True, extra="forbid"):

@@ -24,13 +24,11 @@ from filelock import FileLock, Timeout
 from armwright.exceptions import RunConflictError, RunFolderError
 from armwright.files import replace_file
 from armwright.problem.evaluators import Evaluator
-from armwright.problem.objectives import PAPER_OBJECTIVES
 from armwright.runs.config import RunConfig, check_same_run, versions
 from armwright.runs.control import CHANNEL_FILES
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial, trial_line
 from armwright.runs.trials_file import TRIALS, read_trials
-from armwright.spaces.design_space import DesignSpace
 from armwright.yaml_documents import dump_document, parse_document
 
 LOCK = ".lock"  # held by whoever writes; the system lets go of a dead process's, and the file stays
@@ -130,12 +128,10 @@ class RunFolder:
         content = config.model_dump(mode="json")
         self.write_text(CONFIG, dump_document(content))
 
-    def open_trials(
-        self, space: DesignSpace, n_objectives: int = len(PAPER_OBJECTIVES), n_constraints: int = 0
-    ) -> list[FinishedTrial]:
+    def open_trials(self, config: RunConfig) -> list[FinishedTrial]:
         """Return the finished trials without a truncated last line, and open the file for `append`."""
         path = self.path / TRIALS
-        trials, intact = read_trials(path, space, n_objectives, n_constraints)
+        trials, intact = read_trials(path, config)
         try:
             self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
             if intact < self._trials.tell():  # else the file keeps its time
@@ -235,7 +231,7 @@ def read_run(path: str | Path) -> tuple[RunConfig, History]:
     """Read the configuration and the finished trials of a run folder without changing it."""
     path = Path(path)
     config = read_config(path)
-    trials, _ = read_trials(path / TRIALS, config.space, len(config.objectives), len(config.task.constraints))
+    trials, _ = read_trials(path / TRIALS, config)
     return config, History(config.problem, trials, config.method.n_init, config.reference_point)
 
 

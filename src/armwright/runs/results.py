@@ -71,12 +71,12 @@ def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
     return history, summary
 
 
-def results_are_there(path: Path, history: History) -> bool:
-    """Whether a run folder holds all results of these trials."""
-    summary = read_summary(path)
+def complete_summary(path: Path, history: History) -> dict[str, Any] | None:
+    """Return the summary of a run folder that holds all results of these trials; None if one is missing."""
     files = [path / name for name in TABLES]
     files += [path / DESIGNS / _name(m) / name for m in history.front for name in ("arm.urdf", "design.json")]
-    return summary is not None and summary["n_trials"] == len(history) and all(file.is_file() for file in files)
+    summary = read_summary(path) if all(file.is_file() for file in files) else None
+    return summary if summary is not None and summary["n_trials"] == len(history) else None
 
 
 def discard_results(path: Path) -> None:
@@ -299,7 +299,7 @@ def _overlap_record(history: History, config: RunConfig, turns: Sequence[Finishe
     counted = max(1, len(history) - history.n_init)
     return {
         "in_flight": method.in_flight,
-        "ratio_planned": round(-(-method.n_total // method.n_step) / method.n_total, 4),
+        "ratio_planned": round(method.n_proposals / method.n_total, 4),
         "ratio": round(len(ages) / counted, 4),
         "ratio_with_failures": round(len(turns) / counted, 4),
         "feedback_age": {"mean": round(sum(ages) / len(ages), 2), "max": max(ages)} if ages else None,

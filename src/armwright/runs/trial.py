@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
 
 from armwright.files import replace_surrogates
-from armwright.spaces.design_space import DesignSpace
+from armwright.runs.config import RunConfig
 from armwright.spaces.parameters import Design, ParameterValue
 
 _PARAMS: TypeAdapter[dict[str, ParameterValue]] = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True))
@@ -87,18 +87,20 @@ def trial_line(trial: FinishedTrial) -> bytes:
     )
 
 
-def parse_trial(line: bytes, number: int, space: DesignSpace, n_objectives: int, n_constraints: int) -> FinishedTrial:
+def parse_trial(line: bytes, number: int, config: RunConfig) -> FinishedTrial:
     """Return the trial of a line.
 
     Raises:
-        ValueError: the line is no trial, or not trial `number` of such a problem.
-        DesignError: its design is not in the space.
+        ValueError: The line is not a trial, or not trial `number` of such a run.
+        DesignError: Its design is not in the space.
     """
     trial = _LINE.validate_json(line)
-    if len(trial.values) != n_objectives:
-        raise ValueError(f"expected {n_objectives} values, found {len(trial.values)}")
-    if len(trial.violations) != n_constraints:
-        raise ValueError(f"expected {n_constraints} violations, found {len(trial.violations)}")
+    for name, found, expected in (
+        ("values", trial.values, config.objectives),
+        ("violations", trial.violations, config.task.constraints),
+    ):
+        if len(found) != len(expected):
+            raise ValueError(f"expected {len(expected)} {name}, found {len(found)}")
     if trial.number != number:
         raise ValueError(f"expected trial number {number}, found {trial.number}")
-    return replace(trial, design=space.design(trial.design.params))
+    return replace(trial, design=config.space.design(trial.design.params))

@@ -1,6 +1,7 @@
-"""Read and write trials.jsonl: one line a finished trial, written before the next begins."""
+"""Read trials.jsonl: one line per finished trial, written before the next begins."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -8,14 +9,11 @@ from pydantic import ValidationError
 from armwright.exceptions import DesignError, RunFolderError
 from armwright.runs.config import RunConfig
 from armwright.runs.trial import FinishedTrial, parse_trial
-from armwright.spaces.design_space import DesignSpace
 
 TRIALS = "trials.jsonl"
 
 
-def read_trials(
-    path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
-) -> tuple[list[FinishedTrial], int]:
+def read_trials(path: Path, config: RunConfig) -> tuple[list[FinishedTrial], int]:
     """Read the trials of a file, and its length [bytes] without a truncated last line."""
     try:
         content = path.read_bytes()
@@ -23,24 +21,7 @@ def read_trials(
         return [], 0
     except OSError as fault:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    return parse_trials(content, 0, path, space, n_objectives, n_constraints)
-
-
-def parse_trials(
-    content: bytes, first: int, path: Path, space: DesignSpace, n_objectives: int, n_constraints: int
-) -> tuple[list[FinishedTrial], int]:
-    """Parse the trials from number `first` on, and the length [bytes] without a truncated last line."""
-    end = content.rfind(b"\n") + 1
-    trials: list[FinishedTrial] = []
-    for number, line in enumerate(content[:end].split(b"\n")[:-1], start=first):
-        try:
-            trials.append(parse_trial(line, number, space, n_objectives, n_constraints))
-        except (ValueError, DesignError) as fault:
-            raise RunFolderError(
-                f"{path}, line {number + 1} is damaged ({_message(fault)}); restore the file, or delete this line and "
-                "all after it: the same command then goes on from there"
-            ) from fault
-    return trials, end
+    return _parse_trials(content, 0, path, config)
 
 
 class TrialsReader:
@@ -50,40 +31,38 @@ class TrialsReader:
         self._path = folder / TRIALS
         self._config = config
         self.trials: list[FinishedTrial] = []
-        self._at = 0  # [bytes] read
-        self._file = 0  # which file it was
+        self._length = 0  # [bytes] read
+        self._inode = 0
 
     def read_on(self) -> bool:
-        """Read new trials; return whether the file was replaced, as by a refinement, and read from its start."""
-        try:
-            with self._path.open("rb") as file:
-                there = os.fstat(file.fileno())
-                is_other = there.st_ino != self._file or there.st_size < self._at
-                file.seek(0 if is_other else self._at)
-                content = file.read()
-        except FileNotFoundError:
-            there, is_other, content = None, bool(self.trials), b""
-        except OSError as fault:
-            raise RunFolderError(f"cannot read {self._path}: {fault.strerror or fault}") from fault
-        if is_other:
-            self.trials, self._at = [], 0
-            self._file = 0 if there is None else there.st_ino
-        try:
-            new, length = self._parsed(content)
-        except RunFolderError:
-            if self._at == 0:
-                raise
-            self.trials, self._at = [], 0  # written anew in place, perhaps, and longer than what was read
-            is_other = True
-            new, length = self._parsed(self._path.read_bytes())
-        self.trials = [*self.trials, *new]
-        self._at += length
-        return is_other
+        """Read new trials; return whether those read before were replaced, as by a refinement."""
+        with suppress(OSError, RunFolderError), self._path.open("rb") as file:  # read_trials raises them again
+            status = os.fstat(file.fileno())
+            is_same, self._inode = status.st_ino == self._inode, status.st_ino
+            if is_same and status.st_size >= self._length:
+                file.seek(self._length)
+                new, length = _parse_trials(file.read(), len(self.trials), self._path, self._config)
+                self.trials = [*self.trials, *new]
+                self._length += length
+                return False
+        had_trials = bool(self.trials)
+        self.trials, self._length = read_trials(self._path, self._config)
+        return had_trials
 
-    def _parsed(self, content: bytes) -> tuple[list[FinishedTrial], int]:
-        config = self._config
-        n_objectives, n_constraints = len(config.objectives), len(config.task.constraints)
-        return parse_trials(content, len(self.trials), self._path, config.space, n_objectives, n_constraints)
+
+def _parse_trials(content: bytes, first: int, path: Path, config: RunConfig) -> tuple[list[FinishedTrial], int]:
+    """Parse the trials from number `first` on, and the length [bytes] without a truncated last line."""
+    end = content.rfind(b"\n") + 1
+    trials: list[FinishedTrial] = []
+    for number, line in enumerate(content[:end].split(b"\n")[:-1], start=first):
+        try:
+            trials.append(parse_trial(line, number, config))
+        except (ValueError, DesignError) as fault:
+            raise RunFolderError(
+                f"{path}, line {number + 1} is damaged ({_message(fault)}); restore the file, or delete this line and "
+                "all after it: the same command then resumes from there"
+            ) from fault
+    return trials, end
 
 
 def _message(fault: Exception) -> str:

@@ -9,7 +9,6 @@ import io
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -22,15 +21,16 @@ from armwright.kinematics.ik import MANY_ARMS
 from armwright.pareto import PENALTY
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
-from armwright.runs.config import FrontMethod, RunConfig, record_objectives, versions
+from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import PROPOSALS, SEARCH, RunFolder, read_run
-from armwright.runs.history import FRONT_SEARCH, FrontMember, History, found_reference_point
-from armwright.runs.results import discard_results, read_summary, results_are_there, summarize_front, write_results
+from armwright.runs.history import FRONT_SEARCH, History, found_reference_point
+from armwright.runs.results import complete_summary, discard_results, summarize_front, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
 from armwright.search.front_search import FrontSearch
+from armwright.study.progress import RunResult
 from armwright.study.search_budget import SearchBudget, SearchProgress
-from armwright.study.settings import check_integer
+from armwright.study.settings import run_config
 from armwright.study.study import optimize
 
 SAVE_SECONDS = 5.0
@@ -39,28 +39,8 @@ N_SAMPLE = 10  # random designs that give the reference point, if the task state
 N_PROPOSED = 20  # initial designs requested from a proposer
 
 
-@dataclass(frozen=True)
-class FrontRun:
-    """Result of a direct search.
-
-    Attributes:
-        history: the designs of the front only.
-        config: settings of the run.
-        summary: content of summary.json.
-        folder: the run folder, if there is one.
-        resumed: number of evaluations of earlier sessions.
-    """
-
-    history: History
-    config: RunConfig
-    summary: dict[str, Any]
-    folder: Path | None
-    resumed: int
-
-    @property
-    def front(self) -> list[FrontMember]:
-        """Pareto set, sorted by the first objective."""
-        return self.history.front
+class FrontRun(RunResult):
+    """Result of a direct search: its history holds the designs of the front only, `resumed` counts evaluations."""
 
 
 def find_front(
@@ -94,30 +74,22 @@ def find_front(
         True
     """
     budget = budget if isinstance(budget, SearchBudget) else SearchBudget.parse(str(budget))
-    seed = check_integer("seed", seed, 0)
     matrix, origin = _initial_matrix(problem, initial_designs)  # before a folder is made
+    config = run_config(problem, FrontMethod(initial_designs=origin), seed)
+    if config.reference_point is None:
+        config = config.model_copy(update={"reference_point": _reference_point(problem, config.seed)})
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
-        config = RunConfig(
-            task=problem.task,
-            space=problem.space,
-            tolerance=problem.tolerance,
-            device=problem.device,
-            objectives=record_objectives(problem.objectives),
-            reference_point=problem.reference_point or _reference_point(problem, seed),
-            method=FrontMethod(initial_designs=origin),
-            seed=seed,
-            versions=versions(),
-        )
         if folder is not None:
             config = folder.adopt(config)
         if folder is None or not (folder.path / SEARCH).exists():
             # A proposer is asked, and paid, only after the folder was checked.
             if initial_designs is not None and not isinstance(initial_designs, (str, Path)):
-                matrix = _proposed_matrix(problem, initial_designs, seed, None if folder is None else folder.path)
+                matrix = _proposed_matrix(
+                    problem, initial_designs, config.seed, None if folder is None else folder.path
+                )
             if folder is not None:
-                trials = folder.open_trials(problem.space, len(problem.objectives), len(problem.constraints))
-                matrix = np.vstack([matrix, _matrix(problem, trials)])
+                matrix = np.vstack([matrix, _matrix(problem, folder.open_trials(config))])
         return _DirectSearch(problem, config, folder, matrix, watch).run(budget, stop_at_stall)
 
 
@@ -222,15 +194,13 @@ class _DirectSearch:
         if self.folder is None:
             summary = summarize_front(history, self.config, values, statistics, None)
             return FrontRun(history, self.config, summary, None, resumed)
-        path = self.folder.path
-        summary = read_summary(path)
-        ended_before = None if summary is None else summary.get("search", {}).get("ended_by")
-        if summary is None or not results_are_there(path, history) or ended_before != ended:
+        summary = complete_summary(self.folder.path, history)
+        if summary is None or summary.get("search", {}).get("ended_by") != ended:
             self.folder.replace_trials(trials)
             verification = verify_front(history)
             summary = summarize_front(history, self.config, values, statistics, verification)
             write_results(self.folder, history, summary, verification)
-        return FrontRun(history, self.config, summary, path, resumed)
+        return FrontRun(history, self.config, summary, self.folder.path, resumed)
 
     def _front_trials(self) -> list[FinishedTrial]:
         """Return the best designs of the front as trials."""

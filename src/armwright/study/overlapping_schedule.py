@@ -6,9 +6,10 @@ from collections import deque
 from collections.abc import Callable
 from itertools import count, groupby
 
+from armwright.runs.config import Method
 from armwright.runs.history import History
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
-from armwright.study.schedule import AlternatingSchedule, Blocks, Schedule
+from armwright.study.schedule import AlternatingSchedule, Schedule
 
 POLL_SECONDS = 0.2  # between two checks for Ctrl-C, because a wait cannot be interrupted everywhere
 GRACE_SECONDS = 0.5  # for requests to save their answers when a study ends
@@ -17,24 +18,24 @@ GRACE_SECONDS = 0.5  # for requests to save their answers when a study ends
 class OverlappingSchedule(Schedule):
     """Requests run in threads while black-box trials go on; the ratio of proposals to trials is kept.
 
-    A request is made when its block starts, `most_in_flight` - 1 blocks ahead. The black box may run ahead of the
+    A request is made when its block starts, `max_in_flight` - 1 blocks ahead. The black box may run ahead of the
     answers by the trials in the blocks of the requests in flight, then it waits. An answer enters as the next trial
     after its arrival. If it has several designs, all but the first wait for their blocks.
 
     Args:
         requests: requests to the proposer.
-        blocks: blocks of the run.
+        method: search settings of the run.
         history: returns the finished trials.
-        most_in_flight: requests at a time.
+        max_in_flight: requests at a time.
     """
 
     def __init__(
-        self, requests: ProposalRequests, blocks: Blocks, history: Callable[[], History], most_in_flight: int
+        self, requests: ProposalRequests, method: Method, history: Callable[[], History], max_in_flight: int
     ) -> None:
         self._requests = requests
-        self._blocks = blocks
+        self._method = method
         self._history = history
-        self._most_in_flight = most_in_flight
+        self._max_in_flight = max_in_flight
         past = past_slots(history())
         self._entered = len(past)
         self._asked = {slot.asked for slot in past}
@@ -53,7 +54,7 @@ class OverlappingSchedule(Schedule):
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot of the earliest answer, or None while the black box may go on without one."""
-        counted = number - self._blocks.n_init  # finished trials
+        counted = number - self._method.n_init  # finished trials
         if counted < 0:
             return None
         with self._change:
@@ -79,13 +80,13 @@ class OverlappingSchedule(Schedule):
 
     def upcoming(self, number: int) -> tuple[int, int]:
         """Return the trial of the next request, once `number` trials are finished, and how many will be finished."""
-        return self._next_asked(), max(number, self._blocks.n_init + max(0, self._next_request_after()))
+        return self._next_asked(), max(number, self._method.n_init + max(0, self._next_request_after()))
 
     def _take(self, counted: int) -> ProposalSlot | None:
         """Return the next slot, if one is due."""
-        if self._entered >= self._blocks.n_proposals:
+        if self._entered >= self._method.n_proposals:
             return None
-        if self._surplus and counted >= self._entered * self._blocks.n_step:
+        if self._surplus and counted >= self._entered * self._method.n_step:
             return self._surplus.popleft()
         if self._arrived:
             first, *others = self._arrived.popleft()
@@ -95,13 +96,13 @@ class OverlappingSchedule(Schedule):
 
     def _black_box_may_run(self, n_drawn: int) -> bool:
         """Return whether the black box may draw another trial after `n_drawn` counted ones."""
-        blocks = self._blocks
-        ahead = (blocks.n_step - 1) * (self._entered + self._most_in_flight * self._requests.per_call)
-        return n_drawn < min(ahead, blocks.n_total - blocks.n_proposals)
+        method = self._method
+        ahead = (method.n_step - 1) * (self._entered + self._max_in_flight * self._requests.per_call)
+        return n_drawn < min(ahead, method.n_total - method.n_proposals)
 
     def _start_requests(self, counted: int) -> None:
         """Start the requests that are due after so many counted trials."""
-        while self.n_in_flight < self._most_in_flight and self._n_supplied() < self._blocks.n_proposals:
+        while self.n_in_flight < self._max_in_flight and self._n_supplied() < self._method.n_proposals:
             if counted < self._next_request_after():
                 return
             number = self._next_asked()
@@ -120,11 +121,11 @@ class OverlappingSchedule(Schedule):
 
     def _next_request_after(self) -> int:
         """Return the number of counted trials after which the next request is made."""
-        return (self._n_supplied() - (self._most_in_flight - 1) * self._requests.per_call) * self._blocks.n_step
+        return (self._n_supplied() - (self._max_in_flight - 1) * self._requests.per_call) * self._method.n_step
 
     def _next_asked(self) -> int:
         """Return the trial of the next request: the first of a block without one."""
-        numbers = (self._blocks.first_trial(block) for block in count(0, self._requests.per_call))
+        numbers = (self._method.first_trial(block) for block in count(0, self._requests.per_call))
         return next(number for number in numbers if number not in self._asked)
 
     def _request(self, history: History, number: int) -> None:
@@ -143,9 +144,9 @@ class OverlappingSchedule(Schedule):
 
 
 def request_schedule(
-    requests: ProposalRequests, blocks: Blocks, history: Callable[[], History], in_flight: int | None
+    requests: ProposalRequests, method: Method, history: Callable[[], History]
 ) -> AlternatingSchedule | OverlappingSchedule:
-    """Return the schedule of a proposer; its requests overlap with black-box trials if `in_flight` is given."""
-    if in_flight is None:
-        return AlternatingSchedule(requests, blocks, history)
-    return OverlappingSchedule(requests, blocks, history, in_flight)
+    """Return the schedule of a proposer; its requests overlap with black-box trials if `in_flight` is set."""
+    if method.in_flight is None:
+        return AlternatingSchedule(requests, method, history)
+    return OverlappingSchedule(requests, method, history, method.in_flight)

@@ -45,8 +45,8 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class StudyResult:
-    """Result of a study.
+class RunResult:
+    """Result of a run.
 
     Attributes:
         history: all trials.
@@ -63,14 +63,18 @@ class StudyResult:
     resumed: int
 
     @property
-    def hypervolume(self) -> Array:
-        """(n_total,) hypervolume after each counted trial."""
-        return self.history.hypervolume
-
-    @property
     def front(self) -> list[FrontMember]:
         """Pareto set, sorted by the first objective."""
         return self.history.front
+
+
+class StudyResult(RunResult):
+    """Result of a study."""
+
+    @property
+    def hypervolume(self) -> Array:
+        """(n_total,) hypervolume after each counted trial."""
+        return self.history.hypervolume
 
     @property
     def trials(self) -> Sequence[FinishedTrial]:

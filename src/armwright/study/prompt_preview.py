@@ -18,7 +18,6 @@ from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.proposal_requests import ProposalRequests
-from armwright.study.schedule import Blocks
 from armwright.study.study import optimize
 from armwright.tasks.task import Task
 
@@ -87,7 +86,7 @@ def preview_after(
         past = _history_at(run, config, history, proposer.asked(), number)
         text = proposer.prompt_for(past, requests.seed(number), proposer.past_hints(number))
         return _preview(proposer, history.problem, number, text)
-    schedule = request_schedule(requests, Blocks.of(config.study), lambda: history, config.study.in_flight)
+    schedule = request_schedule(requests, config.study, lambda: history)
     number, finished = schedule.upcoming(len(history))
     # What is to be otherwise than in the run is to be seen, even where the run's own answer waits for its second call.
     if given:
@@ -102,19 +101,16 @@ def _preview(proposer: PromptedProposer, problem: Problem, number: int, text: st
     return Preview(number, text, estimated_tokens(text), dict(proposer.output_format(problem).schema))
 
 
-def _history_at(run: Path, config: RunConfig, history: History, asked: Mapping[int, int], number: int) -> History:
-    """Return the trials that were known when a past proposal was requested."""
-    blocks = Blocks.of(config.study)
-    if asked:
-        if number in asked:
-            return history.before(asked[number])
-        numbers = ", ".join(map(str, sorted(asked)))
-    else:  # a run without a model: as a model would have been asked
-        if blocks.is_first_trial(number) and number <= len(history):
-            return history.before(number)
-        there = [n for n in range(len(history) + 1) if blocks.is_first_trial(n)]
-        numbers = ", ".join(map(str, there[:6])) + (f", … {there[-1]}" if len(there) > 6 else "")
-    raise SettingsError(f"--number {number}: the proposals of {run} were asked for trials {numbers}")
+def _history_at(run: Path, config: RunConfig, history: History, requests: Mapping[int, int], number: int) -> History:
+    """Return the trials that were known when a past proposal was requested.
+
+    A run without a model has no `requests`: they are those that a model would have had.
+    """
+    known = requests or {n: n for n in range(len(history) + 1) if config.study.is_first_trial(n)}
+    if number not in known:
+        numbers = ", ".join(map(str, sorted(known)))
+        raise SettingsError(f"--number {number}: the proposals of {run} were requested for trials {numbers}")
+    return history.before(known[number])
 
 
 def _note(before: int, unused: int) -> str:

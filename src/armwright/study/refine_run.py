@@ -61,7 +61,7 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
     config, _ = read_run(path)
     method = config.study
     with RunFolder(path) as folder:
-        trials = folder.open_trials(config.space, len(config.objectives), len(config.task.constraints))
+        trials = folder.open_trials(config)
         summary = read_summary(path)
         if len(trials) < method.n_trials or summary is None:
             raise RunFolderError(

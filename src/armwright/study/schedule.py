@@ -7,7 +7,6 @@ ReplaySchedule        a recorded run is repeated: each proposal enters at its re
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
 
@@ -15,37 +14,6 @@ from armwright.proposers.proposer import Record
 from armwright.runs.config import Method
 from armwright.runs.history import History
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
-
-
-@dataclass(frozen=True)
-class Blocks:
-    """Blocks of n_step trials after n_init random ones; one trial of each block is the proposer's."""
-
-    n_init: int
-    n_step: int
-    n_total: int
-
-    @classmethod
-    def of(cls, method: Method) -> "Blocks":
-        """Return the blocks of a run."""
-        return cls(method.n_init, method.n_step, method.n_total)
-
-    @property
-    def n_proposals(self) -> int:
-        """Number of proposals in the whole run."""
-        return -(-self.n_total // self.n_step)
-
-    def first_trial(self, block: int) -> int:
-        """Return the number of the first trial of a block."""
-        return self.n_init + block * self.n_step
-
-    def n_started(self, number: int) -> int:
-        """Return how many blocks have started when trial `number` starts, its own included."""
-        return max(0, (number - self.n_init) // self.n_step + 1)
-
-    def is_first_trial(self, number: int) -> bool:
-        """Return whether trial `number` is the first of a block."""
-        return number >= self.n_init and (number - self.n_init) % self.n_step == 0
 
 
 class Schedule(Protocol):
@@ -76,15 +44,15 @@ class NoProposer(Schedule):
 class AlternatingSchedule(Schedule):
     """The first trial of each block is the proposer's; the study waits for its design."""
 
-    def __init__(self, requests: ProposalRequests, blocks: Blocks, history: Callable[[], History]) -> None:
+    def __init__(self, requests: ProposalRequests, method: Method, history: Callable[[], History]) -> None:
         self._requests = requests
-        self._blocks = blocks
+        self._method = method
         self._history = history
         self._ready = deque(requests.unused(history()))
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot if the trial is the first of a block; request proposals if none is left."""
-        if not self._blocks.is_first_trial(number):
+        if not self._method.is_first_trial(number):
             return None
         if not self._ready:
             self._ready.extend(self._requests.request(self._history(), number))
@@ -92,8 +60,8 @@ class AlternatingSchedule(Schedule):
 
     def upcoming(self, number: int) -> tuple[int, int]:
         """Return the trial of the next request, once `number` trials are finished, and how many will be finished."""
-        first = next(n for n in count(number) if self._blocks.is_first_trial(n))
-        asked = first + len(self._ready) * self._blocks.n_step
+        first = next(n for n in count(number) if self._method.is_first_trial(n))
+        asked = first + len(self._ready) * self._method.n_step
         return asked, asked
 
 
@@ -104,11 +72,11 @@ class ReplaySchedule(Schedule):
     """
 
     def __init__(
-        self, requests: ProposalRequests, record: Record, blocks: Blocks, history: Callable[[], History]
+        self, requests: ProposalRequests, record: Record, method: Method, history: Callable[[], History]
     ) -> None:
         self._requests = requests
         self._record = record
-        self._blocks = blocks
+        self._method = method
         self._history = history
         past = past_slots(history())
         self._asked = {slot.asked for slot in past}
@@ -133,7 +101,7 @@ class ReplaySchedule(Schedule):
             self._ready[slot.asked, None if slot.proposal is None else slot.proposal.id] = slot
 
     def _next_after_end(self, number: int) -> ProposalSlot | None:
-        if number < self._record.n_trials or len(past_slots(self._history())) >= self._blocks.n_started(number):
+        if number < self._record.n_trials or len(past_slots(self._history())) >= self._method.n_started(number):
             return None
         note = "" if self._end_is_reported else f"the record ends with trial {self._record.n_trials - 1}"
         self._end_is_reported = True

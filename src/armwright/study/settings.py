@@ -8,7 +8,7 @@ from armwright.exceptions import SettingsError
 from armwright.problem.problem import Problem
 from armwright.proposers.factory import choose_proposer
 from armwright.proposers.proposer import Proposer
-from armwright.runs.config import Method, RunConfig, record_objectives, versions
+from armwright.runs.config import FrontMethod, Method, RunConfig, record_objectives, versions
 from armwright.search.samplers import SamplerFactory, sampler_name
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
@@ -50,7 +50,7 @@ def study_method(
     )
 
 
-def study_config(problem: Problem, method: Method, seed: int) -> RunConfig:
+def run_config(problem: Problem, method: Method | FrontMethod, seed: int) -> RunConfig:
     """Return the settings of a new run."""
     return RunConfig(
         task=problem.task,

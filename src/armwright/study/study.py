@@ -20,7 +20,7 @@ from armwright.runs.config import RunConfig
 from armwright.runs.control import Channel
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import BBO, INITIAL_DESIGN, RANDOM, REFINE, History
-from armwright.runs.results import discard_results, read_summary, results_are_there, summarize, write_results
+from armwright.runs.results import complete_summary, discard_results, summarize, write_results
 from armwright.runs.verification import verify_front
 from armwright.search.refine import Refinement, refine_one
 from armwright.search.samplers import BlackBox, SamplerFactory
@@ -32,8 +32,8 @@ from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
-from armwright.study.schedule import Blocks, NoProposer, ReplaySchedule, Schedule
-from armwright.study.settings import check_proposer, check_settings, study_config, study_method
+from armwright.study.schedule import NoProposer, ReplaySchedule, Schedule
+from armwright.study.settings import check_proposer, check_settings, run_config, study_method
 
 POLL_SECONDS = 0.1  # between two checks for requests of the watcher, while there is nothing else to do
 
@@ -91,7 +91,7 @@ def optimize(
     proposer = check_proposer(proposer)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     check_settings(problem, method, workers, on_model_failure)
-    config = study_config(problem, method, seed)
+    config = run_config(problem, method, seed)
     with ExitStack() as stack:
         folder = None
         if out is not None:
@@ -128,7 +128,7 @@ class Study:
             self._requests = ProposalRequests(proposer, config.seed, notify)
         n_objectives, names = len(problem.objectives), [constraint.words for constraint in problem.constraints]
         self._black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
-        self._trials = folder.open_trials(problem.space, n_objectives, len(names)) if folder is not None else []
+        self._trials = folder.open_trials(config) if folder is not None else []
         self._black_box.restore(self._trials)
         self._first_of: dict[Design, int] = {}  # the first trial of each design
         for trial in self._trials:
@@ -184,7 +184,7 @@ class Study:
         """Report what the proposals will cost, and check that the proposer works."""
         if self._proposer is None or self._requests is None:
             return
-        n_due = Blocks.of(self._method).n_proposals - len(past_slots(self._history()))
+        n_due = self._method.n_proposals - len(past_slots(self._history()))
         if n_due <= 0:
             return
         forecast = self._proposer.forecast(self._problem, n_due)
@@ -206,10 +206,10 @@ class Study:
     def _new_schedule(self) -> Schedule:
         if self._proposer is None or self._requests is None:
             return NoProposer()
-        blocks, record = Blocks.of(self._method), self._proposer.record()
+        record = self._proposer.record()
         if record is not None:
-            return ReplaySchedule(self._requests, record, blocks, self._history)
-        return request_schedule(self._requests, blocks, self._history, self._method.in_flight)
+            return ReplaySchedule(self._requests, record, self._method, self._history)
+        return request_schedule(self._requests, self._method, self._history)
 
     def _wait_for_start(self, number: int) -> None:
         """Take results until trial `number` may start; StoppedError if the watcher ended the session."""
@@ -383,10 +383,9 @@ class Study:
         record = None if self._proposer is None else self._proposer.summary()
         if self._folder is None:
             return StudyResult(history, self._config, summarize(history, self._config, record), None, resumed)
-        folder = self._folder.path
-        summary = read_summary(folder)
-        if summary is None or not results_are_there(folder, history):
+        summary = complete_summary(self._folder.path, history)
+        if summary is None:
             verification = verify_front(history) if verify else None
             summary = summarize(history, self._config, record, verification)
             write_results(self._folder, history, summary, verification)
-        return StudyResult(history, self._config, summary, folder, resumed)
+        return StudyResult(history, self._config, summary, self._folder.path, resumed)
