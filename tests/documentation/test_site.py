@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 import armwright as aw
 from armwright.experiments.plan import ExperimentPlan, FigurePlan, MethodPlan
-from armwright.problem.constraints import QUANTITIES
+from armwright.problem.objectives import QUANTITIES
 from armwright.robot.actuators import ActuatorRecord
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.link_mass import MassOfTube, MassPerLink, MassPerMetre

@@ -20,7 +20,7 @@ from armwright.kinematics.dynamics import inverse_dynamics
 from armwright.kinematics.forward import forward_kinematics
 from armwright.kinematics.jacobian import jacobian_rate, jacobians
 from armwright.problem.evaluation import evaluate
-from armwright.problem.objectives import OF_MOVES, OF_TIME, named_objectives
+from armwright.problem.objectives import MOVE_QUANTITIES, TIMED_QUANTITIES, named_objectives
 from armwright.problem.problem import Problem
 from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, uniform_link
 from armwright.robot.link_geometry import inertia_tensor
@@ -333,13 +333,13 @@ def test_constraints_on_dynamic_quantities() -> None:
     sentences = [f"{name} <= {np.median(column):.6g}" for name, column in zip(names, values.T, strict=True)]
     problem = Problem(task(move_time=0.5, constraints=sentences), space)
     broken = problem.evaluate(designs).violations
-    assert problem.uses(*OF_MOVES)
-    assert problem.uses(*OF_TIME)
+    assert problem.uses(*MOVE_QUANTITIES)
+    assert problem.uses(*TIMED_QUANTITIES)
     assert np.array_equal((broken <= 0.0).sum(axis=0), [15, 15, 15])
     assert np.array_equal(broken > 0.0, values > np.median(values, axis=0))
 
 
-@pytest.mark.parametrize("objective", [objective.name for objective in OF_TIME])
+@pytest.mark.parametrize("objective", [objective.name for objective in TIMED_QUANTITIES])
 def test_dynamic_objectives_require_timed_moves(objective: str) -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"]})
     with pytest.raises(SettingsError, match=r"move_time: 1\.5"):

@@ -100,7 +100,7 @@ def test_exported_trials_equal_those_of_the_run(which: str, request: pytest.Fixt
     _, history = read_run(folder)
     space = history.problem.space
     every = distributions(space)
-    constraints = [constraint.words for constraint in history.problem.constraints]
+    constraints = [constraint.description for constraint in history.problem.constraints]
     verdicts = verdicts_of(folder, history)
     with opened(folder / STUDY_DB) as study:
         assert len(study.trials) == len(history)

@@ -330,7 +330,7 @@ def test_an_objective_s_exception_on_a_worker_arrives_with_its_traceback(shell: 
     def each(evaluation: aw.Evaluation) -> Any:
         raise ValueError("no such thing")
 
-    own = aw.Problem(TASK, objectives=(Objective("own", "Own", "", "E", "own", each),))
+    own = aw.Problem(TASK, objectives=(Objective("own", "", "own", each),))
     with pytest.raises(aw.FailureError, match="ValueError: no such thing") as raised:
         aw.optimize(own, **SHORT, workers=on(shell))
     assert "in each" in "".join(raised.value.__notes__)

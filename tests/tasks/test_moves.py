@@ -17,7 +17,7 @@ from armwright.kinematics.clearance import clearances
 from armwright.kinematics.ik import solve_postures
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.problem.evaluation import Evaluation, evaluate
-from armwright.problem.objectives import OF_MOVES, UNCOVERED_FRACTION, named_objectives
+from armwright.problem.objectives import MOVE_QUANTITIES, UNCOVERED_FRACTION, named_objectives
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.urdf_writer import to_urdf
@@ -257,8 +257,8 @@ def test_moves_cost_nothing_where_nothing_asks_for_them() -> None:
     assert np.array_equal(moving.outcomes(evaluation).values, plain.evaluate(designs).values)
     assert "paths" not in vars(evaluation)
     assert [
-        moving.uses(*OF_MOVES),
-        Problem(task(moves="in_order"), objectives=OF_MOVES[:1]).uses(*OF_MOVES),
+        moving.uses(*MOVE_QUANTITIES),
+        Problem(task(moves="in_order"), objectives=MOVE_QUANTITIES[:1]).uses(*MOVE_QUANTITIES),
     ] == [False, True]
 
 
@@ -353,7 +353,7 @@ def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:
     )
     designs = problem.space.sample(40, 1)
     evaluation, broken = problem.physics(designs), problem.evaluate(designs).violations
-    assert (problem.uses(*OF_MOVES), problem.uses(UNCOVERED_FRACTION)) == (True, True)
+    assert (problem.uses(*MOVE_QUANTITIES), problem.uses(UNCOVERED_FRACTION)) == (True, True)
     measured = np.column_stack(
         [
             evaluation.paths.error.max(axis=1),

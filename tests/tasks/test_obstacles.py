@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import RunConflictError, TaskError
-from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES, OF_CLEARANCE, named_objectives
+from armwright.problem.objectives import CLEARANCE_QUANTITIES, CLEARANCES, FAR, OBJECTIVES, named_objectives
 from armwright.problem.problem import Problem
 from armwright.report.page import write_report
 from armwright.report.repeat_command import repeat_command
@@ -149,8 +149,8 @@ def test_the_paper_s_objectives_do_not_see_them() -> None:
     with_, without = task_of(RECORDS), task_of([])
     designs = Problem(without).space.sample(20, 0)
     assert np.array_equal(Problem(with_).evaluate(designs).values, Problem(without).evaluate(designs).values)
-    assert not Problem(with_).uses(*OF_CLEARANCE)
-    assert Problem(with_, objectives=(OBJECTIVES["collision"],)).uses(*OF_CLEARANCE)
+    assert not Problem(with_).uses(*CLEARANCE_QUANTITIES)
+    assert Problem(with_, objectives=(OBJECTIVES["collision"],)).uses(*CLEARANCE_QUANTITIES)
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """Notes on what a task holds and what its objectives leave out."""
 
-from armwright.problem.objectives import OF_CLEARANCE, OF_MOVES, UNCOVERED_FRACTION
+from armwright.problem.objectives import CLEARANCE_QUANTITIES, MOVE_QUANTITIES, UNCOVERED_FRACTION
 from armwright.problem.problem import Problem
 from armwright.tasks.task import Task
 
@@ -9,8 +9,8 @@ def unused_parts(problem: Problem) -> list[str]:
     """Return a note for each part of the task that neither an objective nor a constraint uses."""
     task = problem.task
     parts = (
-        ("obstacles", task.obstacles, OF_CLEARANCE),
-        ("moves", task.straight_moves, OF_MOVES),
+        ("obstacles", task.obstacles, CLEARANCE_QUANTITIES),
+        ("moves", task.straight_moves, MOVE_QUANTITIES),
         ("workspace", task.workspace, (UNCOVERED_FRACTION,)),
     )
     return [

@@ -17,11 +17,10 @@ from armwright.exceptions import RunFolderError, SettingsError, TaskError
 from armwright.experiments.base_placement import N_POSITIONS, placed_at, search_base, with_travel
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
-from armwright.problem.constraints import Quantity
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
-    OF_CLEARANCE,
+    CLEARANCE_QUANTITIES,
     PEAK_TORQUE,
     POSITION_ERROR,
     PRICE,
@@ -229,13 +228,13 @@ def _compared(
     values = tuple(_value(objective, evaluation) for objective in problem.objectives)
     bounds = [(constraint, _value(constraint.quantity, evaluation)) for constraint in problem.constraints]
     violated = tuple(
-        f"{constraint.words} (it has {value:.3g})"
+        f"{constraint.description} (it has {value:.3g})"
         for constraint, value in bounds
         if value is not None and float(constraint(evaluation)[0]) > 0.0
     )
     unknown = [o.name for o, value in zip(problem.objectives, values, strict=True) if value is None]
     notes = [*notes, *(f"{name} unknown, so the arm cannot be compared with the front" for name in unknown)]
-    notes += [f"unknown whether it meets {constraint.words}" for constraint, value in bounds if value is None]
+    notes += [f"unknown whether it meets {constraint.description}" for constraint, value in bounds if value is None]
     counts = None if history is None else dominance_counts(values, violated, history)
     return ComparedArm(
         name=name,
@@ -252,14 +251,14 @@ def _compared(
     )
 
 
-def _value(quantity: Quantity, evaluation: Evaluation) -> float | None:
+def _value(quantity: Objective, evaluation: Evaluation) -> float | None:
     """Return a quantity of the arm; None if its URDF lacks what is needed: efforts, prices, or the shape of links."""
     actuation = evaluation.arms.actuation
     if quantity.name == TORQUE_UTILISATION.name and actuation is None:
         return None
     if quantity.name == PRICE.name and (actuation is None or np.isnan(actuation.price).any()):
         return None
-    if quantity.name in {clearance.name for clearance in OF_CLEARANCE}:
+    if quantity.name in {clearance.name for clearance in CLEARANCE_QUANTITIES}:
         return None
     return float(quantity(evaluation)[0])
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field
 
 from armwright.exceptions import SettingsError
 from armwright.llm.prompt import rendered
-from armwright.problem.objectives import MOST_OBJECTIVES, OBJECTIVES, PAPER_OBJECTIVES
+from armwright.problem.objectives import MAX_OBJECTIVES, OBJECTIVES, PAPER_OBJECTIVES
 from armwright.robot.actuators import ActuatorRecord, catalogue
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
@@ -53,7 +53,7 @@ def draft_prompt(description: str) -> str:
         "reach": space.max_reach,
         "bases": ", ".join(f"{low:g} <= {axis} <= {high:g}" for axis, (low, high) in zip("xyz", ranges, strict=True)),
         "toy": space.mass.description,
-        "most_objectives": MOST_OBJECTIVES,
+        "most_objectives": MAX_OBJECTIVES,
         "paper_objectives": " and ".join(objective.name for objective in PAPER_OBJECTIVES),
         "objectives": tuple(OBJECTIVES.values()),
         "joint_descriptions": JOINT_DESCRIPTIONS,

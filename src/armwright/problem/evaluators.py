@@ -30,7 +30,7 @@ from armwright.arrays import Array
 from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import MOST_OBJECTIVES, OBJECTIVES
+from armwright.problem.objectives import MAX_OBJECTIVES, OBJECTIVES
 from armwright.robot.arm import Arm
 from armwright.tasks.task import Task
 
@@ -103,16 +103,17 @@ def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callabl
         >>> shortest.objectives[0].unit
         'm'
     """
-    if not 1 <= len(objectives) <= MOST_OBJECTIVES or len(set(objectives)) < len(objectives):
-        raise SettingsError(f"evaluator({', '.join(objectives)}): 1 to {MOST_OBJECTIVES} different names are needed")
+    if not 1 <= len(objectives) <= MAX_OBJECTIVES or len(set(objectives)) < len(objectives):
+        raise SettingsError(f"evaluator({', '.join(objectives)}): 1 to {MAX_OBJECTIVES} different names are needed")
     values = None if worst is None else tuple(float(value) for value in worst)
     if values is not None and (len(values) != len(objectives) or not all(map(math.isfinite, values))):
         raise SettingsError(f"worst = {values}: {len(objectives)} finite numbers are needed, one for each objective")
 
     def decorated(measure: Measure) -> Evaluator:
         name = f"{measure.__module__}:{measure.__qualname__}"
-        words = " ".join((measure.__doc__ or "").split("\n\n")[0].split()) or f"what {measure.__qualname__} measures"
-        return Evaluator(name, measure, tuple(_objective(given, words, name) for given in objectives), values)
+        summary = (measure.__doc__ or f"what {measure.__qualname__} measures").split("\n\n")[0]
+        description = " ".join(summary.split())
+        return Evaluator(name, measure, tuple(_objective(given, description, name) for given in objectives), values)
 
     return decorated
 
@@ -192,7 +193,7 @@ def _staying() -> Generator[None]:
             os.chdir(here)
 
 
-def _objective(given: str, words: str, name: str) -> Objective:
+def _objective(given: str, description: str, name: str) -> Objective:
     """Return the objective of a name with a unit; its value comes from the evaluator alone."""
     match = NAMED.fullmatch(given)
     if match is None or len(match[1]) > LONGEST_NAME:
@@ -207,7 +208,7 @@ def _objective(given: str, words: str, name: str) -> Objective:
     def each(_: Evaluation) -> Array:
         raise SettingsError(f"{own} is measured by {name}, design by design, and only in `armwright optimize`")
 
-    return Objective(own, own.replace("_", " ").capitalize(), unit, f"E_{own}", words, each, over="arm")
+    return Objective(own, unit, description, each, over="arm")
 
 
 def _module(name: str) -> ModuleType:

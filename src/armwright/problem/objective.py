@@ -17,22 +17,27 @@ class Objective:
     """A quantity per arm to minimise.
 
     Attributes:
-        symbol: Its name in formulas and prompts.
         description: The quantity at one target, or for `over="arm"` of the arm, for readers new to this program.
         each: Its value per target, (N, T); for `over="arm"` of the arm itself, (N,).
         over: How the values become one: their sum, maximum, minimum or root mean square.
+        label: Its name in tables and figures; by default the name in words.
+        symbol: Its name in formulas and prompts; by default E_name.
     """
 
     name: str
-    label: str
     unit: str
-    symbol: str
     description: str
     each: Callable[[Evaluation], Array]
     over: Over = "sum"
+    label: str = ""
+    symbol: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", self.label or self.name.replace("_", " ").capitalize())
+        object.__setattr__(self, "symbol", self.symbol or f"E_{self.name}")
 
     def __call__(self, evaluation: Evaluation) -> Array:
-        """One value per arm, (N,)."""
+        """Return one value per arm, (N,)."""
         each = self.each(evaluation)
         match self.over:
             case "sum":
@@ -48,5 +53,5 @@ class Objective:
 
     @property
     def is_of_targets(self) -> bool:
-        """Whether each target has a share in it."""
+        """True if each target contributes to it."""
         return self.over != "arm"

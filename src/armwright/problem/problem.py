@@ -10,11 +10,11 @@ from armwright.exceptions import EvaluatorError, SettingsError, TaskError
 from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
-from armwright.problem.constraints import Constraint, Quantity, read_constraints
+from armwright.problem.constraints import Constraint, read_constraints
 from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import OF_ORIENTATION, ORIENTATION_ERROR, PAPER_OBJECTIVES, named_objectives
+from armwright.problem.objectives import ORIENTATION_ERROR, ORIENTATION_QUANTITIES, PAPER_OBJECTIVES, named_objectives
 from armwright.robot.arm import Arm
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
@@ -126,7 +126,7 @@ class Problem:
                 f"a tolerance does not go with the evaluator {self.evaluator.name}, which measures an arm as it is"
             )
         for objective in self.objectives:
-            if objective in OF_ORIENTATION and not self.task.target_arrays.oriented:
+            if objective in ORIENTATION_QUANTITIES and not self.task.target_arrays.oriented:
                 raise SettingsError(
                     f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has "
                     "an axis or an orientation. Give one to a target, or take another objective"
@@ -157,7 +157,7 @@ class Problem:
         """Return the worst values that count for the hypervolume, if the task states them."""
         return self.task.reference_point
 
-    def uses(self, *quantities: Quantity) -> bool:
+    def uses(self, *quantities: Objective) -> bool:
         """Return whether any of these is an objective or bounded by a constraint."""
         used = {o.name for o in self.objectives} | {constraint.quantity.name for constraint in self.constraints}
         return any(quantity.name in used for quantity in quantities)
@@ -218,7 +218,7 @@ class Problem:
         violations = [constraint(evaluation) for constraint in self.constraints]
         return Outcomes(
             _finite(values, [f"objective {o.name}" for o in self.objectives], len(evaluation)),
-            _finite(violations, [f'constraint "{c.words}"' for c in self.constraints], len(evaluation)),
+            _finite(violations, [f'constraint "{c.description}"' for c in self.constraints], len(evaluation)),
         )
 
     def _evaluate(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:

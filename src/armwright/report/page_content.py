@@ -229,7 +229,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "objectives": [objective.model_dump() for objective in config.objectives],
         "constraints": [
             {
-                "words": constraint.words,
+                "words": constraint.description,
                 "name": constraint.quantity.name,
                 "unit": constraint.quantity.unit,
                 "bound": constraint.bound,

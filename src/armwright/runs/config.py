@@ -164,8 +164,7 @@ def _recorded(record: ObjectiveRecord) -> Objective:
             f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
         )
 
-    description = record.label.lower()
-    return Objective(record.name, record.label, record.unit, record.symbol, description, each, over="arm")
+    return Objective(record.name, record.unit, record.label.lower(), each, "arm", record.label, record.symbol)
 
 
 def versions(evaluator: Evaluator | None = None) -> dict[str, str]:

@@ -153,7 +153,7 @@ class _Export:
         """
         problem, artifacts = self.history.problem, self._artifacts()
         every = distributions(problem.space)
-        names = [constraint.words for constraint in problem.constraints]
+        names = [constraint.description for constraint in problem.constraints]
         durations = [timedelta(seconds=trial.seconds.get("total", 0.0)) for trial in self.history]
         time = datetime.fromtimestamp((self.run / TRIALS).stat().st_mtime) - sum(durations, timedelta())
         for trial, duration in zip(self.history, durations, strict=True):

@@ -178,7 +178,7 @@ def unmet(history: History) -> str:
     broken = history.violations[number]
     constraints = history.problem.constraints
     words = [
-        f"{constraints[i].words} ({constraints[i].measured(float(broken[i])):.4g} {constraints[i].quantity.unit})"
+        f"{constraints[i].description} ({constraints[i].measured(float(broken[i])):.4g} {constraints[i].quantity.unit})"
         for i in np.argsort(-broken, kind="stable")
         if broken[i] > 0.0
     ]
@@ -199,7 +199,7 @@ def _feasibility_record(history: History) -> dict[str, Any]:
     if len(history) and not history.feasible.any():
         (number,) = history.nearest(1)
         measured = {
-            c.words: c.measured(value) for c, value in zip(constraints, history.violations[number], strict=True)
+            c.description: c.measured(value) for c, value in zip(constraints, history.violations[number], strict=True)
         }
         nearest = {
             "number": number,
@@ -209,7 +209,7 @@ def _feasibility_record(history: History) -> dict[str, Any]:
     return {
         "feasibility": {
             "infeasible": int((~history.feasible).sum()),
-            "violated_by": {c.words: n for c, n in zip(constraints, breaking, strict=True)},
+            "violated_by": {c.description: n for c, n in zip(constraints, breaking, strict=True)},
             "nearest": nearest,
         }
     }
@@ -358,13 +358,13 @@ def _rows(history: History) -> Iterable[dict[str, Any]]:
     for trial in history:
         objectives = _objectives(history, trial.values)
         params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
-        broken = dict(zip((c.words for c in history.problem.constraints), trial.violations, strict=True))
+        broken = dict(zip((c.description for c in history.problem.constraints), trial.violations, strict=True))
         yield {"number": trial.number, "source": trial.source, **params, **objectives, **broken}
 
 
 def _violations(history: History, number: int) -> dict[str, Any]:
     """Return the violation of each constraint by one design; empty for a task without any."""
-    names = [constraint.words for constraint in history.problem.constraints]
+    names = [constraint.description for constraint in history.problem.constraints]
     return {"violations": dict(zip(names, history.trials[number].violations, strict=True))} if names else {}
 
 

@@ -126,7 +126,7 @@ class Study:
         if proposer is not None:
             notify = self._report_request if self._method.in_flight is None else None
             self._requests = ProposalRequests(proposer, config.seed, notify)
-        n_objectives, names = len(problem.objectives), [constraint.words for constraint in problem.constraints]
+        n_objectives, names = len(problem.objectives), [constraint.description for constraint in problem.constraints]
         self._black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
         self._trials = folder.open_trials(config) if folder is not None else []
         self._black_box.restore(self._trials)

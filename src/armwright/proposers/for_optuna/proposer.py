@@ -185,7 +185,9 @@ def study_history(study: optuna.Study, problem: Problem) -> History:
 def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTrial:
     attributes = trial.user_attrs
     expected = attributes.get("expected")
-    missing = [constraint.words for constraint in problem.constraints if constraint.words not in trial.constraints]
+    missing = [
+        constraint.description for constraint in problem.constraints if constraint.description not in trial.constraints
+    ]
     if missing:
         raise SettingsError(
             f'trial {trial.number} of the study has no constraint "{missing[0]}": '
@@ -199,5 +201,5 @@ def _finished(number: int, trial: FrozenTrial, problem: Problem) -> FinishedTria
         proposal=attributes.get("proposal"),
         reason=str(attributes.get("reason", "")),
         expected=None if expected is None else tuple(expected),
-        violations=tuple(trial.constraints[constraint.words] for constraint in problem.constraints),
+        violations=tuple(trial.constraints[constraint.description] for constraint in problem.constraints),
     )
