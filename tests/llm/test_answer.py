@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError
 from armwright.llm.answer import Answer, answer_schema, read_answers, read_text, written_answers
+from armwright.llm.model_options import PromptOptions
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
 from armwright.tasks.catalogue import load_task
@@ -68,7 +69,8 @@ def test_the_schema_is_what_is_read(joints: int, proposals: int, expected: bool,
     told = (1.0, 2.0) if expected else None
     answers = [Answer(design, "so", told) for design in problem.space.sample(proposals, 1)]
     content = json.loads(written_answers(answers, problem, "thoughts" if reasoning else ""))
-    schema = answer_schema(problem, reasoning=reasoning, expected=expected, proposals=proposals)
+    answer, memory = "one-step" if reasoning else "two-step", "own" if expected else "none"
+    schema = answer_schema(problem, PromptOptions(answer=answer, memory=memory, proposals=proposals))
     assert list(content) == schema["required"] == list(schema["properties"])
     fields = schema["properties"]["designs"]["items"] if proposals > 1 else schema
     for design in content["designs"] if proposals > 1 else [content]:

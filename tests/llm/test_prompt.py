@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from armwright.exceptions import SettingsError
 from armwright.llm.answer import answer_schema
 from armwright.llm.feedback import Feedback
+from armwright.llm.model_options import ANSWERS, PromptOptions
 from armwright.llm.prompt import (
     LARGEST_TEMPLATE,
     MOST_TOKENS,
@@ -102,20 +103,20 @@ def bounded(*constraints: str) -> FixedProblem:
 
 
 def rendered(history: History, prompt: str = "plus", **how: Any) -> str:
-    return load_prompt(prompt).render(history, 3, **how)
+    return load_prompt(prompt).render(history, 3, PromptOptions(**how))
 
 
 GOLDENS: dict[str, Callable[[], str]] = {
     "analysis-in-three-steps": lambda: rendered(fixed_history(PAPER)),
-    "memory-and-several-designs-as-text": lambda: rendered(own(1), "minus", memory="own", proposals=2, form="text"),
+    "memory-and-several-designs-as-text": lambda: rendered(own(1), "minus", memory="own", proposals=2, answer="text"),
     "obstacles-and-moves": lambda: rendered(fixed_history(FixedProblem(ON_LINES)), "minus"),
     "no-feasible-design": lambda: rendered(
         fixed_history(bounded("mass <= 0.001"), proposals=[proposal(DESIGNS[0], "light", (1.0, 2.0))]),
         "minus",
         memory="own",
     ),
-    "second-call-with-expectations": lambda: parameters_prompt(PAPER, "One design.", expected=True),
-    "schema-of-several-designs": lambda: schema(reasoning=True, expected=True, proposals=2),
+    "second-call-with-expectations": lambda: parameters_prompt(PAPER, "One design.", PromptOptions(memory="own")),
+    "schema-of-several-designs": lambda: schema(answer="one-step", memory="own", proposals=2),
 }
 SIX_JOINTS = FixedProblem(load_task("target-2"), SIX_AXIS)
 BOUNDED = ("worst_error <= 0.3", "length >= 0.7")
@@ -177,7 +178,7 @@ FACTS: dict[str, Facts] = {
         ("one new design",),
     ),
     "one call": (
-        lambda: rendered(fixed_history(PAPER), form="schema"),
+        lambda: rendered(fixed_history(PAPER), answer="one-step"),
         (
             "Step 3: Choose the new values",
             "Write your thoughts into `reasoning` first; then give the new design and the main reason for it",
@@ -185,17 +186,17 @@ FACTS: dict[str, Facts] = {
         ("End your answer", "what you expect"),
     ),
     "one call with memory": (
-        lambda: rendered(own(1), "minus", memory="own", form="schema"),
+        lambda: rendered(own(1), "minus", memory="own", answer="one-step"),
         ("then give the new design, what you expect of E_pos and E_torque, and the main reason for it",),
         ("End your answer",),
     ),
     "one call for several designs, with memory": (
-        lambda: rendered(own(1), "minus", memory="own", proposals=2, form="schema"),
+        lambda: rendered(own(1), "minus", memory="own", proposals=2, answer="one-step"),
         ("then give the 2 new designs, each with what you expect of E_pos and E_torque and the main reason",),
         ("End your answer",),
     ),
     "text": (
-        lambda: rendered(fixed_history(PAPER), "minus", form="text"),
+        lambda: rendered(fixed_history(PAPER), "minus", answer="text"),
         ("End your answer", "REASON: the main reason for this design, in one sentence\n"),
         ("EXPECTED", "`reasoning`"),
     ),
@@ -323,7 +324,9 @@ FACTS: dict[str, Facts] = {
         ("expected",),
     ),
     "second call for several designs": (
-        lambda: parameters_prompt(FixedProblem(ONE_POINT, ONE_JOINT), "Two designs.", proposals=2, expected=True),
+        lambda: parameters_prompt(
+            FixedProblem(ONE_POINT, ONE_JOINT), "Two designs.", PromptOptions(proposals=2, memory="own")
+        ),
         (
             "ends with up to 2 designs of a robot arm",
             "- joint_1: P\n- link_1: 0.2 m (fixed)\n",
@@ -332,7 +335,7 @@ FACTS: dict[str, Facts] = {
         (),
     ),
     "schema of one design": (
-        lambda: schema(reasoning=False, expected=False, proposals=1),
+        lambda: schema(),
         ('"title": "NewDesign"', '"-1 <= origin_x <= 1 m"', '"reason"', '"additionalProperties": false'),
         ('"reasoning"', '"expected_', '"designs"'),
     ),
@@ -340,7 +343,7 @@ FACTS: dict[str, Facts] = {
 
 
 def schema(**how: Any) -> str:
-    return json.dumps(answer_schema(PAPER, **how), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(answer_schema(PAPER, PromptOptions(**how)), indent=2, ensure_ascii=False) + "\n"
 
 
 @pytest.mark.parametrize("name", GOLDENS)
@@ -439,15 +442,15 @@ def test_every_problem_is_told_whole_and_short(
         for design in space.sample(data.draw(st.integers(0, 5)), 2)
     ]
     history = fixed_history(problem, data.draw(st.integers(0, 30)), proposals=told)
-    how: dict[str, Any] = {
-        "memory": data.draw(st.sampled_from(["none", "own"])),
-        "form": data.draw(st.sampled_from(["text", "then-schema", "schema"])),
-        "proposals": proposals,
-    }
+    options = PromptOptions(
+        memory=data.draw(st.sampled_from(["none", "own"])),
+        answer=data.draw(st.sampled_from(["text", "two-step", "one-step"])),
+        proposals=proposals,
+    )
     seed = data.draw(st.integers(0, 2**31))
     prompt = load_prompt(data.draw(st.sampled_from(["plus", "minus"])))
-    text = prompt.render(history, seed, **how)
-    assert text == prompt.render(history, seed, **how)
+    text = prompt.render(history, seed, options)
+    assert text == prompt.render(history, seed, options)
     assert estimated_tokens(text) <= MOST_TOKENS
     for name, (low, high) in {
         "origin_x": space.origin_x,
@@ -479,8 +482,8 @@ def test_the_worst_case_is_bounded() -> None:
     problem = FixedProblem(task, space)
     told = [proposal(design, "理由" * 500, (1e308, -1e308)) for design in space.sample(40, 5)]
     history = fixed_history(problem, 30, proposals=told)
-    for form in ("text", "then-schema", "schema"):
-        text = load_prompt("plus").render(history, 0, memory="own", proposals=100, form=form)
+    for answer in ANSWERS:
+        text = load_prompt("plus").render(history, 0, PromptOptions(memory="own", proposals=100, answer=answer))
         assert estimated_tokens(text) <= MOST_TOKENS
         assert "of them, spread evenly" in text
         assert "理由" in text

@@ -15,6 +15,7 @@ from typing import Any, cast
 
 from armwright.exceptions import DesignError
 from armwright.llm.answer_format import JOINT_NAMES, designs_in_lines, expand_lists, plain_number
+from armwright.llm.model_options import PromptOptions
 from armwright.problem.problem import Problem
 from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, exact
 from armwright.text import one_line, without_thoughts
@@ -34,29 +35,27 @@ class Answer:
     expected: tuple[float, ...] | None = None
 
 
-def answer_schema(problem: Problem, *, reasoning: bool, expected: bool, proposals: int) -> dict[str, Any]:
+def answer_schema(problem: Problem, options: PromptOptions) -> dict[str, Any]:
     """Return the JSON schema of an answer: one property per parameter and the reason, or a list of such designs.
 
     Ranges are described but not enforced: the design space can say what is wrong.
 
     Args:
         problem: gives the parameters and the objectives.
-        reasoning: ask for the analysis first, in the same answer.
-        expected: ask for the expected objectives.
-        proposals: number of designs.
+        options: form of the answer, number of designs, and whether objectives are expected.
     """
     fields: dict[str, Any] = {parameter.name: _property(parameter) for parameter in problem.space.parameters}
-    if expected:
+    if options.expects:
         for objective in problem.objectives:
             words = f"the {objective.symbol} that you expect of this design, summed over all targets [{objective.unit}]"
             fields[f"expected_{objective.name}"] = {"type": "number", "description": words}
     fields["reason"] = {"type": "string", "description": "the main reason for this design, in one sentence"}
-    if proposals > 1:
-        words = f"{proposals} designs, each different from the others"
+    if options.proposals > 1:
+        words = f"{options.proposals} designs, each different from the others"
         content = {"designs": {"type": "array", "description": words, "items": object_schema(fields)}}
     else:
         content = fields
-    return response_schema("NewDesign" if proposals == 1 else "NewDesigns", content, reasoning=reasoning)
+    return response_schema("NewDesign" if options.proposals == 1 else "NewDesigns", content, options)
 
 
 def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 1) -> list[Answer]:
@@ -135,9 +134,9 @@ def _property(parameter: Parameter) -> dict[str, Any]:
     return {"type": "number", "description": words}
 
 
-def response_schema(title: str, fields: Mapping[str, Any], *, reasoning: bool) -> dict[str, Any]:
-    """Return the JSON schema of a whole answer, with the model's analysis first if `reasoning` is set."""
-    if reasoning:
+def response_schema(title: str, fields: Mapping[str, Any], options: PromptOptions) -> dict[str, Any]:
+    """Return the JSON schema of a whole answer, with the model's analysis first if there is no call before it."""
+    if options.form == "schema":
         fields = {"reasoning": {"type": "string", "description": "your analysis, step by step"}, **fields}
     return {"title": title, "description": "What to evaluate next.", **object_schema(fields)}
 

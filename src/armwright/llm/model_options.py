@@ -10,9 +10,10 @@ from typing import Any, Self, cast
 from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_validator
 
 from armwright.exceptions import did_you_mean
-from armwright.llm.prompt import MEMORIES, Form
 
-ANSWERS: Mapping[str, Form] = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
+MEMORIES = ("none", "own")
+# Form of the answer in the prompt: free text and a second call, JSON only, or free text alone.
+ANSWERS = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
 OUTPUTS = ("auto", "tool", "native", "prompted")
 ORIGINS = ("model", "scripted")
 ON_FAILURE = ("stop", "continue")
@@ -65,7 +66,7 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
         return value
 
     @property
-    def form(self) -> Form:
+    def form(self) -> str:
         """Form of the answer in the prompt."""
         return ANSWERS[self.answer]
 

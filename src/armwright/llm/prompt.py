@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.llm.feedback import Feedback, proposal_records
+from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt_values import MOST_TARGETS, VARIABLES, common_values, shown_values
 from armwright.llm.template_sandbox import Sandbox, render
 from armwright.problem.problem import Problem
@@ -21,15 +22,13 @@ from armwright.runs.history import History
 from armwright.text import end_of, fence, one_line, without_thoughts
 
 PROMPTS = ("plus", "minus")
-Memory = Literal["none", "own"]
-MEMORIES: tuple[str, ...] = get_args(Memory)
-Form = Literal["text", "then-schema", "schema"]  # answer: free text; free text and a second call; JSON only
 
 MOST_TOKENS = 12_000  # longer prompts show fewer targets, designs and earlier proposals
 FEWEST_TARGETS = 4  # shown
 MOST_PROPOSED, FEWEST_PROPOSED = 20, 4  # earlier proposals shown
 LONGEST_ANALYSIS = 40_000  # characters from the end of a free answer that the second call reads
 LARGEST_TEMPLATE = 256 * 1024  # [bytes]
+DEFAULTS = PromptOptions()
 
 
 @dataclass(frozen=True)
@@ -72,11 +71,9 @@ class Prompt:
         self,
         history: History,
         seed: int,
+        options: PromptOptions = DEFAULTS,
         *,
-        memory: str = "none",
         name: str = "llm",
-        proposals: int = 1,
-        form: Form = "then-schema",
         hints: Sequence[str] = (),
     ) -> str:
         """Return the prompt for the next design.
@@ -87,18 +84,16 @@ class Prompt:
         Args:
             history: the finished trials.
             seed: of the draw of the designs that are shown.
-            memory: "own" also shows the earlier proposals of `name`.
-            name: name of the proposer.
-            proposals: number of designs asked for.
-            form: form of the answer.
+            options: memory, form of the answer and number of designs.
+            name: name of the proposer, whose earlier proposals are shown if the memory is "own".
             hints: the user's notes; appended if the template ignores them.
 
         Raises:
             SettingsError: The template fails, or renders to nothing.
         """
-        proposed = proposal_records(history, name) if memory == "own" else []
+        proposed = proposal_records(history, name) if options.expects else []
         feedback = Feedback(history, seed)
-        common = common_values(history, memory, proposals, form) | {
+        common = common_values(history, options) | {
             "n_proposed": len(proposed),
             "hints": _visible_hints(hints),
         }
@@ -183,13 +178,13 @@ def whole_template(name: str) -> str:
     return whole
 
 
-def parameters_prompt(problem: Problem, answer: str, *, proposals: int = 1, expected: bool = False) -> str:
+def parameters_prompt(problem: Problem, answer: str, options: PromptOptions = DEFAULTS) -> str:
     """Return the prompt of the second call, which extracts the parameters from a free answer."""
     values = {
         "parameters": problem.space.parameters,
         "symbols": " and ".join(objective.symbol for objective in problem.objectives),
-        "proposals": proposals,
-        "expected": expected,
+        "proposals": options.proposals,
+        "expected": options.expects,
         **fenced(answer),
     }
     return rendered("parameters.md.j2", values)

@@ -10,6 +10,7 @@ from armwright.kinematics.ik import UPDATES
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.llm.answer_format import module_lists
 from armwright.llm.feedback import Feedback, Record, points, vector
+from armwright.llm.model_options import PromptOptions
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     CLEARANCE_QUANTITIES,
@@ -89,7 +90,7 @@ VARIABLES = {
 }
 
 
-def common_values(history: History, memory: str, proposals: int, form: str) -> dict[str, Any]:
+def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
     """Return the values that do not depend on how much of a history is shown."""
     problem = history.problem
     return {
@@ -101,9 +102,9 @@ def common_values(history: History, memory: str, proposals: int, form: str) -> d
         "reference_point": history.reference_point,
         "n_finished": len(history),
         "n_front": len(history.front),
-        "proposals": proposals,
-        "expected": memory == "own",
-        "form": form,
+        "proposals": options.proposals,
+        "expected": options.expects,
+        "form": options.form,
     }
 
 

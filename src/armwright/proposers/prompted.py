@@ -55,9 +55,7 @@ class PromptedProposer(LlmSession, Proposer):
         return {
             "prompt": self.prompt.name,
             **own,
-            "memory": self.options.memory,
-            "answer": self.options.answer,
-            "proposals": self.options.proposals,
+            **self.options.model_dump(include={"memory", "answer", "proposals"}),
         }
 
     def open(self, folder: Path | None) -> None:
@@ -127,19 +125,12 @@ class PromptedProposer(LlmSession, Proposer):
         return hints_of(self._transcript.calls, self.identity(number))
 
     def _extraction_prompt(self, problem: Problem, thoughts: str) -> str:
-        return parameters_prompt(problem, thoughts, proposals=self.options.proposals, expected=self.options.expects)
+        return parameters_prompt(problem, thoughts, self.options)
 
     def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
         """Return the prompt for the next designs."""
-        return self.prompt.render(
-            history,
-            seed,
-            memory=self.options.memory,
-            name=self.name,
-            proposals=self.options.proposals,
-            form=self.options.form,
-            hints=[hint.text for hint in hints],
-        )
+        texts = [hint.text for hint in hints]
+        return self.prompt.render(history, seed, self.options, name=self.name, hints=texts)
 
     def output_format(self, problem: Problem) -> OutputFormat:
         """Return the form of the answer that holds the designs; it is recorded as JSON that `read_text` reads."""
@@ -151,9 +142,7 @@ class PromptedProposer(LlmSession, Proposer):
             answers = read_answers(content, problem, n)
             return written_answers(answers, problem, str(content.get("reasoning", "")))
 
-        reasoning = self.options.form == "schema"
-        schema = answer_schema(problem, reasoning=reasoning, expected=self.options.expects, proposals=n)
-        return OutputFormat(schema, read)
+        return OutputFormat(answer_schema(problem, self.options), read)
 
     def _proposals(self, identity: str, answers: Sequence[Answer], known: int) -> list[Proposal]:
         ids = [identity] if len(answers) == 1 else [f"{identity}.{i}" for i in range(1, len(answers) + 1)]

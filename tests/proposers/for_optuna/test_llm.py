@@ -14,7 +14,7 @@ from optuna.trial import TrialState, create_trial
 from pydantic import ValidationError
 
 from armwright.exceptions import ModelError, ProposalError, SettingsError
-from armwright.llm.model_options import ModelOptions
+from armwright.llm.model_options import ModelOptions, PromptOptions
 from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.proposers.for_optuna.callback import ProposalCallback
@@ -291,7 +291,7 @@ def test_wrong_settings_are_refused(chat_server: ChatServer, settings: dict[str,
 
 def shown(study: optuna.Study, seed: int, memory: str = "none") -> str:
     parameters = study_parameters(observed_space(study), study.trials)
-    return study_prompt(study, study.trials, parameters, "d", seed, memory=memory, source="llm", form="then-schema")
+    return study_prompt(study, study.trials, parameters, "d", seed, PromptOptions(memory=memory), "llm")
 
 
 def test_which_trials_are_shown_depends_on_the_seed_alone() -> None:

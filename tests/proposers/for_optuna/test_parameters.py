@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 
 from armwright.exceptions import DesignError
+from armwright.llm.model_options import PromptOptions
 from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
 from armwright.proposers.for_optuna.parameter_values import (
     checked_value,
@@ -78,7 +79,7 @@ def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
 def test_the_schema_allows_what_is_written(drawn: tuple[BaseDistribution, Any]) -> None:
     distribution, value = drawn
     (parameter,) = study_parameters({"x": distribution}, [])
-    schema = answer_schema([parameter], OBJECTIVES, reasoning=True, expected=True)
+    schema = answer_schema([parameter], OBJECTIVES, PromptOptions(answer="one-step", memory="own"))
     assert list(schema["properties"]) == ["reasoning", "parameters", "expected", "reason"]
     field = schema["properties"]["parameters"]["properties"]["x"]
     written = json_value(value, distribution)
@@ -190,7 +191,7 @@ def test_conditional_parameters_may_be_left_out() -> None:
     for left_out in ({}, {"gamma": None}, {"gamma": "n/a"}):
         answer = read_answer({"parameters": {"kernel": "linear", "C": 1, **left_out}}, PARAMETERS, OBJECTIVES)
         assert dict(answer.params) == {"kernel": "linear", "C": 1.0}
-    schema = answer_schema(PARAMETERS, OBJECTIVES, reasoning=False, expected=False)
+    schema = answer_schema(PARAMETERS, OBJECTIVES, PromptOptions())
     assert schema["properties"]["parameters"]["required"] == ["kernel", "C"]
 
 

@@ -9,6 +9,7 @@ from optuna.distributions import CategoricalDistribution, IntDistribution
 
 from armwright.exceptions import DesignError
 from armwright.llm.answer import LONGEST_REASON, answer_json, object_schema, response_schema
+from armwright.llm.model_options import PromptOptions
 from armwright.proposers.for_optuna.parameter_values import choice_texts, json_value, read_value
 from armwright.proposers.for_optuna.parameters import Parameter, unknown_parameter
 from armwright.proposers.for_optuna.prompt import StudyObjective
@@ -29,24 +30,23 @@ class StudyAnswer:
 
 
 def answer_schema(
-    parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], *, reasoning: bool, expected: bool
+    parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], options: PromptOptions
 ) -> dict[str, Any]:
     """Return the JSON schema of an answer: the parameters and the reason for them.
 
     Args:
         parameters: what the model chooses; conditional parameters are optional.
         objectives: the study's objectives.
-        reasoning: ask for the analysis first, in the same answer.
-        expected: ask for the expected values.
+        options: form of the answer, and whether values are expected.
     """
     fields = {parameter.key: _property(parameter) for parameter in parameters}
     required = [parameter.key for parameter in parameters if not parameter.conditional]
     content: dict[str, Any] = {"parameters": object_schema(fields, required)}
-    if expected:
+    if options.expects:
         values = {o.key: {"type": "number", "description": f"that you expect; {o.direction}"} for o in objectives}
         content["expected"] = object_schema(values)
     content["reason"] = {"type": "string", "description": "the main reason for these parameters, in one sentence"}
-    return response_schema("NewTrial", content, reasoning=reasoning)
+    return response_schema("NewTrial", content, options)
 
 
 def read_answer(

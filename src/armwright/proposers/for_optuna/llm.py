@@ -59,16 +59,7 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             raise ProposalError("space", "no trial has shown a parameter yet; give StudyLlmProposer(space=…)")
         objectives = study_objectives(study)
         identity = f"{self.name}-{number:04d}"
-        prompt = study_prompt(
-            study,
-            trials,
-            parameters,
-            self.description,
-            seed,
-            memory=self.options.memory,
-            source=self.name,
-            form=self.options.form,
-        )
+        prompt = study_prompt(study, trials, parameters, self.description, seed, self.options, self.name)
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
         step = "reasoning" if self.options.form == "then-schema" else "answer"
         text = self._ask(
@@ -85,6 +76,4 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             answer = read_answer(content, parameters, objectives)
             return written_answer(answer, parameters, objectives, str(content.get("reasoning") or ""))
 
-        reasoning = self.options.form == "schema"
-        schema = answer_schema(parameters, objectives, reasoning=reasoning, expected=self.options.expects)
-        return OutputFormat(schema, read)
+        return OutputFormat(answer_schema(parameters, objectives, self.options), read)

@@ -10,7 +10,8 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
 from armwright.llm.feedback import N_PARETO, N_RANDOM, draw_in_order
-from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, Form, estimated_tokens, fenced, rendered
+from armwright.llm.model_options import PromptOptions
+from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, estimated_tokens, fenced, rendered
 from armwright.proposers.for_optuna.parameter_values import value_text
 from armwright.proposers.for_optuna.parameters import Parameter, unique_keys
 from armwright.proposers.for_optuna.study_view import best_trials
@@ -42,10 +43,8 @@ def study_prompt(
     parameters: Sequence[Parameter],
     description: str,
     seed: int,
-    *,
-    memory: str,
+    options: PromptOptions,
     source: str,
-    form: Form,
 ) -> str:
     """Return the prompt for the next trial.
 
@@ -58,14 +57,13 @@ def study_prompt(
         parameters: what the model may choose.
         description: the user's description of the problem.
         seed: of the draw of the trials that are shown.
-        memory: "own" also shows the earlier proposals of `source`.
-        source: name of the proposer.
-        form: form of the answer.
+        options: memory and form of the answer.
+        source: name of the proposer, whose earlier proposals are shown if the memory is "own".
     """
     complete = [trial for trial in trials if trial.state == TrialState.COMPLETE]
     objectives = study_objectives(study)
     best = best_trials(complete, study.directions)
-    own = [trial for trial in complete if memory == "own" and _is_proposal(trial, source)]
+    own = [trial for trial in complete if options.expects and _is_proposal(trial, source)]
     best_records, other_records, own_records = (
         [_record(trial, parameters, objectives, {t.number for t in best}) for trial in group]
         for group in (*_sample(complete, best, seed, ranked=len(objectives) == 1), own)
@@ -81,8 +79,8 @@ def study_prompt(
         "n_failed": sum(trial.state == TrialState.FAIL for trial in trials),
         "under_way": under_way[-N_RANDOM:],
         "n_proposed": len(own),
-        "expected": memory == "own",
-        "form": form,
+        "expected": options.expects,
+        "form": options.form,
     }
     most_shown, most_proposed = N_PARETO + N_RANDOM, MOST_PROPOSED
     while True:
