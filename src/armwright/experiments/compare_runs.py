@@ -118,14 +118,15 @@ class Comparison:
 
     def reference_point(self, task: str) -> tuple[float, ...]:
         """Return the common reference point of all runs on a task."""
-        return self._first_run(task).reference_point
+        return self.first_run(task).reference_point
 
     def best_known(self, task: str) -> float | None:
         """Return the best known hypervolume of a task within the common reference point; None if unknown."""
-        known = known_front(self._first_run(task).config.problem)
+        known = known_front(self.first_run(task).config.problem)
         return None if known is None else hypervolume(known.values, self.reference_point(task))
 
-    def _first_run(self, task: str) -> RunSummary:
+    def first_run(self, task: str) -> RunSummary:
+        """Return one of the runs on a task, for what they have in common."""
         return next(run for run in self.runs if run.task == task)
 
     @cached_property

@@ -6,7 +6,6 @@ from itertools import combinations, product
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -15,32 +14,26 @@ from matplotlib.ticker import MaxNLocator
 from armwright.kinematics.forward import joint_positions, link_lines, rails
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import TORQUE
+from armwright.report.drawing import legend_mark
 from armwright.report.solids import draw_obstacles
-from armwright.report.style import (
-    FRONT,
-    JOINT,
-    JOINT_LABEL,
-    LINK,
-    MISSED,
-    OBSTACLE,
-    REGION,
-    TARGET,
-    WAY,
-    look,
-)
+from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, look
 from armwright.runs.history import FrontMember, History
 from armwright.tasks.obstacles import Ground
 from armwright.tasks.targets import AXIS
-from armwright.tasks.workspace import Region
 
 ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
 MOST_PANELS = 12
+
+# Lines
+MISS: Any = {"color": MISSED, "linewidth": 1.2, "linestyle": (0, (2, 2))}  # from the tip to a target not reached
+MOVE: Any = {"color": TARGET, "linewidth": 1.2}  # between two targets
+TIP: Any = {"color": FRONT, "linewidth": 1.4, "linestyle": (0, (3, 1))}  # path of the tip on a move
+EDGE: Any = {"color": "#8A8A8A", "linewidth": 0.8}  # of boxes to cover
 
 
 def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
     """Draw the chosen designs side by side, each with its postures at all targets."""
     figure = Figure(figsize=(3.8 * len(chosen), 4.4))
-    FigureCanvasAgg(figure)
     # The layout engines do not know how far the labels of a 3D plot reach.
     figure.subplots_adjust(left=0.01, right=0.97, bottom=0.1, top=0.9, wspace=0.08)
     evaluation = history.evaluation([member.number for _, member in chosen])
@@ -49,9 +42,7 @@ def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Fi
         axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
         _draw_panel(axes, member, evaluation, column, range(len(evaluation.targets)), extent)
         axes.set_title(f"{title}\n{_caption(history, member)}", y=1.0)
-    figure.legend(
-        handles=_legend(evaluation), loc="lower center", ncols=3 if len(chosen) == 1 else _legend_columns(evaluation)
-    )
+    _add_legend(figure, evaluation, is_narrow=len(chosen) == 1)
     return figure
 
 
@@ -64,7 +55,6 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     rows = -(-len(shown) // columns)
     height = 3.1 * rows + 1.2
     figure = Figure(figsize=(3.1 * columns, height))
-    FigureCanvasAgg(figure)
     figure.subplots_adjust(left=0.01, right=0.96, bottom=0.55 / height, top=1 - 0.75 / height, wspace=0.08, hspace=0.12)
     extent = _extent(evaluation, [member])
     for place, target in enumerate(shown):
@@ -75,9 +65,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
         axes.set_title(f"Target {target + 1}: {verdict}", y=1.0, color=MISSED if missed else FRONT)
     part = "" if len(shown) == n else f" ({len(shown)} of {n} targets shown)"
     figure.suptitle(f"{title}{part}\n{_caption(history, member)}", fontsize=10)
-    figure.legend(
-        handles=_legend(evaluation), loc="lower center", ncols=_legend_columns(evaluation) if columns > 2 else 3
-    )
+    _add_legend(figure, evaluation, is_narrow=columns <= 2)
     return figure
 
 
@@ -89,30 +77,32 @@ def _draw_panel(
     targets: Sequence[int],
     extent: tuple[np.ndarray, float],
 ) -> None:
+    """Draw one arm at some of its targets; row: that of the arm in the evaluation."""
     draw_obstacles(axes, evaluation.obstacles, extent)
-    _draw_workspace(axes, evaluation.workspace)
+    for region in evaluation.workspace:
+        corners = np.array(list(product(*zip(region.low, region.high, strict=True))))
+        for one, other in combinations(corners, 2):
+            if (one != other).sum() == 1:
+                axes.plot(*np.array([one, other]).T, **EDGE)
     _draw_moves(axes, evaluation, row, targets)
-    _draw_postures(axes, member, evaluation, row, targets)
-    frame(axes, extent)
-
-
-def _draw_postures(axes: Any, member: FrontMember, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
+    arm = member.arm
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
-        q = evaluation.q[row, target, : len(member.arm.joints)]
-        places = joint_positions(member.arm, q)
-        for line in rails(member.arm, q):
+        q = evaluation.q[row, target, : len(arm.joints)]
+        places = joint_positions(arm, q)
+        for line in rails(arm, q):
             axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
-        for line in link_lines(member.arm, q):
+        for line in link_lines(arm, q):
             axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
-        for joint, place in zip(member.arm.joints, places[:-1], strict=True):
+        for joint, place in zip(arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
         goal = evaluation.targets[target]
         axes.plot(*goal[:, None], marker="*", markersize=10, color=TARGET, markeredgecolor=FRONT, markeredgewidth=0.5)
-        _draw_goal(axes, evaluation, target, ARROW * member.arm.reach)
+        _draw_orientation(axes, evaluation, target, ARROW * arm.reach)
         if evaluation.unreached[row, target]:
-            axes.plot(*np.array([places[-1], goal]).T, color=MISSED, linewidth=1.2, linestyle=(0, (2, 2)))
-    axes.plot(*np.array(member.arm.base)[:, None], marker="s", markersize=7, color=FRONT)
+            axes.plot(*np.array([places[-1], goal]).T, **MISS)
+    axes.plot(*np.array(arm.base)[:, None], marker="s", markersize=7, color=FRONT)
+    frame(axes, extent)
 
 
 def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
@@ -122,20 +112,11 @@ def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[i
     lines = evaluation.paths.samples
     for (_, end), first, beyond in zip(evaluation.moves.pairs, lines.first, lines.first[1:], strict=False):
         if end in targets:
-            axes.plot(*lines.points[first:beyond].T, color=TARGET, linewidth=1.2)
-            axes.plot(*evaluation.paths.reached[row, first:beyond].T, color=WAY, linewidth=1.4, linestyle=(0, (3, 1)))
+            axes.plot(*lines.points[first:beyond].T, **MOVE)
+            axes.plot(*evaluation.paths.reached[row, first:beyond].T, **TIP)
 
 
-def _draw_workspace(axes: Any, workspace: Sequence[Region]) -> None:
-    """Draw the edges of the boxes to cover."""
-    for region in workspace:
-        corners = np.array(list(product(*zip(region.low, region.high, strict=True))))
-        for one, other in combinations(corners, 2):
-            if (one != other).sum() == 1:
-                axes.plot(*np.array([one, other]).T, color=REGION, linewidth=0.8)
-
-
-def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
+def _draw_orientation(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
     """Draw the required tool direction: an arrow along its z axis, and for a full orientation also along x and y."""
     goal, rows = evaluation.targets[target], evaluation.target_arrays.n_angular[target]
     if not rows:
@@ -147,10 +128,10 @@ def _draw_goal(axes: Any, evaluation: Evaluation, target: int, size: float) -> N
 
 
 def _describe_miss(evaluation: Evaluation, target: int) -> str:
-    words = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
+    distance = f"{1e3 * evaluation.position_error[0, target]:.0f} mm"
     if not evaluation.target_arrays.n_angular[target]:
-        return words
-    return f"{words}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
+        return distance
+    return f"{distance}, {math.degrees(evaluation.angle_error[0, target]):.0f}°"
 
 
 def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
@@ -181,28 +162,21 @@ def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.
     return (low + high) / 2, float(max(0.1, 0.52 * (high - low).max()))
 
 
-def _legend(evaluation: Evaluation) -> list[Line2D | Patch]:
-    joints = [Line2D([], [], linestyle="", marker="o", color=JOINT[a], label=JOINT_LABEL[a]) for a in "xyz"]
-    obstacles = [Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle")] if evaluation.obstacles else []
-    moves = [
-        Line2D([], [], color=TARGET, linewidth=1.2, label="straight move"),
-        Line2D([], [], color=WAY, linewidth=1.4, linestyle=(0, (3, 1)), label="its tip"),
-    ][: 2 * bool(evaluation.moves)]
-    regions = [Line2D([], [], color=REGION, linewidth=0.8, label="workspace")] if evaluation.workspace else []
-    return [
-        Line2D([], [], linestyle="", marker="s", color=FRONT, label="base"),
-        *joints,
-        Line2D([], [], linestyle="", marker="*", markersize=9, color=TARGET, markeredgecolor=FRONT, label="target"),
-        Line2D([], [], color=MISSED, linestyle=(0, (2, 2)), label="missed by"),
-        *obstacles,
-        *moves,
-        *regions,
+def _add_legend(figure: Figure, evaluation: Evaluation, is_narrow: bool) -> None:
+    """Add the legend below the panels: one line, or three columns in a narrow figure."""
+    handles: list[Line2D | Patch] = [
+        legend_mark("base", "s", FRONT),
+        *(legend_mark(JOINT_LABEL[axis], "o", JOINT[axis]) for axis in "xyz"),
+        legend_mark("target", "*", TARGET, markersize=9, markeredgecolor=FRONT),
+        Line2D([], [], **MISS, label="missed by"),
     ]
-
-
-def _legend_columns(evaluation: Evaluation) -> int:
-    """Return the number of columns of a one-line legend."""
-    return len(_legend(evaluation))
+    if evaluation.obstacles:
+        handles.append(Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle"))
+    if evaluation.moves:
+        handles += [Line2D([], [], **MOVE, label="straight move"), Line2D([], [], **TIP, label="its tip")]
+    if evaluation.workspace:
+        handles.append(Line2D([], [], **EDGE, label="workspace"))
+    figure.legend(handles=handles, loc="lower center", ncols=3 if is_narrow else len(handles))
 
 
 def _caption(history: History, member: FrontMember) -> str:

@@ -11,9 +11,8 @@ from armwright.arrays import Array
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.run_summary import RunSummary
 from armwright.pareto import front_indices
-from armwright.report.drawing import front_steps, legend_below, method_handle, one_panel
-from armwright.report.figures import label_axes
-from armwright.report.style import FRONT, line
+from armwright.report.drawing import frame_plane, front_steps, legend_below, method_handle, one_panel
+from armwright.report.style import line
 
 
 def draw_attainment(comparison: Comparison, task: str) -> Figure:
@@ -30,12 +29,9 @@ def draw_attainment(comparison: Comparison, task: str) -> Figure:
         grid = np.unique(np.concatenate([least[0], median[0], most[0]]))
         low, high = (_heights(grid, *steps) for steps in (least, most))
         axes.fill_between(grid, low, high, step="post", color=style.colour, alpha=0.13, linewidth=0)
-        axes.step(*median, where="post", color=style.colour, linestyle=style.pattern, linewidth=1.5)
+        axes.step(*median, where="post", **style.curve)
         handles.append(method_handle(comparison, method, with_marker=False))
-    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
-    axes.set_xlim(0, 1.1 * reference[0])
-    axes.set_ylim(0, 1.1 * reference[1])
-    label_axes(axes, next(run for run in comparison.runs if run.task == task).config)
+    frame_plane(axes, comparison.first_run(task).config.problem, reference, 1.1)
     axes.set_title(f"{task}: attained by half of the runs (lines), by one and by all (areas)")
     legend_below(figure, handles)
     return figure

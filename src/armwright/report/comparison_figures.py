@@ -18,10 +18,18 @@ from armwright.experiments.run_summary import RunSummary
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.report.arm_figures import draw_arm, frame
 from armwright.report.attainment import draw_attainment
-from armwright.report.drawing import front_steps, legend_below, method_handle, one_panel, several_panels, write_drawn
-from armwright.report.figures import draw_samples, label_axes
+from armwright.report.drawing import (
+    draw_dominated,
+    frame_plane,
+    legend_below,
+    method_handle,
+    one_panel,
+    several_panels,
+    write_drawn,
+)
+from armwright.report.figures import draw_samples
 from armwright.report.reason_figures import draw_reasons
-from armwright.report.style import FRONT, MISSED, TARGET, line, look
+from armwright.report.style import BEST_KNOWN, FRONT, MISSED, TARGET, line, look
 from armwright.runs.history import BBO, RANDOM
 from armwright.runs.results import FIGURES
 
@@ -108,7 +116,7 @@ def draw_targets(comparison: Comparison) -> Figure:
     figure = Figure(figsize=(3.2 * columns, 3.3 * rows))
     figure.subplots_adjust(left=0.02, right=0.95, bottom=0.06 / rows, top=1 - 0.1 / rows, wspace=0.1, hspace=0.16)
     for place, task in enumerate(shown, start=1):
-        points = next(run for run in comparison.runs if run.task == task).config.task.target_positions
+        points = comparison.first_run(task).config.task.target_positions
         axes: Any = figure.add_subplot(rows, columns, place, projection="3d")
         axes.scatter(*points.T, marker="*", s=90, color=TARGET, edgecolors=FRONT, linewidths=0.5, depthshade=False)
         low, high = points.min(axis=0), points.max(axis=0)
@@ -126,40 +134,25 @@ def draw_targets(comparison: Comparison) -> Figure:
 def draw_area(comparison: Comparison) -> Figure:
     """Draw the area that E_hv measures, between the front of one run and the reference point."""
     run = next(
-        r
+        run
         for method in [comparison.baseline, *comparison.methods]
-        for r in comparison.runs
-        if r.method == method and len(r.curve)
+        for run in comparison.runs
+        if run.method == method and len(run.curve)
     )
-    config, history = run.config, run.history()
-    reference = run.reference_point
-    values = history.values[: config.study.n_trials, :2]
+    reference = np.array(run.reference_point)
+    history = run.history()
+    counted = slice(run.config.study.n_trials)
+    values, masked = history.values[counted, :2], history.masked_objectives[counted]
+    inside = values[[n for n in front_indices(masked[:, :2]) if np.all(values[n] < reference[:2])]]
     figure, axes = one_panel(4.4, 3.8)
-    kept = history.masked_objectives[: config.study.n_trials, :2]
-    inside = values[[n for n in front_indices(kept) if np.all(values[n] < reference[:2])]]
     axes.scatter(*values.T, s=12, color="#9A9A9A", label="designs")
     if len(inside):
-        x, y = front_steps(inside, reference)
-        axes.fill_between(
-            x,
-            y,
-            reference[1],
-            step="post",
-            facecolor="#F0E442",
-            alpha=0.5,
-            hatch="///",
-            edgecolor="#B8AE2C",
-            linewidth=0,
-            label="area measured",
-        )
-        axes.step(x, y, where="post", color=FRONT, linewidth=1.2)
+        fill = {"facecolor": "#F0E442", "alpha": 0.5, "hatch": "///", "edgecolor": "#B8AE2C"}
+        draw_dominated(axes, inside, run.reference_point, label="area measured", **fill)
         axes.scatter(*inside.T, s=34, color=MISSED, edgecolors="white", linewidths=0.5, zorder=4, label="Pareto front")
-    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=12, clip_on=False)
     axes.annotate("reference point", reference[:2], xytext=(-4, 5), textcoords="offset points", ha="right")
-    axes.set_xlim(0, 1.15 * reference[0])
-    axes.set_ylim(0, 1.15 * reference[1])
-    label_axes(axes, config)
-    area = hypervolume(history.masked_objectives[: config.study.n_trials], reference)
+    frame_plane(axes, history.problem, run.reference_point, 1.15)
+    area = hypervolume(masked, run.reference_point)
     axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
     axes.legend(loc="lower left")
     return figure
@@ -176,18 +169,13 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
             style = line(comparison.methods.index(method))
             iterations = np.arange(1, len(curves[0]) + 1)
             mean, deviation = curves.mean(axis=0), curves.std(axis=0)
-            axes.fill_between(
-                iterations, mean - deviation, mean + deviation, color=style.colour, alpha=0.15, linewidth=0
-            )
-            axes.plot(
-                iterations, mean, color=style.colour, linestyle=style.pattern, linewidth=1.5, marker=style.marker,
-                markevery=max(1, len(mean) // MARKERS), markersize=4,
-            )  # fmt: skip
+            low, high = mean - deviation, mean + deviation
+            axes.fill_between(iterations, low, high, color=style.colour, alpha=0.15, linewidth=0)
+            axes.plot(iterations, mean, **style.curve, markevery=max(1, len(mean) // MARKERS), marker=style.marker)
         known = comparison.best_known(task)
         if known is not None:
-            axes.axhline(known, color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)))
-        axes.set_title(task)
-        axes.set_xlabel("Iteration")
+            axes.axhline(known, **BEST_KNOWN)
+        axes.set(title=task, xlabel="Iteration")
         axes.margins(y=0.08)
         axes.set_ylim(bottom=0)
         axes.set_xlim(left=0)
@@ -195,7 +183,7 @@ def draw_curves(comparison: Comparison, methods: Sequence[str], title: str) -> F
         axes.set_ylabel("Hypervolume")
     handles = [method_handle(comparison, method) for method in methods]
     if any(comparison.best_known(task) is not None for task in comparison.tasks):
-        handles.append(Line2D([], [], color=MISSED, linewidth=1.0, linestyle=(0, (4, 2)), label="best known"))
+        handles.append(Line2D([], [], **BEST_KNOWN, label="best known"))
     legend_below(figure, handles)
     seeds = {len(comparison.runs_of(method, task)) for method in methods for task in comparison.tasks} - {0}
     runs = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else f"{seeds.pop()}"
@@ -211,18 +199,12 @@ def draw_times(comparison: Comparison, methods: Sequence[str]) -> Figure:
     panels: Any = np.atleast_1d(figure.subplots(1, len(levels), sharey=True))
     for axes, level in zip(panels, levels, strict=True):
         for method in methods:
-            there = np.sort(
-                [trials for task in comparison.tasks for trials in comparison.trials_to(method, task, level)]
-            )
-            longest = max(comparison.curves(method, task).shape[1] for task in comparison.tasks)
-            arrived = there[np.isfinite(there)]
-            trials = np.concatenate([[0], arrived, [longest]])
-            share = np.concatenate([[0], np.arange(1, len(arrived) + 1), [len(arrived)]]) / len(there)
-            style = line(comparison.methods.index(method))
-            axes.step(trials, share, where="post", color=style.colour, linestyle=style.pattern, linewidth=1.5)
-        axes.set_title(f"{level:.0%} of the best known")
-        axes.set_xlabel("Iteration")
-        axes.set_ylim(-0.02, 1.02)
+            reached = sorted(n for task in comparison.tasks for n in comparison.trials_to(method, task, level))
+            longest: int = max(comparison.curves(method, task).shape[1] for task in comparison.tasks)
+            trials = np.arange(longest + 1)
+            share = np.searchsorted(reached, trials, side="right") / len(reached)
+            axes.step(trials, share, where="post", **line(comparison.methods.index(method)).curve)
+        axes.set(title=f"{level:.0%} of the best known", xlabel="Iteration", ylim=(-0.02, 1.02))
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     panels[0].set_ylabel("Runs that reached it")
     legend_below(figure, [method_handle(comparison, method, with_marker=False) for method in methods])
@@ -256,11 +238,10 @@ def draw_attribution_shares(comparison: Comparison) -> Figure:
 
 
 def _gained_shares(runs: Sequence[RunSummary]) -> Mapping[str, float]:
-    gained: dict[str, list[float]] = {RANDOM: [], BBO: []}
-    for run in runs:
-        for source, share in run.gained.items():
-            gained.setdefault(source, []).append(share)
-    return {source: sum(shares) / len(runs) for source, shares in gained.items() if shares}
+    """Return the mean share of each source, random trials and the black box first."""
+    sources = dict.fromkeys(source for run in runs for source in run.gained)
+    ordered = sorted(sources, key=lambda source: (source != RANDOM, source != BBO))
+    return {source: sum(run.gained.get(source, 0.0) for run in runs) / len(runs) for source in ordered}
 
 
 def _columns(tasks: Sequence[str]) -> int:

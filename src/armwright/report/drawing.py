@@ -7,14 +7,15 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from armwright.arrays import Array
 from armwright.experiments.compare_runs import Comparison
 from armwright.files import naming_write_errors, replace_folder
-from armwright.report.style import RC, line
+from armwright.problem.objectives import TORQUE
+from armwright.problem.problem import Problem
+from armwright.report.style import FRONT, RC, line
 
 LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
 
@@ -27,9 +28,33 @@ def one_panel(width: float, height: float) -> tuple[Figure, Any]:
 
 def several_panels(width: float, height: float) -> Figure:
     """Return a figure of this size [inch] without axes."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], shown: float) -> None:
+    """Label a plane of the first two objectives, mark its reference point and set its limits.
+
+    Torques of toy masses are marked as such.
+
+    Args:
+        axes: The plane.
+        problem: The problem with these objectives.
+        reference: The reference point.
+        shown: Upper limits of the axes, as a multiple of the reference point.
+    """
+    for i, axis in enumerate("xy"):
+        objective = problem.objectives[i]
+        toy = "; toy masses" if objective.name == TORQUE.name and problem.space.is_toy else ""
+        label = f"{objective.label} [{objective.unit.replace(' x ', ' × ')}{toy}]"
+        axes.set(**{f"{axis}label": label, f"{axis}lim": (0, shown * reference[i])})
+    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
+
+
+def draw_dominated(axes: Any, front: Array, reference: Sequence[float], **fill: Any) -> None:
+    """Draw a front (K, 2) within the reference box as a step line, and fill the area that it dominates."""
+    x, y = front_steps(front, reference)
+    axes.step(x, y, where="post", color=FRONT, linewidth=1.2, zorder=2)
+    axes.fill_between(x, y, reference[1], step="post", linewidth=0, **fill)
 
 
 def front_steps(front: Array, reference: Sequence[float]) -> tuple[Array, Array]:
@@ -46,14 +71,15 @@ def front_steps(front: Array, reference: Sequence[float]) -> tuple[Array, Array]
     return x, y
 
 
+def legend_mark(label: str, marker: str, colour: str, **style: Any) -> Line2D:
+    """Return the legend entry of a marker."""
+    return Line2D([], [], linestyle="", marker=marker, color=colour, label=label, **style)
+
+
 def method_handle(comparison: Comparison, method: str, with_marker: bool = True) -> Line2D:
     """Return the legend entry of a method's line."""
     style = line(comparison.methods.index(method))
-    marker = style.marker if with_marker else None
-    return Line2D(
-        [], [], color=style.colour, linestyle=style.pattern, linewidth=1.5, marker=marker, markersize=4,
-        label=comparison.label(method),
-    )  # fmt: skip
+    return Line2D([], [], **style.curve, marker=style.marker if with_marker else None, label=comparison.label(method))
 
 
 def legend_below(figure: Figure, handles: Sequence[Any]) -> None:

@@ -15,11 +15,10 @@ class Look(NamedTuple):
     hatch: str = ""  # hatch of filled areas
 
     @property
-    def paint(self) -> dict[str, Any]:
-        """Colour arguments of a scatter plot."""
-        if self.marker == "x":
-            return {"color": self.colour, "linewidths": 1.0}
-        return {"color": self.colour, "edgecolors": "white", "linewidths": 0.4}
+    def points(self) -> dict[str, Any]:
+        """Arguments of a scatter plot."""
+        edge = {"linewidths": 1.0} if self.marker == "x" else {"edgecolors": "white", "linewidths": 0.4}
+        return {"s": self.size, "marker": self.marker, "color": self.colour, **edge}
 
     @property
     def fill(self) -> dict[str, Any]:
@@ -41,12 +40,11 @@ _LOOKS = {
 EXISTING = Look("existing arm", "#56B4E9", "P", 70)
 FRONT = "#111111"
 MISSED = "#CC0000"
+BEST_KNOWN: Any = {"color": MISSED, "linewidth": 1.0, "linestyle": (0, (4, 2))}  # line of the best known hypervolume
 TARGET = "#CC79A7"
 INFEASIBLE = "#B0B0B0"
 LINK = "#5A5A60"
 OBSTACLE = "#6E7F91"
-REGION = "#8A8A8A"  # boxes to cover
-WAY = "#111111"  # path of the tip on a move
 JOINT = {"x": "#D55E00", "y": "#0072B2", "z": "#009E73"}
 JOINT_LABEL = {"x": "R (roll, x)", "y": "P (pitch, y)", "z": "Y (yaw, z)"}
 
@@ -82,6 +80,11 @@ class Line(NamedTuple):
     colour: str
     pattern: Any
     marker: str
+
+    @property
+    def curve(self) -> dict[str, Any]:
+        """Arguments of a line plot, apart from its marker."""
+        return {"color": self.colour, "linestyle": self.pattern, "linewidth": 1.5, "markersize": 4}
 
 
 _LINES = (
