@@ -14,7 +14,7 @@ from armwright.problem.objectives import MAX_OBJECTIVES, OBJECTIVES, PAPER_OBJEC
 from armwright.robot.actuators import ActuatorRecord, catalogue
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
-from armwright.tasks.task import MOST_TARGETS, Task
+from armwright.tasks.task import MAX_TARGETS, Task
 from armwright.text import end_of, fence
 
 LONGEST_DESCRIPTION = 10_000  # characters; longer ones hold points, which `armwright init --from` reads
@@ -49,7 +49,7 @@ def draft_prompt(description: str) -> str:
     values = {
         "description": shown,
         "fence": fence(shown),
-        "most_targets": MOST_TARGETS,
+        "most_targets": MAX_TARGETS,
         "reach": space.max_reach,
         "bases": ", ".join(f"{low:g} <= {axis} <= {high:g}" for axis, (low, high) in zip("xyz", ranges, strict=True)),
         "toy": space.mass.description,

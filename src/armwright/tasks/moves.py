@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 
 MOVE_STEP = 0.02  # [m] largest distance between two samples of a line
-MOST_STEPS = 200  # per move
-MOST_SAMPLES = 10_000  # of all moves
-LONGEST_TIME = 1e4  # [s] of a move
-FEWEST_PARTS = 32  # of a timed line; a line of fewer steps is also evaluated between its samples
+MAX_STEPS = 200  # per move
+MAX_SAMPLES = 10_000  # of all moves
+MAX_TIME = 1e4  # [s] of a move
+MIN_PARTS = 32  # of a timed line; a line of fewer steps is also evaluated between its samples
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def time_samples(moves: Moves, lines: MoveSamples) -> MoveTiming:
     shares: list[Array] = []
     for first, end in zip(lines.first, lines.first[1:], strict=False):
         steps = int(end - first) - 1
-        parts = math.ceil(FEWEST_PARTS / steps)
+        parts = math.ceil(MIN_PARTS / steps)
         number = np.arange(steps * parts + 1)
         shares.append(number / (steps * parts))
         sample.append(first + number // parts)
@@ -138,8 +138,8 @@ def check_times(times: float | tuple[float, ...], moves: int) -> None:
     if isinstance(times, tuple) and len(times) != moves:
         raise ValueError(f"move_time: expected 1 or {moves} values [s], got {len(times)}")
     for time in times if isinstance(times, tuple) else (times,):
-        if not 0.0 < time <= LONGEST_TIME:
-            raise ValueError(f"move_time: expected above 0 and at most {LONGEST_TIME:g} s, got {time:g} s")
+        if not 0.0 < time <= MAX_TIME:
+            raise ValueError(f"move_time: expected above 0 and at most {MAX_TIME:g} s, got {time:g} s")
 
 
 def check_moves(pairs: Sequence[tuple[int, int]], targets: Sequence[tuple[float, float, float]], step: float) -> None:
@@ -157,15 +157,15 @@ def check_moves(pairs: Sequence[tuple[int, int]], targets: Sequence[tuple[float,
         length = math.dist(targets[start - 1], targets[end - 1])
         if length == 0.0:
             raise ValueError(f"move {number} = [{start}, {end}]: the targets are at the same position")
-        if count_steps(length, step) > MOST_STEPS:
+        if count_steps(length, step) > MAX_STEPS:
             raise ValueError(
-                f"move {number} = [{start}, {end}] is {length:.4g} m long, more than {MOST_STEPS} steps of {step:g} m; "
-                f"try move_step: {_rounded_up(length / MOST_STEPS):g}"
+                f"move {number} = [{start}, {end}] is {length:.4g} m long, more than {MAX_STEPS} steps of {step:g} m; "
+                f"try move_step: {_rounded_up(length / MAX_STEPS):g}"
             )
         n_samples += count_steps(length, step) + 1
-        if n_samples > MOST_SAMPLES:
+        if n_samples > MAX_SAMPLES:
             raise ValueError(
-                f"moves: expected at most {MOST_SAMPLES} samples in all; try fewer moves or move_step > {step:g} m"
+                f"moves: expected at most {MAX_SAMPLES} samples in all; try fewer moves or move_step > {step:g} m"
             )
 
 

@@ -11,19 +11,16 @@ from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import did_you_mean
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
+from armwright.tasks.targets import MAX_COORDINATE, Coordinate, Point, Position
 from armwright.yaml_documents import check_document
 
-Point = tuple[float, float, float]
 Shape = Literal["box", "sphere", "cylinder", "ground"]
 
 SHAPES: tuple[Shape, ...] = ("box", "sphere", "cylinder", "ground")
-MOST_OBSTACLES = 100
-LARGEST = 1000.0  # [m], of coordinates and sizes
+MAX_OBSTACLES = 100
 
-Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]  # [m]
-Size = Annotated[float, Field(gt=0.0, le=LARGEST)]  # [m]
+Size = Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)]  # [m]
 Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]  # [rad]
-Position = tuple[Coordinate, Coordinate, Coordinate]
 Name = Annotated[str, Field(pattern=r"^([A-Za-z0-9][A-Za-z0-9 ._-]{0,39})?$")]
 
 
@@ -45,11 +42,24 @@ class Solid:
     half: Point
 
 
-class Box(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+class Record(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """The fields that obstacles of all kinds have."""
+
+    kind: Shape
+    name: Name = ""  # for messages and drawings
+
+    def describe(self) -> str:
+        """Return a description on one line."""
+        return f"{self.name}: {self._describe()}" if self.name else self._describe()
+
+    def _describe(self) -> str:
+        raise NotImplementedError
+
+
+class Box(Record, frozen=True):
     """A box about its centre, rotated by yaw, or by roll, pitch and yaw as in URDF."""
 
     kind: Literal["box"]
-    name: Name = ""  # for messages and drawings
     center: Position  # [m]
     size: tuple[Size, Size, Size]  # along its own axes
     yaw: Angle = 0.0  # about z
@@ -66,22 +76,18 @@ class Box(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         x, y, z = self.size
         return Solid("box", self.center, rotation_from_rpy(*(self.rpy or (0.0, 0.0, self.yaw))), (x / 2, y / 2, z / 2))
 
-    def describe(self) -> str:
-        """Return a description on one line."""
+    def _describe(self) -> str:
         x, y, z = self.size
         rotation = f", turned by yaw {self.yaw:g} rad" if self.yaw else ""
         if self.rpy is not None:
             rotation = f", turned by roll, pitch, yaw {_point(self.rpy)} rad"
-        return (
-            f"{_prefix(self.name)}box of {x:g} x {y:g} x {z:g} m (along x, y, z) about {_point(self.center)}{rotation}"
-        )
+        return f"box of {x:g} x {y:g} x {z:g} m (along x, y, z) about {_point(self.center)}{rotation}"
 
 
-class Sphere(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+class Sphere(Record, frozen=True):
     """A sphere about its centre."""
 
     kind: Literal["sphere"]
-    name: Name = ""  # for messages and drawings
     center: Position  # [m]
     radius: Size
 
@@ -89,16 +95,14 @@ class Sphere(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def solid(self) -> Solid:
         return Solid("sphere", self.center, np.eye(3), (self.radius, self.radius, self.radius))
 
-    def describe(self) -> str:
-        """Return a description on one line."""
-        return f"{_prefix(self.name)}sphere of radius {self.radius:g} m about {_point(self.center)}"
+    def _describe(self) -> str:
+        return f"sphere of radius {self.radius:g} m about {_point(self.center)}"
 
 
-class Cylinder(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+class Cylinder(Record, frozen=True):
     """A cylinder about its centre. axis: its direction, a letter or a vector of any length."""
 
     kind: Literal["cylinder"]
-    name: Name = ""  # for messages and drawings
     center: Position  # [m]
     radius: Size
     height: Size
@@ -115,29 +119,26 @@ class Cylinder(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         axis = np.eye(3)["xyz".index(self.axis)] if isinstance(self.axis, str) else np.array(self.axis)
         return Solid("cylinder", self.center, rotation_to_axis(axis), (self.radius, self.radius, self.height / 2))
 
-    def describe(self) -> str:
-        """Return a description on one line."""
+    def _describe(self) -> str:
         axis = self.axis if isinstance(self.axis, str) else _point(self.axis)
         return (
-            f"{_prefix(self.name)}cylinder of radius {self.radius:g} m and height {self.height:g} m about "
+            f"cylinder of radius {self.radius:g} m and height {self.height:g} m about "
             f"{_point(self.center)}, its axis along {axis}"
         )
 
 
-class Ground(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+class Ground(Record, frozen=True):
     """Everything below a height, such as a floor or an endless table top."""
 
     kind: Literal["ground"]
-    name: Name = ""  # for messages and drawings
     z: Coordinate = 0.0  # everything below is solid
 
     @property
     def solid(self) -> Solid:
         return Solid("ground", (0.0, 0.0, self.z), np.eye(3), (0.0, 0.0, 0.0))
 
-    def describe(self) -> str:
-        """Return a description on one line."""
-        return f"{_prefix(self.name)}ground, solid everywhere below z = {self.z:g} m"
+    def _describe(self) -> str:
+        return f"ground, solid everywhere below z = {self.z:g} m"
 
 
 Obstacle = Annotated[Box | Sphere | Cylinder | Ground, Field(discriminator="kind")]
@@ -166,7 +167,3 @@ def read_obstacle(record: Any, number: int) -> Any:
 
 def _point(values: Point) -> str:
     return "(" + ", ".join(f"{value:g}" for value in values) + ")"
-
-
-def _prefix(name: str) -> str:
-    return f"{name}: " if name else ""

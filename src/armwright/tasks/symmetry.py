@@ -1,12 +1,16 @@
 """Symmetry planes of a set of points, which mirror the set onto itself."""
 
+from typing import cast
+
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from armwright.arrays import Array
 
 TOLERANCE = 1e-6  # [m]
 ROUGH = 1e-5  # [m]; a candidate plane within it is refined on all the pairs that it mirrors
-MOST_CANDIDATES = 2000  # otherwise thousands of points on a circle take minutes
+MAX_CANDIDATES = 2000  # otherwise thousands of points on a circle take minutes
 
 
 def symmetry_planes(points: Array) -> Array:
@@ -63,7 +67,7 @@ def _candidates(offsets: Array) -> Array:
         moves = offsets[np.abs(distance - distance[row]) <= ROUGH] - offsets[row]
         length = np.linalg.norm(moves, axis=1)
         normals.append(moves[length > ROUGH] / length[length > ROUGH, None])
-    return np.vstack(normals)[:MOST_CANDIDATES]
+    return np.vstack(normals)[:MAX_CANDIDATES]
 
 
 def _basis(offsets: Array) -> list[int]:
@@ -108,19 +112,10 @@ def _mirrored(offsets: Array, normal: Array) -> Array:
     return offsets - 2.0 * np.outer(offsets @ normal, normal)
 
 
-def _partners(offsets: Array, mirrored: Array, tolerance: float) -> np.ndarray | None:
+def _partners(offsets: Array, mirrored: Array, tolerance: float) -> NDArray[np.intp] | None:
     """Return (T,) the index of the offset at each mirrored one; None if one has none within `tolerance` [m]."""
-    # Sorted along a direction that no grid has, a point's partner is among the few at its own height.
-    along = np.array([0.5377, 0.6613, 0.5227])
-    order = np.argsort(offsets @ along)
-    heights, mirrored_heights = (offsets @ along)[order], mirrored @ along
-    first, last = (np.searchsorted(heights, mirrored_heights + sign * tolerance) for sign in (-1.0, 1.0))
-    partners = np.full(len(offsets), -1)
-    for step in range(int((last - first).max(initial=0))):
-        row = order[np.minimum(first + step, len(order) - 1)]
-        matches = (np.linalg.norm(offsets[row] - mirrored, axis=1) <= tolerance) & (first + step < last)
-        partners[matches] = row[matches]
-    return partners if np.all(partners >= 0) else None
+    distances, partners = cast("tuple[Array, NDArray[np.intp]]", KDTree(offsets).query(mirrored))
+    return partners if distances.max() <= tolerance else None
 
 
 def _with_positive_sign(normal: Array) -> Array:

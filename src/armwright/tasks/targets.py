@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,12 @@ from pydantic import BaseModel, Field, GetJsonSchemaHandler, model_serializer, m
 from armwright.arrays import Array
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
 
-Point = tuple[float, float, float]
+MAX_COORDINATE = 1000.0  # [m]
+MAX_WEIGHT = 1e6
 
-LARGEST_COORDINATE = 1000.0  # [m]
-LARGEST_WEIGHT = 1e6
+Point = tuple[float, float, float]
+Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]  # [m]
+Position = tuple[Coordinate, Coordinate, Coordinate]
 
 REACHED = 1e-3  # [m]; a target nearer than this counts as reached
 ALIGNED = math.radians(1.0)  # [rad]; likewise for a target's axis or orientation
@@ -73,15 +75,15 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     position: Point
     axis: Point | None = None
     orientation: Point | None = None
-    tolerance: float = Field(default=REACHED, gt=0.0, le=LARGEST_COORDINATE)
+    tolerance: float = Field(default=REACHED, gt=0.0, le=MAX_COORDINATE)
     angle_tolerance: float = Field(default=ALIGNED, gt=0.0, le=math.pi)
-    weight: float = Field(default=1.0, gt=0.0, le=LARGEST_WEIGHT)
+    weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.axis is not None and self.orientation is not None:
             raise ValueError("expected axis or orientation, got both; an orientation states all axes")
-        if self.axis is not None and not 1e-6 <= math.hypot(*self.axis) <= LARGEST_COORDINATE:
+        if self.axis is not None and not 1e-6 <= math.hypot(*self.axis) <= MAX_COORDINATE:
             raise ValueError(f"axis = {list(self.axis)} is no direction; try [0, 0, -1] for a tool that points down")
         if self.orientation is not None and max(map(abs, self.orientation)) > 2 * math.pi:
             raise ValueError(
@@ -163,14 +165,6 @@ def stack_targets(records: tuple[Target | None, ...], restarts: int) -> TargetAr
     )
 
 
-@lru_cache
 def position_targets(n: int, restarts: int = 0) -> TargetArrays:
     """Return the arrays of `n` points, whose tolerances and weights are the defaults."""
-    return TargetArrays(
-        n_angular=np.zeros(n, dtype=np.intp),
-        rotation=np.broadcast_to(np.eye(3), (n, 3, 3)),
-        tolerance=np.full(n, REACHED),
-        angle_tolerance=np.full(n, ALIGNED),
-        weight=np.ones(n),
-        restarts=restarts,
-    )
+    return stack_targets((None,) * n, restarts)

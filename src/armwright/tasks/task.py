@@ -16,23 +16,23 @@ from pydantic import (
 
 from armwright.files import check_name
 from armwright.tasks.moves import MOVE_STEP, Moves, check_moves, check_times
-from armwright.tasks.obstacles import MOST_OBSTACLES, Obstacle, read_obstacle
+from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, read_obstacle
 from armwright.tasks.targets import (
-    LARGEST_COORDINATE,
+    MAX_COORDINATE,
     Point,
     Target,
     TargetArrays,
     position_targets,
     stack_targets,
 )
-from armwright.tasks.workspace import MOST_POINTS, MOST_REGIONS, Region
+from armwright.tasks.workspace import MAX_POINTS, MAX_REGIONS, Region
 from armwright.yaml_documents import check_document
 
-LARGEST_PAYLOAD = 1e4  # [kg]
-MOST_TIMES_PAYLOAD = 100.0
-LARGEST_NOISE = 1.0  # [m]
-MOST_TARGETS = 10_000
-MOST_RESTARTS = 100
+MAX_PAYLOAD = 1e4  # [kg]
+MAX_PAYLOAD_FACTOR = 100.0
+MAX_NOISE = 1.0  # [m]
+MAX_TARGETS = 10_000
+MAX_RESTARTS = 100
 IN_ORDER = "in_order"  # of moves: from each target to the next
 
 
@@ -58,14 +58,14 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # also names run folders
     targets: tuple[Point, ...]
     payload: float | tuple[float, ...] = 0.0
-    payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MOST_TIMES_PAYLOAD)], ...] = Field(
+    payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MAX_PAYLOAD_FACTOR)], ...] = Field(
         default=(), max_length=10
     )
-    target_noise: float = Field(default=0.0, ge=0.0, le=LARGEST_NOISE)
+    target_noise: float = Field(default=0.0, ge=0.0, le=MAX_NOISE)
     obstacles: tuple[Obstacle, ...] = ()
-    restarts: int = Field(default=0, ge=0, le=MOST_RESTARTS)
+    restarts: int = Field(default=0, ge=0, le=MAX_RESTARTS)
     moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
-    move_step: Annotated[float, Field(gt=0.0, le=LARGEST_COORDINATE)] = MOVE_STEP
+    move_step: Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)] = MOVE_STEP
     move_time: float | tuple[float, ...] | None = None
     workspace: tuple[Region, ...] = ()
     objectives: tuple[str, ...] | None = None
@@ -107,8 +107,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if not isinstance(value, (list, tuple)):
             raise ValueError("obstacles: expected a list of records, such as {kind: ground, z: 0.0}")
         records = cast("list[Any]", value)
-        if len(records) > MOST_OBSTACLES:
-            raise ValueError(f"obstacles: expected at most {MOST_OBSTACLES} records, got {len(records)}")
+        if len(records) > MAX_OBSTACLES:
+            raise ValueError(f"obstacles: expected at most {MAX_OBSTACLES} records, got {len(records)}")
         return [read_obstacle(record, number) for number, record in enumerate(records, start=1)]
 
     @model_validator(mode="before")
@@ -128,8 +128,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @classmethod
     def _check_workspace(cls, value: Any) -> Any:
         regions = _listed(value)
-        if len(regions) > MOST_REGIONS:
-            raise ValueError(f"workspace: expected at most {MOST_REGIONS} boxes, got {len(regions)}")
+        if len(regions) > MAX_REGIONS:
+            raise ValueError(f"workspace: expected at most {MAX_REGIONS} boxes, got {len(regions)}")
         return regions
 
     @field_validator("moves", mode="before")
@@ -146,26 +146,26 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def _check_numbers(self) -> Self:
         if not self.targets:
             raise ValueError("targets is empty: give at least one point [x, y, z] in metres")
-        if len(self.targets) > MOST_TARGETS:
-            raise ValueError(f"targets: expected at most {MOST_TARGETS} points, got {len(self.targets)}")
+        if len(self.targets) > MAX_TARGETS:
+            raise ValueError(f"targets: expected at most {MAX_TARGETS} points, got {len(self.targets)}")
         for number, point in enumerate(self.targets, start=1):
-            if max(abs(c) for c in point) > LARGEST_COORDINATE:
+            if max(abs(c) for c in point) > MAX_COORDINATE:
                 raise ValueError(
-                    f"target {number} = {list(point)} m is more than {LARGEST_COORDINATE:g} m away; "
+                    f"target {number} = {list(point)} m is more than {MAX_COORDINATE:g} m away; "
                     "coordinates are in metres (armwright init --from FILE --unit mm converts)"
                 )
         payloads = self.payload if isinstance(self.payload, tuple) else (self.payload,)
         if isinstance(self.payload, tuple) and len(self.payload) != len(self.targets):
             raise ValueError(f"payload: expected 1 or {len(self.targets)} values [kg], got {len(self.payload)}")
-        if not all(0.0 <= kg <= LARGEST_PAYLOAD for kg in payloads):
-            raise ValueError(f"payload: expected 0 to {LARGEST_PAYLOAD:g} kg, got {self.payload} kg")
+        if not all(0.0 <= kg <= MAX_PAYLOAD for kg in payloads):
+            raise ValueError(f"payload: expected 0 to {MAX_PAYLOAD:g} kg, got {self.payload} kg")
         if self.moves == IN_ORDER and len(self.targets) < 2:
             raise ValueError(f"moves: {IN_ORDER} needs at least two targets")
         check_moves([(start + 1, end + 1) for start, end in self.straight_moves.pairs], self.targets, self.move_step)
         if self.move_time is not None:
             check_times(self.move_time, len(self.straight_moves))
-        if sum(region.points for region in self.workspace) > MOST_POINTS:
-            raise ValueError(f"workspace: expected at most {MOST_POINTS} points in all boxes together")
+        if sum(region.points for region in self.workspace) > MAX_POINTS:
+            raise ValueError(f"workspace: expected at most {MAX_POINTS} points in all boxes together")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
             raise ValueError(f"reference_point: expected values above 0, got {list(self.reference_point)}")
         return self

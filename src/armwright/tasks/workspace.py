@@ -4,20 +4,13 @@ from itertools import product
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.arrays import Array
+from armwright.tasks.targets import Position
 
-LARGEST = 1000.0  # [m], of coordinates
-MOST_POINTS = 10_000
-MOST_REGIONS = 20
-USUAL_POINTS = 200
-
-Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]  # [m]
-Position = tuple[Coordinate, Coordinate, Coordinate]
-
-BASES = (2, 3, 5)  # of Halton's sequence, for x, y and z
+MAX_POINTS = 10_000
+MAX_REGIONS = 20
 
 
 class Region(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -25,7 +18,7 @@ class Region(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     low: Position  # smallest x, y and z [m]
     high: Position  # largest x, y and z [m]
-    points: Annotated[int, Field(ge=1, le=MOST_POINTS)] = USUAL_POINTS  # samples of it
+    points: Annotated[int, Field(ge=1, le=MAX_POINTS)] = 200  # number of samples
 
     @model_validator(mode="after")
     def _check_corners(self) -> Self:
@@ -48,19 +41,10 @@ class Region(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
 def sample_regions(regions: tuple[Region, ...]) -> Array:
     """Return (W, 3) points spread evenly over each region by Halton's sequence, without its first point [m]."""
+    from scipy.stats import qmc  # takes half a second to import
+
     parts = [np.zeros((0, 3))]
     for region in regions:
-        low, high = np.array(region.low), np.array(region.high)
-        shares = np.column_stack([_radical_inverse(np.arange(1, region.points + 1), base) for base in BASES])
-        parts.append(low + (high - low) * shares)
+        shares = qmc.Halton(3, scramble=False).fast_forward(1).random(region.points)
+        parts.append(np.array(region.low) + (np.array(region.high) - np.array(region.low)) * shares)
     return np.concatenate(parts)
-
-
-def _radical_inverse(numbers: NDArray[np.int64], base: int) -> Array:
-    """Return the radical inverses (n,) of numbers: their digits in reverse order behind the point."""
-    inverses, digit = np.zeros(len(numbers)), 1.0
-    while numbers.any():
-        digit /= base
-        inverses += digit * (numbers % base)
-        numbers = numbers // base
-    return inverses
