@@ -8,17 +8,26 @@ import gc
 import signal
 import sys
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser
 
 from tests.support import browser as browsers
 from tests.support.chat_server import ChatServer
 
+# The same examples each time, however busy the machine is. `make fuzz` looks for new ones.
+settings.register_profile(
+    "tests", deadline=None, derandomize=True, database=None, max_examples=50, suppress_health_check=list(HealthCheck)
+)
+settings.load_profile("tests")
+
 SLOW_FOLDERS = frozenset({"torture", "fuzz"})
 SLOW_FIXTURES = frozenset({"browser", "guide", "shell"})
+_homes = count()
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -33,8 +42,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture(autouse=True)
 def _own_home(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test sees the user's models and keys, and none can call a real model."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.mktemp("config")))
+    """Hide the user's models and keys: no test can call a real model."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.getbasetemp() / f"config-{next(_homes)}"))
     for name in ("ARMWRIGHT_MODEL", "ARMWRIGHT_BASE_URL", "ARMWRIGHT_API_KEY", "OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
         monkeypatch.delenv(name, raising=False)
 

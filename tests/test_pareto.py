@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from pymoo.indicators.hv import HV
@@ -20,7 +20,6 @@ from armwright.pareto import (
 )
 
 REFERENCE = (5.0, 5.0)
-EXAMPLES = settings(deadline=None, max_examples=200, derandomize=True, database=None)
 
 # A coarse grid, so that duplicates, ties in one objective and points on the box's edge are common.
 POINTS = arrays(float, st.tuples(st.integers(1, 25), st.just(2)), elements=st.integers(0, 24).map(lambda i: i / 4))
@@ -32,7 +31,6 @@ def dominates(a: np.ndarray, b: np.ndarray) -> bool:
     return bool(np.all(a <= b) and np.any(a < b))
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_front_is_pymoos_without_later_duplicates(values: np.ndarray) -> None:
     front = set(NonDominatedSorting().do(values, only_non_dominated_front=True).tolist())
@@ -40,7 +38,6 @@ def test_front_is_pymoos_without_later_duplicates(values: np.ndarray) -> None:
     assert set(np.flatnonzero(front_mask(values)).tolist()) == first
 
 
-@EXAMPLES
 @given(POINTS)
 def test_front_by_its_definition(values: np.ndarray) -> None:
     """Nothing beats a member; whatever is left out is beaten by a member, or equal to an earlier one."""
@@ -53,7 +50,6 @@ def test_front_by_its_definition(values: np.ndarray) -> None:
             assert any(dominates(values[k], row) or (k < i and np.array_equal(values[k], row)) for k in members)
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_front_numbers_rise_in_the_first_objective_and_fall_in_the_second(values: np.ndarray) -> None:
     front = values[front_indices(values)]
@@ -61,7 +57,6 @@ def test_front_numbers_rise_in_the_first_objective_and_fall_in_the_second(values
     assert np.all(np.diff(front[:, 1]) < 0)
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_hypervolume_is_pymoos(values: np.ndarray) -> None:
     inside = values[np.all(values < REFERENCE, axis=1)]
@@ -69,7 +64,6 @@ def test_hypervolume_is_pymoos(values: np.ndarray) -> None:
     assert hypervolume(values, REFERENCE) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE, st.randoms(use_true_random=False))
 def test_order_and_duplicates_do_not_matter(values: np.ndarray, random: object) -> None:
     order = list(range(len(values))) * 2
@@ -80,7 +74,6 @@ def test_order_and_duplicates_do_not_matter(values: np.ndarray, random: object) 
     assert front_mask(again).sum() == front_mask(values).sum()
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_points_outside_the_box_count_nothing(values: np.ndarray) -> None:
     """On its edge neither: they bound no area."""
@@ -90,7 +83,6 @@ def test_points_outside_the_box_count_nothing(values: np.ndarray) -> None:
     assert hypervolume(outside, REFERENCE) == 0.0
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_history_is_the_hypervolume_of_every_beginning(values: np.ndarray) -> None:
     history = hypervolume_history(values, REFERENCE)
@@ -99,7 +91,6 @@ def test_history_is_the_hypervolume_of_every_beginning(values: np.ndarray) -> No
     assert np.all((history >= 0.0) & (history <= 25.0))
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_tracker_holds_the_front_at_every_moment(values: np.ndarray) -> None:
     tracker = FrontTracker(2, None)
@@ -112,7 +103,6 @@ def test_tracker_holds_the_front_at_every_moment(values: np.ndarray) -> None:
         assert tracker.hypervolume == pytest.approx(hypervolume(values, bound), rel=1e-12)
 
 
-@EXAMPLES
 @given(POINTS)
 def test_inputs_are_left_as_they_are(values: np.ndarray) -> None:
     before = values.copy()
@@ -147,7 +137,6 @@ def test_nothing_evaluated_yet() -> None:
     assert FrontTracker(2, REFERENCE).hypervolume == 0.0
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_default_reference_point_bounds_the_front(values: np.ndarray) -> None:
     """1.1 times the worst values on the front; what is dominated does not move it; never 0."""
@@ -160,7 +149,6 @@ def test_default_reference_point_bounds_the_front(values: np.ndarray) -> None:
         assert hypervolume(values, point) > 0.0
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_solutions_are_the_ends_of_the_front_in_the_box(values: np.ndarray) -> None:
     """docs/method.md §7: the front's designs of least E_pos and of least E_torque within the reference box."""
@@ -173,7 +161,6 @@ def test_solutions_are_the_ends_of_the_front_in_the_box(values: np.ndarray) -> N
     assert all(type(number) is int for number in solutions)
 
 
-@EXAMPLES
 @given(POINTS | ANYWHERE)
 def test_knee_is_farthest_below_the_line_between_the_ends(values: np.ndarray) -> None:
     inside = [i for i in front_indices(values) if np.all(values[i] < REFERENCE)]

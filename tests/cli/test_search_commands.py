@@ -10,15 +10,15 @@ from tests.support.command_line import armwright, refused
 
 
 def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> None:
-    done = armwright("design", "target-1", "--budget", "3000", "--seed", "4", "--no-figures")
+    done = armwright("design", "target-1", "--budget", "400", "--seed", "4", "--no-figures")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     for words in ("of the best known hypervolume", "robust", "sensitive", "budget spent", "a toy"):
         assert words in done.stdout
     assert (in_folder / "runs" / "target-1-front-seed4" / "summary.json").is_file()
-    more = armwright("design", "target-1", "--budget", "4000", "--seed", "4", "--no-figures", "--json")
+    more = armwright("design", "target-1", "--budget", "800", "--seed", "4", "--no-figures", "--json")
     summary = json.loads(more.stdout)
-    assert summary["search"]["evaluations"] >= 4000
+    assert summary["search"]["evaluations"] >= 800
     assert summary["folder"] == "runs/target-1-front-seed4"
 
     armwright("optimize", "target-1", *SHORT, "--out", "mine")
@@ -33,7 +33,7 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     again = armwright("optimize", "target-1", *SHORT, "--out", "mine")
     assert "is finished; nothing was computed again" in again.stdout
 
-    from_run = armwright("design", "target-1", "--budget", "500", "--from", "mine", "--no-figures", "--out", "from-run")
+    from_run = armwright("design", "target-1", "--budget", "300", "--from", "mine", "--no-figures", "--out", "from-run")
     assert from_run.returncode == 0, from_run.stderr
 
 

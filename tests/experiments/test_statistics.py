@@ -4,7 +4,7 @@ import gc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
@@ -20,7 +20,6 @@ def test_holm_is_that_of_statsmodels(p_values: list[float]) -> None:
     assert holm(p_values) == pytest.approx(multipletests(p_values, method="holm")[1], abs=1e-12)
 
 
-@settings(deadline=None)
 @given(st.lists(VALUES, min_size=3, max_size=15), st.integers(0, 2**32 - 1))
 def test_an_interval_holds_its_mean_and_is_the_same_again(values: list[float], seed: int) -> None:
     found = interval(values, seed)

@@ -143,7 +143,7 @@ def test_one_link_and_one_obstacle(kind: str) -> None:
 @pytest.mark.parametrize("dof", [3, 6, 8])
 def test_whole_arms(dof: int, precision: Precision) -> None:
     rng = np.random.default_rng(dof)
-    arms = [*moving_arms(40, dof, 1), *(paper_space(dof).arm(design) for design in paper_space(dof).sample(40, 1))]
+    arms = [*moving_arms(12, dof, 1), *(paper_space(dof).arm(design) for design in paper_space(dof).sample(12, 1))]
     obstacles = [random_obstacle(rng, kind, 1.0) for kind in (*SHAPES[:3], *SHAPES[:3])]
     q = random_postures(arms, 3, 5)
     own, clear = clearances(stack_arms(arms, precision), q, obstacles)
@@ -156,7 +156,7 @@ def test_whole_arms(dof: int, precision: Precision) -> None:
             free += min(theirs) > NEAR
             assert agree(own[n, t], theirs[0]) or own[n, t] == theirs[0] == np.inf
             assert agree(clear[n, t], theirs[1])
-    assert 20 < free < 230, "some arms are free, some are not"
+    assert 6 < free < 69, "some arms are free, some are not"
 
 
 def test_nearly_parallel_and_touching_segments() -> None:
@@ -172,7 +172,7 @@ def test_nearly_parallel_and_touching_segments() -> None:
     own = clearances(stack_arms(arms), q)[0]
     exact = clearances(stack_arms(arms, "float64"), q)[0]
     assert own == pytest.approx(exact, abs=1e-5)
-    for n in range(0, 1500, 5):
+    for n in range(0, 1500, 15):
         assert agree(own[n, 0], expected_self(places_of(arms[n], q[n, 0]), [0.01] * 3))
 
 

@@ -54,11 +54,11 @@ def load(arm: Arm) -> float:
 @MAKERS
 @DOFS
 def test_tip_and_torque_agree_with_pinocchio_and_mujoco(dof: int, arms_of: ArmMaker) -> None:
-    """8 x 2 x 63 arms: tip within 1e-5 m; torque within 1e-4 of its norm (or of 1 % of the arm's load if larger).
+    """8 x 2 x 20 arms: tip within 1e-5 m; torque within 1e-4 of its norm (or of 1 % of the arm's load if larger).
 
     The torque holds the posture: +dV/dq, as Pinocchio's computeGeneralizedGravity and MuJoCo's qfrc_bias at rest.
     """
-    arms = arms_of(63, dof, 1)
+    arms = arms_of(20, dof, 1)
     targets = np.random.default_rng(dof).uniform(-1.0, 1.0, (2, 3))
     postures = solve_postures(stack_arms(arms), targets)
     for arm, q_of, reached_of, torque_of in zip(arms, postures.q, postures.reached, postures.torque, strict=True):
@@ -74,11 +74,11 @@ def test_tip_and_torque_agree_with_pinocchio_and_mujoco(dof: int, arms_of: ArmMa
 @MAKERS
 @DOFS
 def test_reference_agrees_with_pinocchio_and_mujoco(dof: int, arms_of: ArmMaker) -> None:
-    """8 x 2 x 63 arms: the reference's tip, position Jacobian and torque, in float64.
+    """8 x 2 x 20 arms: the reference's tip, position Jacobian and torque, in float64.
 
     The kernels' Jacobian never leaves them; it is compared with the reference's by single updates.
     """
-    arms = arms_of(63, dof, 2)
+    arms = arms_of(20, dof, 2)
     chains = reference.chains(arms)
     q = np.random.default_rng(dof).uniform(chains.lower, chains.upper)
     tip, jacobian, torque = (f(chains, q)[:, 0] for f in (reference.tip, reference.jacobian, reference.gravity_torque))
@@ -143,12 +143,12 @@ def test_planar_two_link_arm() -> None:
 def test_single_updates_agree_with_the_reference(dof: int, arms_of: ArmMaker) -> None:
     """dq = J# dx + (I - J# J) y from random (q, H before): within 1e-4 rad, and 1 + H within 5e-5 of itself.
 
-    Where m > 0.01, for all but 1 in 2,000 at the most (some 1 in 80,000 were seen); it holds below too, and for D < 3,
-    where m is 0 and the damping always full. Left out of the strict bound are updates that no float32 Jacobian
-    determines: those, rare, in which a joint near its limit (w down to 2.5e-4) is needed for a direction while k = 0,
-    so that J W Jᵀ + k I has a root below 0.01 m.
+    This also holds for D < 3, where m is 0 and the damping is always full. The bound excludes updates that a float32
+    Jacobian does not determine: a joint near its limit (w down to 2.5e-4) is needed for a direction while k = 0, so
+    that J W Jᵀ + k I has a root below 0.01 m. With m > 0.01 these are rare (about 1 in 80,000), and none is among
+    these arms.
     """
-    arms = arms_of(4000, dof, 5)
+    arms = arms_of(1000, dof, 5)
     arrays = stack_arms(arms)
     chains = chains_as_stacked(arms, arrays)
     q, h_before, targets = random_states(chains, seed=dof)
@@ -158,8 +158,7 @@ def test_single_updates_agree_with_the_reference(dof: int, arms_of: ArmMaker) ->
     assert determined.mean() > 0.999
     assert np.abs(q_after - expected_q[:, 0])[determined].max() < 1e-4
     manipulable = reference.manipulability(chains, q)[:, 0] > 0.01
-    missed = np.abs(q_after - expected_q[:, 0]).max(axis=1)[manipulable] > 1e-4
-    assert missed.sum() <= len(arms) / 2000
+    assert np.abs(q_after - expected_q[:, 0])[manipulable].max(initial=0.0) < 1e-4
     assert np.abs((h_after - expected_h[:, 0]) / (1.0 + expected_h[:, 0])).max() < 5e-5
 
 
@@ -265,7 +264,16 @@ def test_whole_solves_in_float64_agree_with_the_reference(arms_of: ArmMaker) -> 
     assert np.all((chains.lower <= solved.q) & (solved.q <= chains.upper))
 
 
-@pytest.mark.parametrize(("dof", "bound"), [(1, 1e-5), (2, 1e-5), (3, 1e-3), (6, 3e-3), (8, 3e-3)])
+@pytest.mark.parametrize(
+    ("dof", "bound"),
+    [
+        (1, 1e-5),
+        (2, 1e-5),
+        (3, 1e-3),
+        pytest.param(6, 3e-3, marks=pytest.mark.slow),
+        pytest.param(8, 3e-3, marks=pytest.mark.slow),
+    ],
+)
 def test_other_numbers_of_joints_agree_with_the_reference_in_distribution(dof: int, bound: float) -> None:
     """400 general arms each, 3 targets: the mean errors differ by less than `bound` times the straight start's.
 

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError
@@ -40,7 +40,6 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 reasons = st.text(max_size=400)
 
 
-@settings(deadline=None)
 @given(
     joints=st.integers(1, 8),
     n=st.integers(1, 4),
@@ -62,7 +61,6 @@ def test_what_is_written_is_read_back(
     assert read_text(f"My answer:\n```json\n{written_answers(once, problem)}\n```\n", problem, n)[0].design
 
 
-@settings(deadline=None, max_examples=30)
 @given(joints=st.integers(1, 8), proposals=st.integers(1, 3), expected=st.booleans(), reasoning=st.booleans())
 def test_the_schema_is_what_is_read(joints: int, proposals: int, expected: bool, reasoning: bool) -> None:
     problem = Problem(load_task("target-2"), paper_space(joints))
@@ -324,7 +322,6 @@ def test_garbled_answers_are_read_or_refused() -> None:
     assert 0.05 < sum(outcomes) / len(outcomes) < 0.95
 
 
-@settings(deadline=None, max_examples=200)
 @given(text=st.text(), proposals=st.integers(1, 3))
 def test_any_text_is_read_or_refused(text: str, proposals: int) -> None:
     read_or_refuse(text, proposals)

@@ -54,14 +54,12 @@ every_output = pytest.mark.parametrize("output", OUTPUTS)
 
 
 def spread(cases: Iterable[str], outputs: Sequence[str] = OUTPUTS) -> pytest.MarkDecorator:
-    """The first case over every wire format and output, each other case over one of them in turn."""
+    """Run each case over one wire format and output in turn, and the first (slow) over every combination."""
     first, *others = cases
     ways = list(product(("openai", "anthropic"), outputs))
-    together = [
-        *((*way, first) for way in ways),
-        *((*way, case) for way, case in zip(cycle(ways), others, strict=False)),
-    ]
-    return pytest.mark.parametrize(("wire", "output", "case"), together)
+    everywhere = [pytest.param(*way, first, marks=pytest.mark.slow) for way in ways]
+    in_turn = [(*way, case) for way, case in zip(cycle(ways), others, strict=False)]
+    return pytest.mark.parametrize(("wire", "output", "case"), [*everywhere, *in_turn])
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from tests.support.command_line import PATIENCE
 from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
@@ -150,7 +151,8 @@ def test_a_model_that_fails_before_the_first_trial_is_an_error(chat_server: Chat
     assert (tmp_path / "run" / "trials.jsonl").read_text() == ""
 
 
-def test_a_server_that_is_not_there_is_an_error() -> None:
+def test_unreachable_server_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
     proposer = llm_proposer("http://127.0.0.1:9/v1")
     with pytest.raises(ModelError, match="test-model"):
         optimize(PROBLEM, proposer=proposer, n_total=1)
@@ -160,7 +162,7 @@ def test_a_server_that_hangs_is_an_error(chat_server: ChatServer, monkeypatch: p
     released = threading.Event()
 
     def answer(request: Request) -> Answer:
-        released.wait(30)
+        released.wait(PATIENCE)
         return designer(request)
 
     chat_server.answer = answer
@@ -212,7 +214,10 @@ def test_a_finished_or_extended_run_keeps_its_account(chat_server: ChatServer, t
     assert len(chat_server.requests) == 3
 
 
-def test_after_a_server_that_was_not_there_another_proposer_may_take_the_folder(tmp_path: Path) -> None:
+def test_folder_of_an_unreachable_model_accepts_another_proposer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
     with pytest.raises(ModelError):
         optimize(PROBLEM, proposer=llm_proposer("http://127.0.0.1:9/v1", model="m"), n_total=1, out=tmp_path / "run")
     assert optimize(PROBLEM, proposer="rules", n_init=2, n_total=1, out=tmp_path / "run").trials[2].source == "rules"
@@ -249,7 +254,7 @@ def test_a_wrong_prompt_name_is_refused(chat_server: ChatServer) -> None:
 
 def test_feedback_shows_at_most_five_of_each_and_depends_on_the_seed_alone(chat_server: ChatServer) -> None:
     proposer = llm_proposer(chat_server.url)
-    history = optimize(PROBLEM, proposer="none", n_total=40).history
+    history = optimize(PROBLEM, proposer="none", n_total=20).history
     prompts: list[str] = []
     for seed in (1, 1, 2):
         proposer.propose(history, seed, len(history))

@@ -176,9 +176,12 @@ REFUSED = {
     "long text": (answer_with(task={"description": "w" * 20_000}), "description: String should have at most"),
     "too long": (answer_with(task={"targets": [[0, 0, 0]] * 10_001}), "task: expected an object"),
 }  # fmt: skip
+REFUSED_FAST = ("no task", "unknown key", "payloads", "actuators missing", "price missing", "built-in name", "path")
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in REFUSED_FAST else pytest.mark.slow) for name in REFUSED]
+)
 def test_an_invalid_answer_goes_back_with_the_reason_and_is_never_written(
     chat_server: ChatServer, tmp_path: Path, name: str
 ) -> None:
@@ -234,13 +237,13 @@ def test_line_ends_of_a_description_stay_in_their_comment(chat_server: ChatServe
     assert prompt.count("-" * 13) == 2  # the description cannot leave its lines of dashes
 
 
-@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, some in FAULTS.items() for name in some])
+@pytest.mark.parametrize(("kind", "name"), [(kind, next(iter(faults))) for kind, faults in FAULTS.items()])
 def test_faults_are_one_line_and_write_no_task(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, name: str
 ) -> None:
     monkeypatch.setattr(client, "RETRY_SECONDS", 0.01)
     with pytest.raises(ModelError) as fault:
-        drafted(chat_server, FAULTS[kind][name], tmp_path, timeout=1.0)
+        drafted(chat_server, FAULTS[kind][name], tmp_path, timeout=0.2 if kind == "timeout" else 60.0)
     assert str(fault.value).startswith("no draft: test-model: ")
     assert str(fault.value).endswith("armwright init my-task.yaml writes a task to edit without a model")
     assert "\n" not in str(fault.value)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from armwright.exceptions import ModelError
@@ -35,11 +35,16 @@ from tests.support.wire_formats import WIRES, llm_proposer, proposer
 
 PROBLEM = Problem(load_task("target-1"))
 ENDLESS = ("slow first byte", "dripping body")
-ALL_FAULTS = [pytest.param(kind, name, id=name) for kind, faults in FAULTS.items() for name in faults]
+EVERY_FAULT = [
+    pytest.param(wire, kind, name, id=f"{wire}-{name}", marks=[] if name == next(iter(faults)) else pytest.mark.slow)
+    for wire in ("openai", "anthropic")
+    for kind, faults in FAULTS.items()
+    for name in faults
+]
 
 both_formats = pytest.mark.parametrize("wire", ["openai", "anthropic"])
 every_wire = pytest.mark.parametrize("wire", WIRES)
-every_fault = pytest.mark.parametrize(("kind", "name"), ALL_FAULTS)
+every_fault = pytest.mark.parametrize(("wire", "kind", "name"), EVERY_FAULT)
 
 
 @pytest.fixture(autouse=True)
@@ -92,7 +97,6 @@ def sources(run: StudyResult) -> Sequence[str]:
 
 
 @every_fault
-@both_formats
 def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
@@ -117,7 +121,6 @@ def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
 
 
 @every_fault
-@both_formats
 def test_later_a_fault_is_a_black_box_trial_and_is_counted(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
@@ -343,7 +346,7 @@ def test_whatever_a_server_says_is_an_answer_or_a_fault(
     nameless = [dict(event) for event in streamed_events(message(TEXT, TOOL_CALL))]
     nameless[0]["message"] = {**nameless[0]["message"], "model": True}
 
-    @settings(max_examples=60, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=30)
     @given(st.builds(Response, BODIES, STATUSES, HEADERS, TYPES), st.sampled_from(["reasoning", "answer"]))
     @example(Response(stream(nameless), 200, {}, "text/event-stream"), "answer")
     def check(response: Response, step: str) -> None:

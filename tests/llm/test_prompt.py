@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armwright.exceptions import SettingsError
@@ -423,7 +423,7 @@ hostile = st.sampled_from(
 words = st.lists(st.one_of(hostile, st.text(max_size=30)), max_size=5).map(" ".join)
 
 
-@settings(deadline=None, max_examples=40, suppress_health_check=list(HealthCheck))
+@settings(max_examples=20)
 @given(data=st.data(), space=spaces, n_targets=st.integers(1, 300), proposals=st.integers(1, 100))
 def test_every_problem_is_told_whole_and_short(
     data: st.DataObject, space: DesignSpace, n_targets: int, proposals: int

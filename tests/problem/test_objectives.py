@@ -70,14 +70,19 @@ def bounded(*point: float) -> Task:
     return OPEN.model_copy(update={"reference_point": point})
 
 
-PROBLEMS = [one(OPEN), one(bounded(5.0)), three(OPEN), three(bounded(5.0, 5.0, 60.0))]
-
-
 def short(problem: Problem, n_total: int, out: Path | None = None) -> StudyResult:
     return optimize(problem, proposer="rules", n_init=5, n_step=3, n_total=n_total, out=out)
 
 
-@pytest.mark.parametrize("problem", PROBLEMS)
+@pytest.mark.parametrize(
+    "problem",
+    [
+        one(OPEN),
+        three(bounded(5.0, 5.0, 60.0)),
+        pytest.param(one(bounded(5.0)), marks=pytest.mark.slow),
+        pytest.param(three(OPEN), marks=pytest.mark.slow),
+    ],
+)
 def test_a_run_completes_resumes_and_counts_right(tmp_path: Path, problem: Problem) -> None:
     short(problem, 10, tmp_path / "run")
     run = short(problem, 30, tmp_path / "run")

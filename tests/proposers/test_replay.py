@@ -15,11 +15,13 @@ from armwright.llm.model_options import ModelOptions
 from armwright.llm.transcript import Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.factory import choose_proposer
+from armwright.proposers.proposer import Proposer
 from armwright.proposers.replay import ReplayProposer
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from tests.support.command_line import PATIENCE
 from tests.support.wire_formats import llm_proposer
 
 PROBLEM = Problem(load_task("target-1"))
@@ -90,7 +92,7 @@ def test_late_answers_with_several_designs_are_replayed_when_they_came(chat_serv
 
     def answer(request: Request) -> Answer:
         if len(chat_server.requests) > 1:
-            late.wait(60)
+            late.wait(PATIENCE)
         answered = [{**next(designs).params, "expected_position_error": 1, "expected_torque": 2} for _ in range(2)]
         return json.dumps({"designs": answered}) if "response_format" in request else "ready"
 
@@ -201,7 +203,7 @@ def test_what_a_record_that_was_cut_short_still_owes_is_missing(
     assert lines(tmp_path / "again")[:there] == lines(tmp_path / "first")
     turns = [trial for trial in again.trials if trial.proposal or trial.fault]
     assert len(turns) == 4
-    assert all(trial.fault == "missing" for trial in turns if trial.number >= there)
+    assert {trial.fault for trial in turns if trial.number >= there} == {"missing"}
 
 
 @pytest.mark.parametrize(
@@ -230,27 +232,29 @@ def test_what_a_transcript_cannot_say_is_taken_from_the_wishes(varied: ChatServe
         assert again.summary["proposer"]["failures"] == {}
 
 
-@pytest.mark.parametrize("alone", [False, True])
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [
-        ({"memory": "own"}, "recorded with memory = none; leave out memory = own"),
+def test_options_that_contradict_the_record_are_refused(chat_server: ChatServer, tmp_path: Path) -> None:
+    recorded(chat_server, tmp_path / "first", n_total=1)
+
+    def choose(**option: Any) -> Proposer | None:
+        return choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option)).proposer
+
+    in_transcript = [
         ({"answer": "one-step"}, "recorded with answer = two-step; leave out answer = one-step"),
         ({"proposals": 4}, "recorded with proposals = 1; leave out proposals = 4"),
+    ]
+    in_config = [
+        ({"memory": "own"}, "recorded with memory = none; leave out memory = own"),
         ({"prompt": "minus"}, "recorded with prompt = plus; leave out prompt = minus"),
-    ],
-)
-def test_wishes_that_contradict_the_record_are_refused(
-    chat_server: ChatServer, tmp_path: Path, option: dict[str, Any], words: str, alone: bool
-) -> None:
-    recorded(chat_server, tmp_path / "first", n_total=1)
-    if alone:
-        (tmp_path / "first" / "config.yaml").unlink()
-    if alone and option.keys() & {"prompt", "memory"}:  # which nothing in the transcript says
-        choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option))
-        return
-    with pytest.raises(SettingsError, match=words):
-        choose_proposer(f"replay:{tmp_path / 'first'}", ModelOptions(**option))
+    ]
+    for option, message in (*in_transcript, *in_config):
+        with pytest.raises(SettingsError, match=message):
+            choose(**option)
+    (tmp_path / "first" / "config.yaml").unlink()
+    for option, message in in_transcript:
+        with pytest.raises(SettingsError, match=message):
+            choose(**option)
+    for option, _ in in_config:
+        assert isinstance(choose(**option), ReplayProposer)
 
 
 def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatServer, tmp_path: Path) -> None:

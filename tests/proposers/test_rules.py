@@ -75,7 +75,7 @@ tasks = st.builds(
 
 
 @given(space=spaces, task=tasks, n=st.integers(0, 6))
-@settings(max_examples=8, deadline=None, derandomize=True, database=None)
+@settings(max_examples=8)
 def test_proposals_lie_in_any_space_and_repeat(space: DesignSpace, task: Task, n: int) -> None:
     proposals(history_of(Problem(task, space), n), len(OPENING) + 4)
 

@@ -73,14 +73,14 @@ PROVEN_OF = [*paper_arms(5, 4, 51), *odd_arms(5, 4, 52), *short_arms(30, 53), MI
 
 
 def test_what_is_proven_is_so() -> None:
-    """In 200 postures each, and at the limits: pairs said to meet never or always do as said, and there are both."""
+    """In 50 postures each, and at the limits: pairs said to meet never or always do as said, and there are both."""
     reasons: Counter[str] = Counter()
     for arm in PROVEN_OF:
         geometry = Geometry(arm)
         settled = disabled_collision_pairs(arm)
         reasons.update(settled.values())
         lower, upper = geometry.model.lowerPositionLimit, geometry.model.upperPositionLimit
-        for q in [*postures(arm, 200), lower, upper]:
+        for q in [*postures(arm, 50), lower, upper]:
             for pair, distance in geometry.distances(arm, q).items():
                 if settled.get(pair) == "Never":
                     assert distance > 0.0
@@ -91,22 +91,22 @@ def test_what_is_proven_is_so() -> None:
 
 
 def test_what_is_clear_is_proven() -> None:
-    """Of pairs with two joints between, in 1000 postures: where 5 mm of air are left beyond both radii, it is proven.
+    """Of pairs with two joints between, in 500 postures: where 5 mm of air are left beyond both radii, it is proven.
 
     Beyond the radii, as what is proven is proven of cylinders with round ends.
     """
     clear = 0
-    for arm in short_arms(30, 54):
+    for arm in short_arms(16, 54):
         geometry = Geometry(arm)
         settled, least = disabled_collision_pairs(arm), dict[tuple[int, int], float]()
-        for q in postures(arm, 1000):
+        for q in postures(arm, 500):
             for pair, distance in geometry.distances(arm, q).items():
                 least[pair] = min(distance, least.get(pair, np.inf))
         for (first, second), distance in least.items():
             if second - first == 2 and distance > arm.links[first].radius + arm.links[second].radius + 0.005:
                 clear += 1
                 assert settled[first, second] in ("Never", "Adjacent")  # the latter where all between is fixed
-    assert clear > 3
+    assert clear > 2
 
 
 def test_neighbours_and_what_is_joined_rigidly_are_adjacent() -> None:

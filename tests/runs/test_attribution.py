@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.pareto import front_indices, hypervolume
@@ -12,7 +12,6 @@ from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
 from armwright.tasks.task import Task
 
-EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 BOUNDED = Problem(Task(name="bounded", targets=((0.3, 0.0, 0.3),), reference_point=(5.0, 5.0)))
 OPEN = Problem(Task(name="open", targets=((0.3, 0.0, 0.3),)))
 DESIGN = BOUNDED.space.sample(1, 0)[0]
@@ -32,7 +31,6 @@ def history(trials: list[tuple[str, tuple[int, int]]], problem: Problem = BOUNDE
     )
 
 
-@EXAMPLES
 @given(TRIALS)
 def test_what_the_sources_brought_adds_up_to_the_run(trials: list[tuple[str, tuple[int, int]]]) -> None:
     past = history(trials)
@@ -45,7 +43,6 @@ def test_what_the_sources_brought_adds_up_to_the_run(trials: list[tuple[str, tup
     assert all(g is not None and g >= 0.0 for g in gained)
 
 
-@EXAMPLES
 @given(TRIALS)
 def test_the_curves_add_up_at_every_iteration_and_end_at_the_credit(trials: list[tuple[str, tuple[int, int]]]) -> None:
     past = history(trials)

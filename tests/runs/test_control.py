@@ -56,7 +56,7 @@ from armwright.study.prompt_preview import preview_after
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
-from tests.support.command_line import armwright
+from tests.support.command_line import PATIENCE, armwright
 from tests.support.fixed_problem import FixedProblem, fixed_history
 from tests.support.wire_formats import llm_proposer, model_options
 
@@ -64,7 +64,6 @@ PROBLEM = Problem(load_task("target-1"))
 SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2}
 NOTE = "A note from the engineer who watches this search; take it into account: "
 NOTES = "Notes from the engineer who watches this search; take them into account:\n"
-PATIENCE = 60.0  # [s] for what another thread does
 
 
 def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -> StudyResult:
@@ -164,8 +163,7 @@ def test_ctrl_c_ends_a_paused_study(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert len(run(out, watch=watch).trials) == 13
 
 
-@pytest.mark.parametrize("proposer", ["rules", "none"])
-@pytest.mark.parametrize("number", [0, 3, 4, 6, 11])
+@pytest.mark.parametrize(("proposer", "number"), [("rules", 0), ("none", 3), ("rules", 4), ("rules", 11)])
 def test_a_stopped_study_goes_on_as_if_it_had_not_been(tmp_path: Path, proposer: str, number: int) -> None:
     out = tmp_path / "run"
     with pytest.raises(StoppedError, match=r"stopped as asked; every finished trial is in .*run/, and the same com"):

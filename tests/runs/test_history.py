@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.pareto import FrontTracker
@@ -40,7 +40,6 @@ def assert_same(one: History, other: History) -> None:
     assert [one.has_tried(design) for design in DESIGNS] == [other.has_tried(design) for design in DESIGNS]
 
 
-@settings(deadline=None, max_examples=60)
 @given(trials, st.lists(st.integers(0, 20), max_size=6), st.integers(0, 20), st.data())
 def test_a_history_that_grew_is_the_history_of_all_its_trials(
     rows: list[tuple[object, tuple[int, int], float, str]], steps: list[int], found_at: int, data: st.DataObject

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.problem.problem import Problem
@@ -12,7 +12,6 @@ from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
 from armwright.tasks.catalogue import load_task, random_task
 
-EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 TARGET_2 = Problem(load_task("target-2"))  # symmetric about y = 0, x = 0.5 and its own z = 0.5
 WITHOUT_SYMMETRY = Problem(random_task(0))
 
@@ -29,7 +28,6 @@ def history(designs: list[tuple[str, Design]], problem: Problem = TARGET_2, n_in
     return History(problem, [FinishedTrial(i, s, d, (1.0 + i, 2.0)) for i, (s, d) in enumerate(designs)], n_init)
 
 
-@EXAMPLES
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=8))
 def test_multiples_of_a_step_are_round_however_they_were_computed(steps: list[int]) -> None:
     assert are_round([n * 0.05 for n in steps], 0.05)
@@ -82,7 +80,6 @@ def test_uniform_designs_have_no_habits() -> None:
     assert shares == (0.0, 0.0, 0.0)
 
 
-@EXAMPLES
 @given(st.integers(0, 6), st.floats(-3e-3, 3e-3))
 def test_near_repeats_are_within_a_millimetre_in_every_number(place: int, moved: float) -> None:
     numbers = np.array([0.11, 0.12, 0.13, 0.1, 0.15, 0.2, 0.25])

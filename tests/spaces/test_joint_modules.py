@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.exceptions import DesignError, SpaceError
@@ -163,7 +163,6 @@ def way_of(mount: Any, axis: Any) -> float:
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=50, deadline=None)
 def test_designs_round_trip_through_matrix_and_files(seed: int) -> None:
     (design,) = MIXED.sample(1, seed)
     assert MIXED.designs(MIXED.matrix([design])) == [design]

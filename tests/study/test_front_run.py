@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -47,17 +46,15 @@ OPEN = Task(name="open", targets=((0.3, 0.0, 0.3), (0.2, 0.1, 0.4)))
         ("100000", SearchBudget(evaluations=100_000)),
         ("1e6", SearchBudget(evaluations=1_000_000)),
         ("100_000", SearchBudget(evaluations=100_000)),
+        ("5", SearchBudget(evaluations=5)),
     ],
 )
 def test_budgets(words: str, budget: SearchBudget) -> None:
     assert SearchBudget.parse(words) == budget
 
 
-@pytest.mark.parametrize("words", ["0", "0s", "-5s", "5", "5 parsecs", "", "s", "1.5", "1e99", "nan", "inf s", "5m"])
+@pytest.mark.parametrize("words", ["0", "0s", "-5s", "5 parsecs", "", "s", "1.5", "1e99", "nan", "inf s", "5m"])
 def test_budgets_that_mean_nothing(words: str) -> None:
-    if words == "5":  # evaluations, if few
-        assert SearchBudget.parse(words) == SearchBudget(evaluations=5)
-        return
     with pytest.raises(SettingsError, match="budget"):
         SearchBudget.parse(words)
 
@@ -169,10 +166,14 @@ def test_a_damaged_state_is_said(tmp_path: Path) -> None:
     # One wrong byte anywhere: numpy, zipfile, zlib and tokenize each complain in their own way.
     find_front(PROBLEM, budget="300", seed=1, out=tmp_path / "other")
     whole = (tmp_path / "other" / "search.npz").read_bytes()
-    for place in range(0, len(whole), len(whole) // 60):
+    refused = 0
+    for place in range(0, len(whole), len(whole) // 30):
         state.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
-        with suppress(RunFolderError):
+        try:
             find_front(PROBLEM, budget="300", seed=1, out=tmp_path / "run")
+        except RunFolderError:
+            refused += 1
+    assert refused > 0
     before = read_run(tmp_path / "run")[1]
     state.unlink()
     anew = find_front(PROBLEM, budget="600", seed=1, out=tmp_path / "run")

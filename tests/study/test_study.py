@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -191,11 +192,17 @@ def qmc(seed: int) -> BaseSampler:
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-@pytest.mark.parametrize("sampler", ["tpe", "tpe-multivariate", "nsga2", nsga2, qmc])
-@pytest.mark.parametrize("proposer", ["none", "rules", Listed()])
-@pytest.mark.parametrize("stop", [3, 5, 6, 12])
+@pytest.mark.parametrize(
+    ("sampler", "proposer", "stop"),
+    [
+        pytest.param(*case, marks=[] if i % 7 == 0 else pytest.mark.slow)  # 7 is coprime to the lengths of the lists
+        for i, case in enumerate(
+            product(["tpe", "tpe-multivariate", "nsga2", nsga2, qmc], ["none", "rules", Listed()], [3, 5, 6, 12])
+        )
+    ],
+)
 def test_resumed_run_equals_uninterrupted_one(
-    tmp_path: Path, proposer: Proposer | str, stop: int, sampler: str | SamplerFactory
+    tmp_path: Path, sampler: str | SamplerFactory, proposer: Proposer | str, stop: int
 ) -> None:
     check_resume(tmp_path / "run", stop, proposer=proposer, sampler=sampler, n_init=5, n_step=4, n_total=20)
 

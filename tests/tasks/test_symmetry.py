@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from armwright.tasks.catalogue import builtin_names, load_task, random_task
 from armwright.tasks.symmetry import centre, distance_to_planes, is_mirrored, symmetry_planes
 
-EXAMPLES = settings(deadline=None, max_examples=100, derandomize=True, database=None)
 MILLIMETRES = st.integers(-1000, 1000).map(lambda mm: mm / 1000)
 POINTS = arrays(float, st.tuples(st.integers(2, 8), st.just(3)), elements=MILLIMETRES)
 ROTATIONS = arrays(float, (4,), elements=st.floats(-1.0, 1.0)).filter(lambda q: np.linalg.norm(q) > 0.1)
@@ -55,7 +54,6 @@ def test_the_planes_of_target_3_are_an_octagons_and_its_own() -> None:
     assert np.abs(normals[~own, 0]) == pytest.approx(np.zeros(8))
 
 
-@EXAMPLES
 @given(POINTS, ROTATIONS, arrays(float, (3,), elements=MILLIMETRES))
 def test_a_mirrored_set_has_its_plane_wherever_it_is_turned(
     half: np.ndarray, quaternion: np.ndarray, shift: np.ndarray
@@ -68,7 +66,6 @@ def test_a_mirrored_set_has_its_plane_wherever_it_is_turned(
     assert distance_to_planes(turn @ (0.3, 0.0, 0.7) + shift, points @ turn.T + shift, normals) < 1e-6
 
 
-@EXAMPLES
 @given(POINTS)
 def test_a_quarter_turn_about_z_turns_the_planes(half: np.ndarray) -> None:
     points = np.vstack([half, half * (1.0, -1.0, 1.0)])
@@ -78,7 +75,6 @@ def test_a_quarter_turn_about_z_turns_the_planes(half: np.ndarray) -> None:
     assert all(has(after, turn @ normal) for normal in before)
 
 
-@EXAMPLES
 @given(POINTS, ROTATIONS)
 def test_every_plane_mirrors_the_set_onto_itself(points: np.ndarray, quaternion: np.ndarray) -> None:
     points = points @ rotation(quaternion).T
@@ -90,7 +86,6 @@ def test_every_plane_mirrors_the_set_onto_itself(points: np.ndarray, quaternion:
         assert apart.min(axis=1).max() <= 1e-6 + 1e-12
 
 
-@EXAMPLES
 @given(POINTS, st.randoms(use_true_random=False))
 def test_order_and_points_given_twice_mean_nothing(points: np.ndarray, random: object) -> None:
     order = [0, *range(len(points))]

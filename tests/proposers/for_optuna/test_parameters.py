@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 
@@ -56,7 +56,6 @@ def categories(draw: st.DrawFn) -> tuple[CategoricalDistribution, Any]:
 
 
 @pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
-@settings(deadline=None, max_examples=200)
 @given(st.dictionaries(st.text(max_size=70), st.one_of(ints(), floats(), categories()), min_size=1, max_size=5))
 def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
     drawn: dict[str, tuple[BaseDistribution, Any]],
@@ -74,7 +73,6 @@ def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
         assert space[name]._contains(space[name].to_internal_repr(value))
 
 
-@settings(deadline=None)
 @given(st.one_of(ints(), categories()))
 def test_the_schema_allows_what_is_written(drawn: tuple[BaseDistribution, Any]) -> None:
     distribution, value = drawn

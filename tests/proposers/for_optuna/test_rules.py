@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import optuna
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.trial import TrialState, create_trial
@@ -53,7 +53,6 @@ def made(rule: str, study: optuna.Study, seed: int) -> tuple[dict[str, Any], str
     return RULES[rule](view, np.random.default_rng(seed))
 
 
-@settings(deadline=None)
 @pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
 @given(st.one_of(ints(), floats()), st.floats(-0.5, 1.5))
 def test_the_scale_from_0_to_1_and_back(drawn: tuple[BaseDistribution, Any], share: float) -> None:
@@ -87,7 +86,6 @@ def trials(draw: st.DrawFn) -> tuple[dict[str, BaseDistribution], list[dict[str,
     return {name: kind[0] for name, kind in kinds.items()}, rows, [draw(values) for _ in range(n)]
 
 
-@settings(deadline=None)
 @pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
 @given(trials(), st.integers(0, 2**31))
 def test_whatever_the_study_each_rule_stays_in_its_space(
