@@ -53,7 +53,7 @@ from tests.fuzz.targets import a_run, looked_at
         ("[" * 100_000, "nested too deeply"),
         ("a: " + "{a: " * 100_000, "nested too deeply"),
         ("- " * 100_000, "nested too deeply"),
-        ("a: [" + "1," * 400_000 + "1]", "400,000 values"),
+        pytest.param("a: [" + "1," * 400_000 + "1]", "400,000 values", marks=pytest.mark.slow),
         ("name: many\ntargets: [" + "[0,0,0]," * 10_001 + "]", "at most 10000"),
         ("name: x\ntargets: [[1e308, 0, 0]]", "more than 1000 m away"),
         ("name: x\ntargets: [[.nan, 0, 0]]", "finite number"),

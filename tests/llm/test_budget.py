@@ -98,7 +98,7 @@ class Session(LlmSession):
         return came
 
 
-@pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (4, 1), (5, 2), (9, 4), (50, 4)])
+@pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (5, 2), (50, 4)])
 def test_after_so_many_calls_it_asks_no_more(chat_server: ChatServer, most: int, proposals: int) -> None:
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="m", max_calls=most), seen=seen)
@@ -261,7 +261,7 @@ def test_a_run_that_has_begun_goes_on_without_its_model(
     assert sum("not today" in note for note in notes(seen)) == asked
 
 
-@pytest.mark.parametrize("most", [4, 9, 10])
+@pytest.mark.parametrize("most", [4, 9])
 def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_server: ChatServer, most: int) -> None:
     def answer(request: Request) -> Answer:
         return "no design" if "response_format" in request else designer(request)

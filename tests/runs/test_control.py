@@ -61,7 +61,7 @@ from tests.support.fixed_problem import FixedProblem, fixed_history
 from tests.support.wire_formats import llm_proposer, model_options
 
 PROBLEM = Problem(load_task("target-1"))
-SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2}
+SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2, "verify": False}
 NOTE = "A note from the engineer who watches this search; take it into account: "
 NOTES = "Notes from the engineer who watches this search; take them into account:\n"
 

@@ -4,6 +4,8 @@ import csv
 import json
 import re
 import resource
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -25,9 +27,16 @@ def short(out: Path, n_total: int = 8) -> StudyResult:
     return optimize(PROBLEM, proposer="rules", n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
+    return short(tmp_path_factory.mktemp("finished") / "run")
+
+
 @pytest.fixture
-def run(tmp_path: Path) -> StudyResult:
-    return short(tmp_path / "run")
+def run(finished: StudyResult, tmp_path: Path) -> StudyResult:
+    """Return a copy of a finished run, which a test may damage."""
+    shutil.copytree(folder(finished), tmp_path / "run")
+    return replace(finished, folder=tmp_path / "run")
 
 
 def folder(run: StudyResult) -> Path:

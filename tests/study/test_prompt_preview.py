@@ -43,7 +43,15 @@ def run(
     in_flight: int | None = None,
 ) -> StudyResult:
     return optimize(
-        problem, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=5, out=out, in_flight=in_flight
+        problem,
+        proposer=proposer,
+        n_init=4,
+        n_step=3,
+        n_total=n_total,
+        seed=5,
+        out=out,
+        in_flight=in_flight,
+        verify=False,
     )
 
 
@@ -185,6 +193,15 @@ def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Pa
     assert shown("--template", "--prompt", "own.md")[0] == whole
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder that holds a finished run and a space file."""
+    folder = tmp_path_factory.mktemp("finished")
+    run(folder / "run", 1, "none")
+    (folder / "space.yaml").write_text("name: mine\njoints: 5\n", encoding="utf-8")
+    return folder
+
+
 @pytest.mark.parametrize(
     ("args", "message"),
     [
@@ -206,9 +223,10 @@ def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Pa
         (["--after", "run", *model_options(memory="all")], 'unknown memory "all"'),
     ],
 )
-def test_mistakes_are_one_line(in_folder: Path, args: list[str], message: str) -> None:
-    run(in_folder / "run", 1, "none")
-    (in_folder / "space.yaml").write_text("name: mine\njoints: 5\n", encoding="utf-8")
+def test_invalid_arguments_are_refused(
+    finished: Path, monkeypatch: pytest.MonkeyPatch, args: list[str], message: str
+) -> None:
+    monkeypatch.chdir(finished)
     with pytest.raises(ArmwrightError) as refusal:
         shown(*args)
     assert message in str(refusal.value)

@@ -46,7 +46,7 @@ class Listed(Proposer):
 def short(
     out: Path | None = None, problem: Problem = PROBLEM, proposer: Proposer | str = "none", n_total: int = 8
 ) -> StudyResult:
-    return optimize(problem, proposer=proposer, n_init=5, n_step=4, n_total=n_total, seed=0, out=out)
+    return optimize(problem, proposer=proposer, n_init=5, n_step=4, n_total=n_total, seed=0, out=out, verify=False)
 
 
 def designs(run: StudyResult) -> list[object]:
@@ -204,7 +204,9 @@ def qmc(seed: int) -> BaseSampler:
 def test_resumed_run_equals_uninterrupted_one(
     tmp_path: Path, sampler: str | SamplerFactory, proposer: Proposer | str, stop: int
 ) -> None:
-    check_resume(tmp_path / "run", stop, proposer=proposer, sampler=sampler, n_init=5, n_step=4, n_total=20)
+    check_resume(
+        tmp_path / "run", stop, proposer=proposer, sampler=sampler, n_init=5, n_step=4, n_total=20, verify=False
+    )
 
 
 @pytest.mark.parametrize("proposer", [pytest.param(name, marks=NEEDS_GP) for name in ("none", "rules")])

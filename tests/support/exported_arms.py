@@ -56,7 +56,7 @@ def odd_arms(n: int, dof: int, seed: int) -> list[Arm]:
     return arms
 
 
-ARMS = [*paper_arms(3, 4, 41), *(arm for dof in (1, 3, 6, 8) for arm in odd_arms(3, dof, 42)), MIXED]
+ARMS = [*paper_arms(2, 4, 41), *(arm for dof in (1, 3, 6, 8) for arm in odd_arms(2, dof, 42)), MIXED]
 
 
 def moving(arm: Arm) -> list[tuple[int, Joint]]:

@@ -331,6 +331,7 @@ def arms(problem: Problem, study: optuna.Study, n_trials: int, callback: Proposa
     return study
 
 
+@pytest.mark.slow
 def test_rules_in_a_plain_study_beat_the_study_alone() -> None:
     volumes: list[list[float]] = [[], []]
     for seed in range(2):

@@ -102,7 +102,7 @@ def test_each_kind_of_parameter_with_each_sampler(
             assert not isinstance(value, np.generic)
 
 
-@pytest.fixture(params=["memory", "sqlite", "journal"])
+@pytest.fixture(params=["memory", pytest.param("sqlite", marks=pytest.mark.slow), "journal"])
 def storage(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[BaseStorage]:
     if request.param == "memory":
         yield InMemoryStorage()
@@ -154,7 +154,7 @@ def test_failed_pruned_and_nan_trials_teach_nothing_and_stop_nothing() -> None:
 
 
 @pytest.mark.parametrize("value", [float("inf"), -float("inf"), 1e308, -1e308, 0.0])
-@pytest.mark.parametrize("n_objectives", [1, 2, 3])
+@pytest.mark.parametrize("n_objectives", [1, 3])
 def test_values_beyond_measure_and_none_better_than_another(value: float, n_objectives: int) -> None:
     """Where all are alike, or all infinite; one is not."""
     study = optuna.create_study(directions=["maximize"] * n_objectives, sampler=RandomSampler(seed=0))
