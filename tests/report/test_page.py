@@ -152,13 +152,13 @@ def test_page_kinematics_match_the_kernels(run: Path, tab: Tab, history: History
 
 def test_stepper_visits_all_targets(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html", "#design=12&target=9")
-    assert tab.text("#target-words").startswith("Target 9 of 9")
+    assert tab.text("#target-note").startswith("Target 9 of 9")
     tab.page.locator("#next").click()
-    assert tab.text("#target-words").startswith("Target 1 of 9")
+    assert tab.text("#target-note").startswith("Target 1 of 9")
     tab.page.keyboard.press("ArrowRight")
     tab.page.keyboard.press("ArrowRight")
     tab.page.keyboard.press("ArrowLeft")
-    assert tab.text("#target-words").startswith("Target 2 of 9")
+    assert tab.text("#target-note").startswith("Target 2 of 9")
     assert tab.page.locator("#postures tr.chosen td").first.inner_text() == "2"
 
 
@@ -214,7 +214,7 @@ def test_design_off_the_front_has_values_but_no_files(run: Path, tab: Tab, histo
     tab.open(run / "report.html", f"#design={next(n for n in range(50) if n not in front)}")
     assert tab.page.get_by_role("button", name="URDF").is_disabled()
     assert tab.page.get_by_role("button", name="CSV").is_enabled()
-    assert "Not on the Pareto front" in tab.text("#design-words")
+    assert "Not on the Pareto front" in tab.text("#design-summary")
 
 
 def test_infeasible_designs_are_hollow_and_list_violations(tmp_path: Path, tab: Tab) -> None:
@@ -234,9 +234,9 @@ def test_infeasible_designs_are_hollow_and_list_violations(tmp_path: Path, tab: 
     worst = max(infeasible, key=lambda number: history.violations[number, 0])
     tab.ask(f"armwright.set({{ design: {worst} }})")
     error = history.evaluation([worst]).position_error.max()
-    assert f"Infeasible; worst_error <= 0.4: {error:.4g} m (broken); length >= 0.5: " in tab.text("#design-words")
+    assert f"Infeasible; worst_error <= 0.4: {error:.4g} m (violated); length >= 0.5: " in tab.text("#design-summary")
     tab.ask(f"armwright.set({{ design: {numbers[0]} }})")
-    assert "Feasible; worst_error <= 0.4: " in tab.text("#design-words")
+    assert "Feasible; worst_error <= 0.4: " in tab.text("#design-summary")
     assert asked(tab, "worst_error<=0.35") == [
         member.number for member in pick_from(tmp_path / "run", [read_condition("worst_error<=0.35")])[1]
     ]
@@ -292,7 +292,7 @@ def test_page_pick_matches_the_pick_command(run: Path, tab: Tab) -> None:
     last = asked(tab, "torque < 4.5", by="weights", weights="position_error=2, torque=1")
     assert last == picked(run, "torque<4.5", weights={"position_error": 2.0, "torque": 1.0})
     assert tab.ask("armwright.state.design") == last[0]
-    assert tab.text("#pick-words").endswith(
+    assert tab.text("#pick-message").endswith(
         'armwright pick RUN --where "torque<4.5" --weights position_error=2,torque=1'
     )
     tab.page.get_by_role("button", name="Show all").click()
@@ -303,14 +303,14 @@ def test_page_pick_explains_empty_results(run: Path, tab: Tab, history: History)
     tab.open(run / "report.html")
     before = tab.page.locator("#table tbody tr").count()
     asked(tab, "torque<100, position_error<=1e-6")
-    least = float(re.findall(r"the nearest has ([\d.]+)\.", tab.text("#pick-words"))[0])
+    least = float(re.findall(r"the nearest has ([\d.]+)\.", tab.text("#pick-message"))[0])
     assert least == pytest.approx(min(member.values[0] for member in history.front), rel=1e-3)
     asked(tab, "mas<2")
-    assert 'Unknown quantity "mas"' in tab.text("#pick-words")
+    assert 'Unknown quantity "mas"' in tab.text("#pick-message")
     asked(tab, "torque")
-    assert "such as mass<=2.5" in tab.text("#pick-words")
+    assert "such as mass<=2.5" in tab.text("#pick-message")
     asked(tab, by="weights", weights="torque=0")
-    assert "above 0" in tab.text("#pick-words")
+    assert "above 0" in tab.text("#pick-message")
     assert tab.page.locator("#table tbody tr").count() == before
     assert tab.faults == []
 
@@ -337,7 +337,7 @@ def test_page_works_without_webgl(run: Path, browser: Browser, history: History)
     tab.page.mouse.click(*place_of(tab, number))
     assert tab.text("#design-title").startswith(f"#{number} ")
     tab.page.locator("#next").click()
-    assert tab.text("#target-words").startswith("Target 2 of 9")
+    assert tab.text("#target-note").startswith("Target 2 of 9")
     tab.close()
 
 

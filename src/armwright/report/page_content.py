@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,6 @@ from armwright.runs.results import read_summary
 from armwright.runs.selection import bounded_numbers, numbers_of
 from armwright.runs.trials_file import TrialsReader
 from armwright.spaces.parameters import FloatParameter
-from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.targets import TargetArrays
 
 KINDS = ("revolute", "prismatic", "fixed")
 NO_JOINT = Joint("fixed", "z")  # padding of shorter arms
@@ -105,10 +103,10 @@ class RunContent:
             "arms": {number: _of_arm(self.history, number) for number in front},
             "proposals": _proposals(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
-            "looks": {trial.source: _look(trial.source) for trial in self.history},
-            "existing": {"label": EXISTING.label, "colour": EXISTING.colour},
+            "looks": {trial.source: look(trial.source)._asdict() for trial in self.history},
+            "existing": EXISTING._asdict(),
             "existing_arms": _existing_arms(self.folder, self.history),
-            "result": _result(self.config, self.history, self.summary),
+            "result": _result(self.history, self.summary),
             "calls_from": calls_from,
             "calls": [asdict(call) for call in self.calls[calls_from:]],
             "files": {number: design_files(self.history, number) for number in front} if with_files else {},
@@ -121,9 +119,9 @@ def _existing_arms(folder: Path, history: History) -> list[dict[str, Any]]:
     return [
         {
             "name": arm.name,
-            "values": list(arm.values),
-            "violated": list(arm.violated),
-            "standing": dominance_counts(arm.values, arm.violated, history),
+            "values": arm.values,
+            "violated": arm.violated,
+            "dominance": dominance_counts(arm.values, arm.violated, history),
         }
         for arm in read_existing_arms(folder, len(history.problem.objectives))
     ]
@@ -155,7 +153,8 @@ def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
         places[name] = [array.dtype.name, at, list(array.shape)]
         parts.append(data + b"\0" * (-len(data) % 8))
         at += len(parts[-1])
-    text = json.dumps({**head, "arrays": places}, separators=(",", ":"), allow_nan=False).encode()
+    head = {**head, "arrays": places}
+    text = json.dumps(head, separators=(",", ":"), allow_nan=False, default=lambda array: array.tolist()).encode()
     text += b" " * (-(len(text) + 4) % 8)
     return len(text).to_bytes(4, "little") + text + b"".join(parts)
 
@@ -171,7 +170,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         "source": np.array([sources.index(trial.source) for trial in trials], dtype=np.uint8),
         "values": history.values[numbers.start : numbers.stop],
         "params": space.matrix([trial.design for trial in trials]),
-        "broken": history.violations[numbers.start : numbers.stop],
+        "violations": history.violations[numbers.start : numbers.stop],
         "q": evaluation.q.astype(np.float32),
         **_arm_arrays(arms, evaluation.arms.dof),
     }
@@ -186,16 +185,11 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
         return np.array(rows, dtype=np.float32)
 
     return {
-        "base": floats([arm.base for arm in arms]),
-        "tool": floats([arm.tool for arm in arms]),
-        "tool_axis": floats([arm.tool_axis for arm in arms]),
-        "tool_side": floats([arm.tool_side for arm in arms]),
+        **{name: floats([getattr(arm, name) for arm in arms]) for name in ("base", "tool", "tool_axis", "tool_side")},
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
         "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
         "axis": np.array([[AXES.index(j.axis) for j in row] for row in own], dtype=np.uint8),
-        "lower": floats([[j.lower for j in row] for row in own]),
-        "upper": floats([[j.upper for j in row] for row in own]),
-        "travel": floats([[j.travel for j in row] for row in own]),
+        **{name: floats([[getattr(j, name) for j in row] for row in own]) for name in ("lower", "upper", "travel")},
         "offset": floats([[link.offset for link in row] for row in links]),
         "com": floats([[link.total_com for link in row] for row in links]),
         "mass": floats([[link.total_mass for link in row] for row in links]),
@@ -212,24 +206,23 @@ def _joined(chunks: Sequence[Arrays]) -> dict[str, NDArray[Any]]:
 def _about(config: RunConfig, folder: Path, history: History, spent: int | None) -> dict[str, Any]:
     """Return the head's slowly changing part; `spent`: evaluations of a direct search."""
     task, method, space = config.task, config.method, config.space
-    study = None if isinstance(method, FrontMethod) else method
     known = known_front(config.problem)
     reference = history.reference_point
     return {
         "folder": folder.resolve().name,
-        "task": {"name": task.name, "description": task.description, "provenance": task.provenance},
-        "targets": [list(target) for target in task.targets],
-        "payloads": task.payloads.tolist(),
+        "config": config.model_dump(mode="json"),
+        "is_study": not isinstance(method, FrontMethod),
+        "targets": task.targets,
+        "payloads": task.payloads,
         "cases": task.cases_description,
-        "obstacles": [_obstacle(obstacle) for obstacle in task.obstacles],
-        "target_arrays": _target_arrays(task.target_arrays),
-        "workspace": [{"low": list(r.low), "high": list(r.high), "description": r.describe()} for r in task.workspace],
-        "moves": [list(pair) for pair in task.straight_moves.pairs],
-        "reference_point": None if reference is None else list(reference),
-        "objectives": [objective.model_dump() for objective in config.objectives],
+        "obstacles": [asdict(obstacle.solid) | {"description": obstacle.describe()} for obstacle in task.obstacles],
+        "target_arrays": asdict(task.target_arrays) | {"oriented": task.target_arrays.oriented},
+        "workspace": [{"low": r.low, "high": r.high, "description": r.describe()} for r in task.workspace],
+        "moves": task.straight_moves.pairs,
+        "reference_point": reference,
         "constraints": [
             {
-                "words": constraint.description,
+                "description": constraint.description,
                 "name": constraint.quantity.name,
                 "unit": constraint.quantity.unit,
                 "bound": constraint.bound,
@@ -244,19 +237,14 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
             | (
                 {"low": p.low, "high": p.high, "unit": p.unit}
                 if isinstance(p, FloatParameter)
-                else {"choices": list(p.choices)}
+                else {"choices": p.choices}
             )
             for p in space.parameters
         ],
         "masses": space.mass_note,
         "is_toy": space.is_toy,
-        "seed": config.seed,
         "method": describe_method(config),
-        "study": None if study is None else study.model_dump(mode="json"),
-        "n_init": method.n_init,
-        "planned": None if study is None else study.n_trials,
         "command": repeat_command(config, any(trial.source == REFINE for trial in history), spent),
-        "config": config.model_dump(mode="json"),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),
         "colours": {
             "front": FRONT,
@@ -266,60 +254,26 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
             "obstacle": OBSTACLE,
             "infeasible": INFEASIBLE,
         },
-        "joint_words": JOINT_LABEL,
+        "joint_labels": JOINT_LABEL,
     }
 
 
-def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
-    solid = obstacle.solid
-    return {
-        "shape": solid.shape,
-        "centre": list(solid.centre),
-        "rotation": solid.rotation.tolist(),
-        "half": list(solid.half),
-        "description": obstacle.describe(),
-    }
-
-
-def _target_arrays(target_arrays: TargetArrays) -> dict[str, Any]:
-    """Return the targets' orientation requirements; frames: tool axes as columns, stored row by row."""
-    return {
-        "oriented": target_arrays.oriented,
-        "rows": target_arrays.n_angular.tolist(),
-        "frames": target_arrays.rotation.reshape(-1, 9).tolist() if target_arrays.oriented else [],
-        "tolerance": target_arrays.tolerance.tolist(),
-        "angle_tolerance": target_arrays.angle_tolerance.tolist(),
-    }
-
-
-def _result(config: RunConfig, history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return the results of the run so far."""
+def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the results of the run so far; a finished run has a summary."""
     reference = history.reference_point
     final = hypervolume(history.masked_objectives, reference) if reference is not None and len(history) else None
-    found: dict[str, Any] = {
+    parts: Mapping[str, Any] = summary or {}
+    search: Mapping[str, Any] = parts.get("search") or {}  # of a direct search
+    return {
         "finished": summary is not None,
-        "hypervolume": final,
-        "by_source": dict(Counter(trial.source for trial in history)),
-        "seconds": sum(trial.seconds.get("total", 0.0) for trial in history),
-        "evaluations": sum(trial.evaluations for trial in history),
-        "infeasible": int((~history.feasible).sum()),
-        "robust": None,
-        "cost_usd": None,
-        "search": None,
+        "hypervolume": final if summary is None else summary["hypervolume"]["final"],
+        "by_source": Counter(trial.source for trial in history),
+        "seconds": search.get("seconds", sum(trial.seconds.get("total", 0.0) for trial in history)),
+        "evaluations": search.get("evaluations", sum(trial.evaluations for trial in history)),
+        "infeasible": search.get("infeasible", int((~history.feasible).sum())),
+        "robust": (parts.get("verification") or {}).get("robust_numbers"),
+        "search": search.get("hypervolume_history"),
     }
-    if summary is None:
-        return found
-    verification = cast("Mapping[str, Any] | None", summary["verification"])
-    proposer = cast("Mapping[str, Any]", summary.get("proposer") or {})
-    found["hypervolume"] = summary["hypervolume"]["final"]
-    found["robust"] = None if verification is None else verification["robust_numbers"]
-    found["cost_usd"] = proposer.get("cost_usd")
-    if isinstance(config.method, FrontMethod):
-        search = summary["search"]
-        found |= {"seconds": search["seconds"], "evaluations": search["evaluations"]}
-        found["infeasible"] = search.get("infeasible", 0)
-        found["search"] = search["hypervolume_history"]
-    return found
 
 
 def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
@@ -328,15 +282,10 @@ def _proposals(history: History, first: int) -> dict[int, dict[str, Any]]:
         trial.number: {
             "id": trial.proposal,
             "reason": trial.reason,
-            "expected": None if trial.expected is None else list(trial.expected),
+            "expected": trial.expected,
             "fault": trial.fault,
             "refines": trial.refines,
         }
         for trial in history.trials[first:]
         if trial.proposal is not None or trial.fault is not None or trial.refines is not None
     }
-
-
-def _look(source: str) -> dict[str, str]:
-    style = look(source)
-    return {"label": style.label, "colour": style.colour, "marker": style.marker}

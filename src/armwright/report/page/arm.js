@@ -1,6 +1,6 @@
 // The selected arm in space, in one posture for each target.
 
-import { missWords, postures, why } from "./design.js";
+import { describeMiss, postures, why } from "./design.js";
 import { PRISMATIC, chain, length, rail } from "./kinematics.js";
 import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
@@ -57,10 +57,10 @@ export function openArm(shownContent) {
   listen((changed) => {
     if (changed.has("target") && !changed.has("design")) move();
     else if (changed.has("design") || changed.has("target") || changed.has("compared")) drawArm();
-    if (changed.size) words();
+    if (changed.size) describeTarget();
   });
   drawArm();
-  words();
+  describeTarget();
 }
 
 
@@ -122,8 +122,8 @@ function paint() {
 
 // What the colours mean; letters as in the names of designs.
 function legend() {
-  const { joint } = content.head.colours, words = content.head.joint_words;
-  const parts = [...["x", "y", "z"].map((axis) => [joint[axis], words[axis]]),
+  const { joint } = content.head.colours, labels = content.head.joint_labels;
+  const parts = [...["x", "y", "z"].map((axis) => [joint[axis], labels[axis]]),
     [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
   if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
   if (content.head.moves.length) parts.push([content.head.colours.target, "straight move (line)"]);
@@ -251,7 +251,7 @@ function drawObstacles() {
   for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, frame, materials.obstacle));
 }
 
-// The straight lines that the tip is asked to go along.
+// The straight moves of the tip.
 function drawMoves() {
   empty(groups.moves);
   const points = content.head.moves.flatMap(([start, end]) => [...content.targets[start], ...content.targets[end]]);
@@ -279,12 +279,12 @@ function drawTargets() {
 
 // Where the tool should point to: an arrow for its z, of a whole orientation its x and y, too.
 function drawGoal(target, t) {
-  const { rows, frames } = content.head.target_arrays, size = ARROW * frame.radius;
-  if (!rows[t]) return;
-  for (const k of rows[t] === 3 ? [0, 1, 2] : [2]) {
-    const way = [0, 3, 6].map((r) => frames[t][r + k]), long = k === 2 ? size : 0.6 * size;
+  const { n_angular, rotation } = content.head.target_arrays, size = ARROW * frame.radius;
+  if (!n_angular[t]) return;
+  for (const k of n_angular[t] === 3 ? [0, 1, 2] : [2]) {
+    const way = rotation[t].map((row) => row[k]), long = k === 2 ? size : 0.6 * size;
     const [end, neck] = [1, 0.72].map((share) => target.map((v, c) => v + share * long * way[c]));
-    const paint_ = rows[t] === 3 ? materials.joints[k] : materials.missed;
+    const paint_ = n_angular[t] === 3 ? materials.joints[k] : materials.missed;
     groups.goals.add(rod(target, end, 0.006 * frame.radius, paint_));
     const head = rod(neck, end, 0.02 * frame.radius, paint_);
     head.geometry = unit.cone;
@@ -416,14 +416,14 @@ function play(on) {
   if (on) step(1);
 }
 
-function words() {
+function describeTarget() {
   const i = state.design;
   if (i === null) return;
   const one = postures(i)[state.target], n = content.targets.length;
   $("arm-title").textContent = `#${i} ${content.joints(i)}`;
-  const verdict = one.missed ? `missed by ${missWords(one)}: ${why(content.arm(i), one)}` : "reached";
-  $("target-words").textContent = `Target ${state.target + 1} of ${n}: ${verdict}`;
-  $("target-words").className = one.missed ? "missed" : "";
+  const verdict = one.missed ? `missed by ${describeMiss(one)}: ${why(content.arm(i), one)}` : "reached";
+  $("target-note").textContent = `Target ${state.target + 1} of ${n}: ${verdict}`;
+  $("target-note").className = one.missed ? "missed" : "";
   $("compare").setAttribute("aria-pressed", state.compared !== null);
   $("compare").textContent = state.compared === null ? "Compare" : `Beside #${state.compared} ✕`;
 }

@@ -1,10 +1,10 @@
-// The run as the page knows it: taken apart from the packed bytes, grown where the run goes on.
+// The content of the page: unpacked from the bytes of a run, and extended while the run goes on.
 
 const VIEWS = {
   uint8: Uint8Array, int32: Int32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
 };
 
-// A JSON head, and arrays that are views of the bytes (see report/content.py, pack).
+// A JSON head, and arrays that are views of the bytes (see report/page_content.py, pack).
 export function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
@@ -41,7 +41,7 @@ export class Content {
     this.proposals = {};
   }
 
-  // Takes what was sent: the whole run, or what is new in it.
+  // Adds a packed run, or only its new part.
   add(buffer) {
     const { head, arrays } = unpack(buffer);
     if (head.designs_from === 0) this._clear();
@@ -61,23 +61,24 @@ export class Content {
     }
   }
 
-  // One design's part of an array: a view, not a copy.
+  // A view of the part of an array that belongs to a design.
   _part(name, i) {
     const { data, shape } = this._chunks[this._chunk[i]][name];
     const size = data.length / shape[0];
     return data.subarray(this._row[i] * size, (this._row[i] + 1) * size);
   }
 
-  get objectives() { return this.head.objectives; }
+  get objectives() { return this.head.config.objectives; }
+  get nInit() { return this.head.config.method.n_init ?? 0; }
   get targets() { return this.head.targets; }
   get obstacles() { return this.head.obstacles; }
   source(i) { return this.head.sources[this._part("source", i)[0]]; }
   look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }
-  broken(i) { return this._part("broken", i); } // by how much, one a constraint: <= 0 is met
-  isFeasible(i) { return this.broken(i).every((value) => value <= 0); }
+  violations(i) { return this._part("violations", i); } // one per constraint; satisfied at <= 0
+  isFeasible(i) { return this.violations(i).every((value) => value <= 0); }
 
-  // Those that matter: the arm has their module, and it is of a type that they are for.
+  // The active parameters: the arm has their module, and its type uses them.
   params(i) {
     const numbers = this._part("params", i), known = {};
     return this.head.parameters.map((p, k) => ({ ...p, value: p.choices ? p.choices[numbers[k]] : numbers[k] })).filter((p) => {
@@ -91,15 +92,15 @@ export class Content {
     });
   }
 
-  // Joint types in order, as one word.
+  // The joint types in order, such as "PYR".
   joints(i) {
     return this.params(i).filter((p) => p.choices && p.name.startsWith("joint_")).map((p) => p.value).join("");
   }
 
-  // One parameter's value; undefined where it does not matter.
+  // The value of a parameter; undefined if it is not active.
   param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
 
-  // The choices of kind_1, kind_2, … in order, where there are any: "motor", "direction".
+  // The choices of KIND_1, KIND_2, … in order; KIND is "motor" or "direction".
   chosen(i, kind) {
     return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }
@@ -122,7 +123,7 @@ export class Content {
   callsOf(i) {
     const id = this.proposals[i]?.id;
     if (!id) return [];
-    // Of several designs of one call, each is NAME-0042.1, .2, …
+    // Several designs of one call are named NAME-0042.1, .2, …
     return this.calls.filter((call) => call.proposal && (call.proposal === id || id.startsWith(call.proposal + ".")));
   }
 }

@@ -20,13 +20,13 @@ export function openCurve(shownContent) {
 
 export function drawCurve() {
   $("curve-box").querySelector("h2").textContent =
-    content.head.study ? "Hypervolume by source" : "Hypervolume";
+    content.head.is_study ? "Hypervolume by source" : "Hypervolume";
   const search = content.head.result.search;
   const traces = search ? ofSearch(search) : ofStudy();
   const best = content.head.best_known;
   const layout = {
     xaxis: {
-      title: { text: search ? "Designs evaluated" : content.head.study ? `Iteration (after ${content.head.n_init} random designs)` : "Designs of the front", standoff: 6 },
+      title: { text: search ? "Designs evaluated" : content.head.is_study ? `Iteration (after ${content.nInit} random designs)` : "Designs of the front", standoff: 6 },
       type: search ? "log" : "linear", gridcolor: colour("grid"), zeroline: false, linecolor: colour("line"), showline: true,
     },
     yaxis: {
@@ -47,7 +47,7 @@ export function drawCurve() {
 }
 
 function ofStudy() {
-  const { curve } = content, first = content.head.n_init;
+  const { curve } = content, first = content.nInit;
   const traces = [{
     x: [...curve.keys()].map((i) => i - first + 1), y: [...curve], mode: "lines", line: { color: colour("ink"), width: 1.6, shape: "hv" },
     hoverinfo: "skip",

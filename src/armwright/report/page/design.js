@@ -25,20 +25,20 @@ export function openDesign(shownContent, fetched) {
   drawDesign();
 }
 
-// A design at every target: error [m], angle [rad] (null where none is asked for), whether it is missed, joint values,
+// A design at every target: error [m], angle [rad] (null if none is required), whether it is missed, joint values,
 // what holds each joint.
 export function postures(i) {
-  const arm = content.arm(i), { rows, frames, tolerance, angle_tolerance } = content.head.target_arrays;
+  const arm = content.arm(i), { n_angular, rotation, tolerance, angle_tolerance } = content.head.target_arrays;
   return content.targets.map((target, t) => {
     const q = content.q(i, t), posed = chain(arm, q), error = distance(posed.joints.at(-1), target);
-    const angle = rows[t] ? angleOff(posed.tool, frames[t], rows[t] === 3) : null;
+    const angle = n_angular[t] ? angleOff(posed.tool, rotation[t].flat(), n_angular[t] === 3) : null;
     const missed = error >= tolerance[t] || (angle ?? 0) >= angle_tolerance[t];
     return { target, q, ...posed, error, angle, missed, torques: holding(arm, posed, content.head.payloads[t]) };
   });
 }
 
 // By how much a target is missed.
-export function missWords(one) {
+export function describeMiss(one) {
   return one.angle === null ? millimetres(one.error) : `${millimetres(one.error)}, ${degrees(one.angle)}`;
 }
 
@@ -68,17 +68,17 @@ export function drawDesign() {
   const robust = content.isRobust(i), n = content.targets.length;
   const verdict = robust === null || !head.front.includes(i) ? "" : robust ? ", robust" : ", sensitive";
   $("design-title").textContent = `#${i} ${content.joints(i)}, ${content.look(i).label}${verdict}`;
-  const iteration = head.study && i >= head.n_init ? ` Iteration ${i - head.n_init + 1}.` : "";
-  const objectives = head.objectives.map((o, k) => {
+  const iteration = head.is_study && i >= content.nInit ? ` Iteration ${i - content.nInit + 1}.` : "";
+  const objectives = content.objectives.map((o, k) => {
     const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
     return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
   });
-  const feasible = head.constraints.length ? ` ${constraintWords(i)}` : "";
+  const feasible = head.constraints.length ? ` ${describeConstraints(i)}` : "";
   const motors = content.chosen(i, "motor").length ? ` Motors: ${content.chosen(i, "motor").join(", ")}.` : "";
   const mount = content.param(i, "mount");
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-words").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${feasible}${iteration}${motors}`;
+  $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${feasible}${iteration}${motors}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -95,14 +95,14 @@ export function drawDesign() {
   $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${solids}${lines}${boxes}`;
 }
 
-// What the design has where it is bounded.
-function constraintWords(i) {
-  const broken = content.broken(i);
-  const words = content.head.constraints.map((c, k) => {
-    const has = c.bound + c.sign * c.scale * broken[k];
-    return `${c.words}: ${number(has)} ${c.unit}${broken[k] > 0 ? " (broken)" : ""}`;
+// Describes the quantities that constraints bound.
+function describeConstraints(i) {
+  const violations = content.violations(i);
+  const values = content.head.constraints.map((c, k) => {
+    const has = c.bound + c.sign * c.scale * violations[k];
+    return `${c.description}: ${number(has)} ${c.unit}${violations[k] > 0 ? " (violated)" : ""}`;
   });
-  return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${words.join("; ")}.`;
+  return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${values.join("; ")}.`;
 }
 
 function drawLinks(arm) {
@@ -136,7 +136,7 @@ function drawPostures(arm, posed) {
   },
   element("td", {}, String(t + 1)),
   element("td", { class: "text" }, one.target.map((v) => number(v, 3)).join(", ")),
-  element("td", { class: one.missed ? "missed" : "", title: one.missed ? why(arm, one) : null }, one.missed ? missWords(one) : "reached"),
+  element("td", { class: one.missed ? "missed" : "", title: one.missed ? why(arm, one) : null }, one.missed ? describeMiss(one) : "reached"),
   element("td", { title: one.torques.map((v, j) => `joint ${j + 1}: ${number(v, 3)} N m`).join("\n") }, number(length(one.torques), 3)),
   ...joints.map((j) => {
     const side = at(arm, one.q, j);
@@ -166,7 +166,7 @@ export function showRow(row) {
 }
 
 async function download(format) {
-  const i = state.design, name = `${content.head.task.name}-${i}.${ENDINGS[format]}`;
+  const i = state.design, name = `${content.head.config.task.name}-${i}.${ENDINGS[format]}`;
   if (format === "csv") save(name, asCsv(i), TYPES.csv);
   else {
     try {

@@ -46,8 +46,8 @@ export function colour(name) {
 }
 
 // Calls back when the system goes dark or light.
-export function onTheme(told) {
-  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", told);
+export function onTheme(listener) {
+  for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", listener);
 }
 
 // What is nearly black on paper is nearly white in the dark.

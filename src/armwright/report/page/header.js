@@ -23,8 +23,8 @@ function fact(name, value, paint) {
 
 export function drawHeader() {
   const { head } = content, { result } = head, facts = [];
-  $("title").textContent = `${head.task.name}: ${head.method}, seed ${head.seed}`;
-  $("description").textContent = head.task.description;
+  $("title").textContent = `${head.config.task.name}: ${head.method}, seed ${head.config.seed}`;
+  $("description").textContent = head.config.task.description;
   $("repeat").hidden = head.command === "";
   $("repeat").querySelector("code").textContent = head.command;
   if (!result.finished) facts.push(fact("state", "unfinished"));

@@ -62,7 +62,7 @@ export function rail(arm, posed, q, j) {
   return [along(arm.lower[j]), along(arm.upper[j])];
 }
 
-// By which angle [rad] a tool is off a target's frame (3 x 3 by rows): of its z alone, or of all its axes.
+// Returns the angle [rad] between a tool and a target's frame (3 x 3 by rows): of its z alone, or of all its axes.
 export function angleOff(tool, frame, isWhole) {
   const goal = [0, 1, 2].map((k) => column(frame, k));
   if (!isWhole) return Math.atan2(length(cross(tool[2], goal[2])), dot(tool[2], goal[2]));

@@ -2,7 +2,7 @@
 
 import { $, duration, element } from "./format.js";
 
-const AGAIN = 1000; // ms until a lost server is asked again
+const AGAIN = 1000; // [ms] between attempts to reach a lost server
 
 let content = null;
 let take = null;
@@ -104,9 +104,9 @@ async function send(request) {
   }
 }
 
-function complain(id, words) {
-  $(id).hidden = words === "";
-  $(id).textContent = words;
+function complain(id, message) {
+  $(id).hidden = message === "";
+  $(id).textContent = message;
 }
 
 const since = () => duration(Math.max(0, Date.now() / 1000 - status.since));

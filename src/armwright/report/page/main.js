@@ -18,9 +18,9 @@ let isOpen = false;
 
 // The design to begin with: of the address, else the knee of the front.
 function begin() {
-  const asked = fromAddress(content);
-  if (asked.design === undefined) asked.design = ranked(content, content.head.front)[0] ?? (content.n ? 0 : null);
-  set(asked);
+  const selected = fromAddress(content);
+  if (selected.design === undefined) selected.design = ranked(content, content.head.front)[0] ?? (content.n ? 0 : null);
+  set(selected);
 }
 
 function open() {

@@ -68,9 +68,9 @@ function isPrecise() {
 
 const insideBox = (numbers) => numbers.filter((i) => content.values(i).every((v, k) => v < content.head.reference_point[k]));
 
-const isProposer = (source) => source === content.head.study?.proposer?.name;
-const counted = () => Math.max(0, content.n - content.head.n_init);
-const until = () => (state.iteration === null ? content.n : content.head.n_init + state.iteration);
+const isProposer = (source) => source === content.head.config.method.proposer?.name;
+const counted = () => Math.max(0, content.n - content.nInit);
+const until = () => (state.iteration === null ? content.n : content.nInit + state.iteration);
 const placed = (value, axis) => (log && axis === 0 ? Math.max(value, FLOOR) : value);
 
 // Numbers of the feasible, non-dominated designs among the first n in the two objectives that are shown, by rising x.
@@ -85,12 +85,12 @@ export function frontUntil(n) {
 
 function slider() {
   const total = counted();
-  $("iterations").hidden = content.head.study === null || total < 2;
+  $("iterations").hidden = !content.head.is_study || total < 2;
   const range = $("iteration");
   range.max = total;
   range.value = state.iteration ?? total;
   $("iteration-value").textContent = state.iteration ?? total;
-  const planned = content.head.planned - content.head.n_init;
+  const planned = content.head.config.method.n_total;
   const marks = MARKS.map((share) => Math.max(1, Math.round(share * planned))).filter((mark) => mark <= total);
   const list = [...new Set(marks)];
   if (list.join() === $("marks").dataset.list) return; // so that a button keeps the focus
@@ -171,7 +171,7 @@ function draw() {
       x: existing.map((arm) => placed(arm.values[x], 0)),
       y: existing.map((arm) => arm.values[y]),
       text: existing.map((arm) => plain(arm.name)),
-      hovertext: existing.map((arm) => plain(`${arm.name}: ${standing(arm)}`)),
+      hovertext: existing.map((arm) => plain(`${arm.name}: ${describeDominance(arm)}`)),
       hovertemplate: `%{hovertext}<br>%{x:.4g}, %{y:.4g}<extra>${plain(label)}</extra>`,
       mode: "markers+text", textposition: "middle right", cliponaxis: false, name: plain(label),
       marker: { symbol: "cross", size: 12, color: paint, line: { width: 1, color: colour("ink") } },
@@ -201,25 +201,25 @@ function draw() {
   const notes = ["Click a design to see its arm."];
   if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
-  for (const arm of content.head.existing_arms) notes.push(existingWords(arm, high));
+  for (const arm of content.head.existing_arms) notes.push(describeExisting(arm, high));
   if (many) notes.push("Large: on the front in all objectives; other designs may dominate them in this plane.");
   if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
   if (content.head.is_toy) notes.push("Toy masses: use torques to compare designs, not to choose motors.");
   $("pareto-note").textContent = notes.join(" ");
 }
 
-// What the note says of an arm that exists already.
-function existingWords(arm, high) {
+// Describes an existing arm in the note.
+function describeExisting(arm, high) {
   const [u, v] = [arm.values[x], arm.values[y]];
   const place = high(x) !== undefined && (u > high(x) || v > high(y)) ? ` lies outside this view, at ${number(u)}, ${number(v)};` : ":";
   if (u === null || v === null) return `${arm.name}: not comparable, because some of these values are unknown.`;
-  return `${arm.name}${place} ${standing(arm)}.`;
+  return `${arm.name}${place} ${describeDominance(arm)}.`;
 }
 
-function standing(arm) {
+function describeDominance(arm) {
   if (arm.violated.length) return `violates ${arm.violated.join(", ")}`;
-  if (arm.standing === null) return "not comparable";
-  const [worse, better] = arm.standing;
+  if (arm.dominance === null) return "not comparable";
+  const [worse, better] = arm.dominance;
   return `dominates ${plural(worse, "design")} of the front, dominated by ${better}`;
 }
 

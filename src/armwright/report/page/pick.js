@@ -35,14 +35,14 @@ export function drawPick() {
   $("pick-robust").parentElement.hidden = content.head.result.robust === null;
 }
 
-// Shows all of the front again; what was asked for stays in the form.
+// Shows the whole front again; the form keeps its values.
 export function forget() {
-  $("pick-words").textContent = "";
+  $("pick-message").textContent = "";
   $("pick-all").hidden = true;
   show(null);
 }
 
-// What a design of the front can be chosen by.
+// Returns the quantities of a design that conditions and rankings can use.
 function numbersOf(i) {
   const names = content.head.parameters.filter((p) => !p.choices).map((p) => p.name);
   const found = new Map(names.map((name) => [name, content.param(i, name) ?? 0]));
@@ -82,19 +82,19 @@ function conditions() {
 }
 
 function weights() {
-  const said = new Map(split($("pick-weights").value).map((part) => {
-    const found = WEIGHT.exec(part);
-    if (!found || !(Number(found[2]) >= 0)) throw new Error(`"${part.trim()}": expected names with weights, such as position_error=2, torque=1`);
-    return [known(found[1], content.objectives.map((o) => o.name)), Number(found[2])];
+  const found = new Map(split($("pick-weights").value).map((part) => {
+    const match = WEIGHT.exec(part);
+    if (!match || !(Number(match[2]) >= 0)) throw new Error(`"${part.trim()}": expected names with weights, such as position_error=2, torque=1`);
+    return [known(match[1], content.objectives.map((o) => o.name)), Number(match[2])];
   }));
-  if (![...said.values()].some((weight) => weight > 0)) throw new Error("Expected at least one weight above 0.");
-  return said;
+  if (![...found.values()].some((weight) => weight > 0)) throw new Error("Expected at least one weight above 0.");
+  return found;
 }
 
-function ordered(left, told) {
+function ordered(left, quantities) {
   const by = $("pick-by").value, { reference_point: reference } = content.head;
   if (by === KNEE) return ranked(content, left);
-  let value = (i) => told.get(i).get(by);
+  let value = (i) => quantities.get(i).get(by);
   if (by === WEIGHTS) {
     const heavy = weights();
     const shares = content.objectives.map((o, k) => (heavy.get(o.name) ?? 0) / (reference ? reference[k] : 1));
@@ -103,11 +103,11 @@ function ordered(left, told) {
   return [...left].sort((a, b) => value(a) - value(b) || a - b);
 }
 
-// Why none is left: the first condition that none meets, and how near the front comes to it.
-function nearestMiss(asked, told) {
-  if (!told.size) return "No design meets all constraints yet.";
-  for (const { name, relation, bound } of asked) {
-    const values = [...told.values()].map((numbers) => numbers.get(name));
+// Explains an empty selection by the first condition that no design meets.
+function nearestMiss(requested, quantities) {
+  if (!quantities.size) return "No design meets all constraints yet.";
+  for (const { name, relation, bound } of requested) {
+    const values = [...quantities.values()].map((numbers) => numbers.get(name));
     if (values.some((value) => HOLDS[relation](value, bound))) continue;
     const nearest = relation.startsWith("<") ? Math.min(...values) : Math.max(...values);
     return `No design of the front has ${name} ${relation} ${bound}; the nearest has ${number(nearest)}.`;
@@ -116,33 +116,33 @@ function nearestMiss(asked, told) {
 }
 
 function choose() {
-  const told = new Map(content.head.front.map((i) => [i, numbersOf(i)]));
-  const words = $("pick-words");
+  const quantities = new Map(content.head.front.map((i) => [i, numbersOf(i)]));
+  const message = $("pick-message");
   try {
-    const asked = conditions(), robust = $("pick-robust").checked;
+    const requested = conditions(), robust = $("pick-robust").checked;
     const left = content.head.front.filter((i) => (
-      (!robust || content.isRobust(i)) && asked.every(({ name, relation, bound }) => HOLDS[relation](told.get(i).get(name), bound))
+      (!robust || content.isRobust(i)) && requested.every(({ name, relation, bound }) => HOLDS[relation](quantities.get(i).get(name), bound))
     ));
-    const order = ordered(left, told);
-    words.classList.toggle("missed", !order.length);
+    const order = ordered(left, quantities);
+    message.classList.toggle("missed", !order.length);
     if (!order.length) {
-      words.textContent = nearestMiss(asked, told);
+      message.textContent = nearestMiss(requested, quantities);
       return;
     }
     show(order);
     $("pick-all").hidden = false;
-    words.textContent = `Design ${order[0]}, of ${plural(order.length, "design")} that ${order.length === 1 ? "meets" : "meet"} it. ${command(asked, robust)}`;
+    message.textContent = `Design ${order[0]}, of ${plural(order.length, "design")} in the selection. ${command(requested, robust)}`;
     set({ design: order[0] });
   } catch (fault) {
-    words.classList.add("missed");
-    words.textContent = fault.message;
+    message.classList.add("missed");
+    message.textContent = fault.message;
   }
 }
 
-// The same in a terminal.
-function command(asked, robust) {
+// Returns the same selection as a command.
+function command(requested, robust) {
   const by = $("pick-by").value;
-  const parts = asked.map(({ name, relation, bound }) => `--where "${name}${relation}${bound}"`);
+  const parts = requested.map(({ name, relation, bound }) => `--where "${name}${relation}${bound}"`);
   if (by === WEIGHTS) parts.push(`--weights ${[...weights()].map(([name, weight]) => `${name}=${weight}`).join(",")}`);
   else if (by !== KNEE) parts.push(`--by ${by}`);
   if (robust) parts.push("--robust");

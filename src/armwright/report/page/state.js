@@ -9,21 +9,21 @@ export const state = {
   iteration: null, // how far the Pareto plot shows; null: to the end
 };
 
-export function listen(told) {
-  listeners.push(told);
+export function listen(listener) {
+  listeners.push(listener);
 }
 
 export function set(change) {
   const before = { ...state };
   Object.assign(state, change);
   const changed = new Set(Object.keys(change).filter((key) => state[key] !== before[key]));
-  if (changed.size) for (const told of listeners) told(changed);
+  if (changed.size) for (const listener of listeners) listener(changed);
 }
 
 // The address says what is selected: #design=42&target=3, targets counted from 1.
 export function fromAddress(content) {
-  const said = new URLSearchParams(location.hash.slice(1)), found = {};
-  const design = Number.parseInt(said.get("design"), 10), target = Number.parseInt(said.get("target"), 10);
+  const query = new URLSearchParams(location.hash.slice(1)), found = {};
+  const design = Number.parseInt(query.get("design"), 10), target = Number.parseInt(query.get("target"), 10);
   if (design >= 0 && design < content.n) found.design = design;
   if (target >= 1 && target <= content.targets.length) found.target = target - 1;
   return found;

@@ -6,7 +6,7 @@ import { $, element, metres, number, plural } from "./format.js";
 
 let content = null;
 let sorted = { key: "0", up: true };
-let only = null; // designs that were asked for, in their order; null: the whole front
+let only = null; // numbers of the selected designs, in order; null: the whole front
 
 export function openTable(shownContent) {
   content = shownContent;
@@ -20,7 +20,7 @@ function columns() {
   const made = [
     { key: "number", name: "#", value: (i) => i },
     { key: "source", name: "source", text: true, value: (i) => content.look(i).label },
-    ...head.objectives.map((o, k) => ({
+    ...content.objectives.map((o, k) => ({
       key: String(k), name: `${o.label} [${o.unit.replace(" x ", " × ")}]`, value: (i) => content.values(i)[k],
     })),
   ];
@@ -42,7 +42,7 @@ function columns() {
   return made;
 }
 
-// Shows these designs of the front alone, in this order, until a column is chosen.
+// Shows only these designs of the front, in this order until the table is sorted by a column.
 export function show(numbers) {
   only = numbers;
   sorted = only === null ? { key: "0", up: true } : { key: null, up: true };

@@ -1,10 +1,9 @@
-// What was asked and answered for the selected design, or for all.
+// The calls to the model for the selected design, or for all.
 
 import { listen, state } from "./state.js";
 import { $, duration, element, number } from "./format.js";
 
 const STEPS = { reasoning: "reasoning", parameters: "parameters from the reasoning", answer: "answer", check: "check" };
-const FAULTS = { true: "failed", false: "" };
 
 let content = null;
 
@@ -21,31 +20,31 @@ export function drawTranscript() {
   $("all-calls").parentElement.hidden = content.calls.length === 0;
   const calls = all ? content.calls : state.design === null ? [] : content.callsOf(state.design);
   const parts = [];
-  if (!all) parts.push(element("p", {}, words()));
-  parts.push(...calls.map(told));
-  const key = `${all} ${state.design} ${calls.length}`; // what is there stays, so that an opened prompt stays open
+  if (!all) parts.push(element("p", {}, describeProposal()));
+  parts.push(...calls.map(callElement));
+  const key = `${all} ${state.design} ${calls.length}`; // unchanged elements stay, so that an opened prompt stays open
   if (key === $("transcript").dataset.key) return;
   $("transcript").dataset.key = key;
   $("transcript").replaceChildren(...parts);
 }
 
-function words() {
-  const i = state.design, said = content.proposals[i];
+function describeProposal() {
+  const i = state.design, proposal = content.proposals[i];
   if (i === null) return "Select a design.";
-  if (said?.refines !== null && said?.refines !== undefined) return `#${i} is design #${said.refines}, refined.`;
-  if (said?.fault) return `The proposal for #${i} failed (${said.fault}); the black box replaced it.`;
-  if (!said) return `#${i}, source: ${content.look(i).label}; no reason is given.`;
-  const expected = said.expected ? ` Expected: ${said.expected.map((value) => number(value)).join(", ")}.` : "";
-  return `#${i}, by ${content.look(i).label}: ${said.reason || "no reason is given"}.${expected}`.replace("..", ".");
+  if (proposal?.refines !== null && proposal?.refines !== undefined) return `#${i} is design #${proposal.refines}, refined.`;
+  if (proposal?.fault) return `The proposal for #${i} failed (${proposal.fault}); the black box replaced it.`;
+  if (!proposal) return `#${i}, source: ${content.look(i).label}; no reason is given.`;
+  const expected = proposal.expected ? ` Expected: ${proposal.expected.map((value) => number(value)).join(", ")}.` : "";
+  return `#${i}, by ${content.look(i).label}: ${proposal.reason || "no reason is given"}.${expected}`.replace("..", ".");
 }
 
-function told(call) {
+function callElement(call) {
   const cost = call.cost_usd ? `, ${number(call.cost_usd, 2)} USD` : "";
   const head = [
     `${call.proposal || "before the first trial"}, ${STEPS[call.step] ?? call.step}: ${call.model || call.origin}`,
     call.origin === "model" ? "" : ` (${call.origin})`,
     `, ${duration(call.seconds)}, ${call.input_tokens} tokens in, ${call.output_tokens} out${cost}`,
-    call.fault ? `; ${FAULTS[true]}: ${call.fault}` : "",
+    call.fault ? `; failed: ${call.fault}` : "",
   ].join("");
   const made = element("div", { class: "call" }, element("strong", {}, head));
   if (call.error) made.append(element("p", { class: "missed" }, call.error));
