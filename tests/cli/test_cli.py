@@ -72,7 +72,7 @@ def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> No
     longer = armwright("optimize", "target-1", *SHORT[:-1], "9")
     assert "resumed at trial 10 of 13" in longer.stdout
     message = refused(2, "optimize", "target-1", *SHORT[:-1], "9", "--seed", "0", "--proposer", "none")
-    assert "proposer.name: rules there, None asked" in message
+    assert "proposer.name: rules stored, None requested" in message
 
 
 def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer() -> None:

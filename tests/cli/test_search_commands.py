@@ -59,7 +59,7 @@ def test_robust_and_refine_every(in_folder: Path) -> None:
     assert "tolerance: 0.001" in config
     assert "refine_every: 3" in config
     line = refused(2, "optimize", "target-1", *SHORT, "--proposer", "none", "--refine-every", "3", "--out", "r")
-    assert "tolerance: 0.001 there, 0.0 asked" in line
+    assert "tolerance: 0.001 stored, 0.0 requested" in line
 
 
 @pytest.mark.parametrize(

@@ -187,7 +187,7 @@ def test_changed_method_does_not_reuse_an_existing_run(in_folder: Path) -> None:
     result = run_here(file_of(in_folder, seeds=1, tasks=["random-3"], methods=methods))
     assert result.exit_code == 1
     assert "FAILED: BBO/rules, random-3, seed 0" in result.output
-    assert "n_step: 3 there, 2 asked" in result.output
+    assert "n_step: 3 stored, 2 requested" in result.output
 
 
 @pytest.mark.slow

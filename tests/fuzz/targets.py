@@ -463,7 +463,7 @@ def replayed(proposer: Any) -> None:
     problem = a_problem()
     proposer.check()
     proposer.open(None)
-    proposer.record()
+    proposer.recorded_trials()
     proposer.summary()
     json.dumps(dict(proposer.settings()))
     trials = _trials()

@@ -351,7 +351,7 @@ def test_run_without_a_feasible_design_reports_the_nearest(tmp_path: Path) -> No
     assert run.summary["feasibility"]["nearest"]["number"] == nearest
     assert run.summary["front_size"] == 0
     assert run.summary["verification"] is None
-    words = f"the nearest, #{nearest}, breaks worst_error <= 1e-08 .* most"
+    words = f"the nearest, #{nearest}, violates worst_error <= 1e-08 .* most"
     with pytest.raises(FailureError, match=words):
         pick(run.history)
     with pytest.raises(RunFolderError, match=words):

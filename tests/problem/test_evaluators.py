@@ -202,7 +202,7 @@ def test_a_run_is_resumed_with_its_evaluator_alone(file: Path) -> None:
     more = run(8, aw.load_evaluator("sim.py:simulate"))
     assert [t.values for t in more.trials[:10]] == [t.values for t in first.trials]
     assert [v["evaluator"] for v in more.config.earlier_versions] == [first.config.versions["evaluator"]]
-    with pytest.raises(RunConflictError, match=r"evaluator: sim\.py:simulate there, None asked"):
+    with pytest.raises(RunConflictError, match=r"evaluator: sim\.py:simulate stored, None requested"):
         run(8, None)
     (file.parent / "sim.py").unlink()
     config, history = read_run("runs/own")

@@ -125,7 +125,7 @@ def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, probl
     assert all("position error" in title or "spread" in title or "nee" in title for title in titles)
     designs = problem.space.sample(3, 0)
     if SPREAD in problem.objectives:
-        with pytest.raises(RunFolderError, match="an objective of its own"):
+        with pytest.raises(RunFolderError, match="the custom objective"):
             history.problem.evaluate(designs)
     else:
         assert np.array_equal(history.problem.evaluate(designs).values, problem.evaluate(designs).values)

@@ -35,12 +35,11 @@ from armwright.proposers.replay import ReplayProposer
 from armwright.runs import control
 from armwright.runs.control import (
     CONTROL,
-    LARGEST_FILE,
-    LONGEST_HINT,
-    MOST_HINTS,
+    MAX_FILE_SIZE,
+    MAX_HINT_LENGTH,
+    MAX_HINTS,
     STATUS,
     Control,
-    ControlFile,
     Hint,
     Status,
     add_hint,
@@ -278,7 +277,7 @@ def test_a_cell_that_is_stopped_has_failed_in_words(chat_server: ChatServer, tmp
 
 
 def hostile() -> Mapping[str, bytes]:
-    many = [{"id": i, "text": "x"} for i in range(1, MOST_HINTS + 2)]
+    many = [{"id": i, "text": "x"} for i in range(1, MAX_HINTS + 2)]
     return {
         "empty": b"",
         "cut": b'{"paused": true, "st',
@@ -292,11 +291,11 @@ def hostile() -> Mapping[str, bytes]:
         "an id below 1": b'{"paused": true, "hints": [{"id": 0, "text": "a"}]}',
         "more of a hint": b'{"paused": true, "hints": [{"id": 1, "text": "a", "to": "all"}]}',
         "no words": b'{"paused": true, "hints": [{"id": 1, "text": ""}]}',
-        "too long": json.dumps({"paused": True, "hints": [{"id": 1, "text": "x" * (LONGEST_HINT + 1)}]}).encode(),
+        "too long": json.dumps({"paused": True, "hints": [{"id": 1, "text": "x" * (MAX_HINT_LENGTH + 1)}]}).encode(),
         "too many": json.dumps({"paused": True, "hints": many}).encode(),
         "half a letter": b'{"paused": true, "hints": [{"id": 1, "text": "\\ud800"}]}',
         "deep": b'{"hints": ' + b"[" * 100_000,
-        "huge": b'{"paused": true' + b" " * LARGEST_FILE + b"}",
+        "huge": b'{"paused": true' + b" " * MAX_FILE_SIZE + b"}",
     }
 
 
@@ -304,7 +303,6 @@ def hostile() -> Mapping[str, bytes]:
 def test_a_file_that_is_damaged_or_foreign_asks_for_nothing(tmp_path: Path, name: str) -> None:
     (tmp_path / CONTROL).write_bytes(hostile()[name])
     assert read_control(tmp_path) == Control()
-    assert ControlFile(tmp_path).read() == Control()
     assert add_hint(tmp_path, "and it can be written anew") == Hint(1, "and it can be written anew")
 
 
@@ -325,23 +323,9 @@ def test_a_study_goes_on_beside_a_damaged_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("make", [os.mkdir, getattr(os, "mkfifo", None), lambda path: os.symlink(path, path)])
 def test_what_is_no_file_asks_for_nothing(tmp_path: Path, make: Callable[[Path], None]) -> None:
     make(tmp_path / CONTROL)
-    assert read_control(tmp_path) == ControlFile(tmp_path).read() == Control()
+    assert read_control(tmp_path) == Control()
     make(tmp_path / STATUS)
     assert read_status(tmp_path) is None
-
-
-def test_control_is_parsed_only_where_it_has_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    parsed: list[Path] = []
-    monkeypatch.setattr(control, "read_control", lambda folder: (parsed.append(folder), read_control(folder))[1])
-    file = ControlFile(tmp_path)
-    for change in (pause_study, resume_study, stop_study):
-        change(tmp_path)
-        parsed.clear()
-        assert [file.read() for _ in range(5)] == [read_control(tmp_path)] * 5
-        assert len(parsed) == 1
-    (tmp_path / CONTROL).unlink()
-    assert file.read() == Control()
-    assert len(parsed) == 1
 
 
 def test_watchers_do_not_overwrite_each_other(tmp_path: Path) -> None:
@@ -362,16 +346,16 @@ def test_watchers_do_not_overwrite_each_other(tmp_path: Path) -> None:
 
 
 def test_hints_that_cannot_be_taken_are_refused_in_words(tmp_path: Path) -> None:
-    for text, length in (("", "0"), (" \n\t", "0"), ("x" * (LONGEST_HINT + 1), "2,001")):
-        with pytest.raises(SettingsError, match=f"a hint of {length} characters: from 1 to 2,000 are possible"):
+    for text, length in (("", "0"), (" \n\t", "0"), ("x" * (MAX_HINT_LENGTH + 1), "2,001")):
+        with pytest.raises(SettingsError, match=f"expected a hint of 1 to 2,000 characters, got {length}"):
             add_hint(tmp_path, text)
     assert not (tmp_path / CONTROL).exists()
-    for text in ("x" * LONGEST_HINT, "\U0001f9be" * LONGEST_HINT, "half a letter \ud800"):
+    for text in ("x" * MAX_HINT_LENGTH, "\U0001f9be" * MAX_HINT_LENGTH, "half a letter \ud800"):
         add_hint(tmp_path, text)
-    assert [len(hint.text) for hint in read_control(tmp_path).hints] == [LONGEST_HINT, LONGEST_HINT, 15]
-    for i in range(len(read_control(tmp_path).hints), MOST_HINTS):
+    assert [len(hint.text) for hint in read_control(tmp_path).hints] == [MAX_HINT_LENGTH, MAX_HINT_LENGTH, 15]
+    for i in range(len(read_control(tmp_path).hints), MAX_HINTS):
         add_hint(tmp_path, f"hint {i}")
-    with pytest.raises(SettingsError, match="has 100 hints, and more are not possible"):
+    with pytest.raises(SettingsError, match="expected at most 100 hints for a run"):
         add_hint(tmp_path, "one more")
     (tmp_path / "file").touch()
     with pytest.raises(RunFolderError, match="cannot write"):

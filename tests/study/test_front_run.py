@@ -147,7 +147,7 @@ def test_it_begins_with_a_run_or_a_proposer(tmp_path: Path) -> None:
 
 
 def test_folders_of_other_runs_are_refused(done: FrontRun, tmp_path: Path) -> None:
-    with pytest.raises(RunConflictError, match="seed: 1 there, 2 asked"):
+    with pytest.raises(RunConflictError, match="seed: 1 stored, 2 requested"):
         find_front(PROBLEM, budget="100", seed=2, out=done.folder)
     with pytest.raises(RunConflictError):
         optimize(PROBLEM, proposer="none", n_total=5, seed=1, out=done.folder)

@@ -247,7 +247,7 @@ def test_another_template_for_the_same_run_is_refused_in_one_line(chat_server: C
         own.write_text(text, encoding="utf-8")
         if text == OWN:
             run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt=str(own)))
-    with pytest.raises(RunConflictError, match=r"proposer\.template: .* there, .* asked") as refusal:
+    with pytest.raises(RunConflictError, match=r"proposer\.template: .* stored, .* requested") as refusal:
         run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt=str(own)))
     assert "\n" not in str(refusal.value)
     assert len(str(refusal.value)) < 400

@@ -246,10 +246,10 @@ def test_changed_settings_are_refused_with_differences(tmp_path: Path) -> None:
     with pytest.raises(RunConflictError) as refusal:
         optimize(PROBLEM, proposer=Listed(), n_init=5, n_step=2, n_total=6, seed=3, out=tmp_path / "run")
     for difference in (
-        "n_step: 4 there, 2 asked",
-        "seed: 0 there, 3 asked",
-        "proposer.name: None there, listed asked",
-        "n_total: 8 there, 6 asked (it can only grow)",
+        "n_step: 4 stored, 2 requested",
+        "seed: 0 stored, 3 requested",
+        "proposer.name: None stored, listed requested",
+        "n_total: 8 stored, 6 requested (it can only grow)",
     ):
         assert difference in str(refusal.value)
 
@@ -312,10 +312,10 @@ def test_changed_sampler_factory_is_refused(tmp_path: Path) -> None:
 
     go_on(lambda seed: RandomSampler(seed=seed), 2)
     with pytest.raises(
-        RunConflictError, match=r"sampler: line \d+ \(.*\) of tests.study.test_study,.* there, line \d+"
+        RunConflictError, match=r"sampler: line \d+ \(.*\) of tests.study.test_study,.* stored, line \d+"
     ):
         go_on(lambda seed: QMCSampler(seed=seed), 3)
-    with pytest.raises(RunConflictError, match="qmc asked"):
+    with pytest.raises(RunConflictError, match="qmc requested"):
         go_on(qmc, 3)
 
 
@@ -331,7 +331,7 @@ def test_deleted_run_folder_is_reported_at_once(tmp_path: Path) -> None:
         if progress.number == 6:
             shutil.rmtree(tmp_path / "run")
 
-    with pytest.raises(RunFolderError, match="deleted while the run went on"):
+    with pytest.raises(RunFolderError, match="deleted during the run"):
         optimize(PROBLEM, proposer="none", n_init=2, n_total=50, out=tmp_path / "run", watch=delete)
 
 

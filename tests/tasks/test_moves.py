@@ -339,7 +339,7 @@ def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
     (in_folder / "line.yaml").write_text(f"{text} [position_error, path_error]\nmove_step: 0.01\n")
     again = CliRunner().invoke(app, words)
     assert isinstance(again.exception, RunConflictError)
-    assert "move_step: 0.02 there, 0.01 asked" in str(again.exception)
+    assert "move_step: 0.02 stored, 0.01 requested" in str(again.exception)
     (in_folder / "line.yaml").write_text(f"{text} [position_error, torque]\n")
     told = CliRunner().invoke(app, [*words, "--no-figures", "--out", "other"])
     assert "no objective uses the task's moves" in told.output

@@ -98,7 +98,7 @@ def test_looking_whether_a_folder_is_held_keeps_nobody_out(tmp_path: Path) -> No
 
 def test_a_folder_that_is_deleted_is_not_made_again_without_its_trials(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    with pytest.raises(RunFolderError, match="was moved or deleted while the run went on; move it back"):
+    with pytest.raises(RunFolderError, match="was moved or deleted during the run; move it back"):
         optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, lambda: shutil.rmtree(folder)))
     assert not folder.exists()
 
@@ -133,7 +133,7 @@ def test_another_folder_in_its_place_is_left_alone(tmp_path: Path) -> None:
 
 def test_trials_that_are_deleted_end_the_run(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    with pytest.raises(RunFolderError, match="the file was deleted while the run went on"):
+    with pytest.raises(RunFolderError, match="the file was deleted during the run"):
         optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, lambda: (folder / "trials.jsonl").unlink()))
 
 

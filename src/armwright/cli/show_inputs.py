@@ -111,7 +111,7 @@ def show_draft(console: Console, draft: Draft) -> None:
     cost = "cost unknown" if usage.cost_usd is None else f"{usage.cost_usd:.4f} USD"
     console.print(
         f"{draft.by}: {usage.calls} {'call' if usage.calls == 1 else 'calls'}, {usage.input_tokens:,} tokens in, "
-        f"{usage.output_tokens:,} out, {cost}, {usage.seconds:.1f} s"
+        f"{usage.output_tokens:,} out, {cost}, {usage.call_seconds:.1f} s"
     )
     console.print(f"wrote {' and '.join(map(str, draft.files))}: a draft. Check and edit the numbers, then run:")
     console.print(f"  armwright tasks {shlex.quote(str(draft.files[0]))}\n  {draft.command}")

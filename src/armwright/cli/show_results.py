@@ -19,7 +19,7 @@ from armwright.problem.objectives import (
     TORQUE_SCALE,
 )
 from armwright.runs.history import FrontMember, History
-from armwright.runs.results import REPORT, unmet
+from armwright.runs.results import REPORT, describe_infeasibility
 from armwright.study.front_run import FrontRun
 from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
@@ -105,7 +105,8 @@ def show_refined(console: Console, refined: RefinedRun) -> None:
 
 def _show_empty_front(console: Console, history: History, hypervolume: float, more: str) -> None:
     if len(history) and not history.feasible.any():
-        console.print(f"{unmet(history)[0].upper()}{unmet(history)[1:]}. Use {more} or looser constraints.")
+        message = describe_infeasibility(history)
+        console.print(f"{message[0].upper()}{message[1:]}. Use {more} or looser constraints.")
     elif hypervolume == 0.0:
         console.print(
             f"All designs lie beyond the reference point, so none counts. Use {more} or another reference point."

@@ -17,7 +17,7 @@ from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt_values import MOST_TARGETS, VARIABLES, common_values, shown_values
 from armwright.llm.template_sandbox import Sandbox, render
 from armwright.problem.problem import Problem
-from armwright.runs.control import LONGEST_HINT
+from armwright.runs.control import MAX_HINT_LENGTH
 from armwright.runs.history import History
 from armwright.text import end_of, fence, one_line, without_thoughts
 
@@ -208,7 +208,7 @@ def estimated_tokens(text: str) -> int:
 
 def _visible_hints(hints: Sequence[str]) -> list[str]:
     """Return each hint on one line, without those that have no visible characters."""
-    return [line for hint in hints if (line := one_line(hint, LONGEST_HINT))]
+    return [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))]
 
 
 def _fewer(targets: int, designs: int, proposed: int) -> tuple[int, int, int]:

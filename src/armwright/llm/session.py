@@ -46,7 +46,7 @@ class LlmSession:
             input_tokens=sum(call.input_tokens for call in calls),
             output_tokens=sum(call.output_tokens for call in calls),
             cost_usd=total_cost(calls) if any(call.requests for call in calls) else None,
-            seconds=round(sum(call.seconds for call in calls), 3),
+            call_seconds=round(sum(call.seconds for call in calls), 3),
         )
 
     def cancel(self) -> None:

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.runs.summary import ProposerSummary
+from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
 
 
@@ -32,29 +33,6 @@ class Proposal:
     asked: int = 0
     known: int | None = None
     note: str = ""
-
-
-@dataclass(frozen=True)
-class RecordedTurn:
-    """A proposal or failure in a run that is replayed.
-
-    Attributes:
-        asked: trial that it was requested for.
-        feedback: number of finished trials known at the time.
-        proposal: id of the proposal; None for a failure.
-    """
-
-    asked: int
-    feedback: int
-    proposal: str | None
-
-
-@dataclass(frozen=True)
-class Record:
-    """A recorded run: its proposals and failures by trial number, and its number of trials."""
-
-    turns: Mapping[int, RecordedTurn]
-    n_trials: int
 
 
 class Proposer(Protocol):
@@ -96,9 +74,9 @@ class Proposer(Protocol):
         """Return proposals of earlier sessions of this run that no trial has used yet; they go first."""
         return ()
 
-    def record(self) -> Record | None:
-        """Return when the proposals of a replayed run entered; None if no run is replayed."""
-        return None
+    def recorded_trials(self) -> Sequence[FinishedTrial]:
+        """Return the trials of the run that is replayed; empty if none is."""
+        return ()
 
     def summary(self) -> ProposerSummary:
         """Return the number, cost and time of the calls so far."""

@@ -14,7 +14,7 @@ from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import ReplayBackend
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of
 from armwright.proposers.prompted import LAST_STEPS, PromptedProposer
-from armwright.proposers.proposer import Proposal, Record, RecordedTurn
+from armwright.proposers.proposer import Proposal
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Hint
 from armwright.runs.folder import CONFIG, read_config, read_run
@@ -62,17 +62,9 @@ class ReplayProposer(PromptedProposer):
         if any(call.step == "check" and call.fault is None for call in self.recording.calls):
             super().check()
 
-    def record(self) -> Record | None:
-        """Return when the recorded proposals entered; None for a transcript without its run."""
-        if not self._trials:
-            return None
-        turns: dict[int, RecordedTurn] = {}
-        for trial in self._trials:
-            if trial.proposal is not None or trial.fault is not None:
-                asked = trial.number if trial.asked is None else trial.asked
-                feedback = trial.number if trial.feedback is None else trial.feedback
-                turns[trial.number] = RecordedTurn(asked, feedback, trial.proposal)
-        return Record(turns, len(self._trials))
+    def recorded_trials(self) -> Sequence[FinishedTrial]:
+        """Return the trials of the recorded run; empty for a transcript without its run."""
+        return self._trials
 
     def summary(self) -> ProposerSummary:
         """Return the summary of the replayed calls."""
@@ -102,7 +94,7 @@ class ReplayProposer(PromptedProposer):
         return hints_of(self.recording.calls, self.identity(number))
 
     def _why_missing(self, number: int) -> tuple[str, str]:
-        recorded = next((t for t in self._trials if t.fault and number == (t.asked or t.number)), None)
+        recorded = next((t for t in self._trials if t.fault and t.request is not None and t.request[0] == number), None)
         if recorded is not None:  # never asked or not answered: no budget, or a model that was given up
             assert recorded.fault is not None
             return recorded.fault, f"recorded: {recorded.fault}"

@@ -26,7 +26,7 @@ from armwright.exceptions import ArmwrightError
 from armwright.files import replace_surrogates
 from armwright.report.live_run import LiveRun
 from armwright.report.page import render_page
-from armwright.runs.control import LONGEST_HINT, add_hint, pause_study, resume_study, stop_study
+from armwright.runs.control import MAX_HINT_LENGTH, add_hint, pause_study, resume_study, stop_study
 
 POLL = 0.25  # [s] between two checks of the run folder
 HEARTBEAT = 15.0  # [s] between events while nothing changes
@@ -51,7 +51,7 @@ class HintRequest(BaseModel, frozen=True, extra="forbid"):
     """A hint for the next prompt."""
 
     action: Literal["hint"]
-    text: str = Field(min_length=1, max_length=LONGEST_HINT)
+    text: str = Field(min_length=1, max_length=MAX_HINT_LENGTH)
 
 
 _REQUESTS: TypeAdapter[ControlRequest | HintRequest] = TypeAdapter(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.pareto import front_mask
 from armwright.runs.history import History
+from armwright.runs.trial import Count
 
 
 @dataclass(frozen=True)
@@ -18,8 +19,8 @@ class Attribution:
     hypervolume_gained: see `hypervolume_gains`, summed; None as long as there is no reference point.
     """
 
-    trials: int
-    front: int
+    trials: Count
+    front: Count
     hypervolume_gained: float | None
 
 

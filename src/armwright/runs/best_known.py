@@ -15,6 +15,7 @@ from armwright.arrays import Array
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem.objectives import PAPER_OBJECTIVES
 from armwright.problem.problem import Problem
+from armwright.runs.trial import Count
 from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import Design, FloatParameter
 from armwright.tasks.catalogue import builtin_names, load_task
@@ -43,7 +44,7 @@ class FrontGap:
 
     hypervolume: float
     share: float
-    beyond: int
+    beyond: Count
     gain: float
 
 

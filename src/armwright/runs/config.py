@@ -1,4 +1,4 @@
-"""The settings of a run: everything needed to repeat it, as config.yaml holds it."""
+"""The settings of a run: everything needed to repeat it, stored in config.yaml."""
 
 import platform
 from collections.abc import Mapping, Sequence
@@ -20,21 +20,28 @@ from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
 
-# Of a task; its words may change.
-IDENTITY = (
-    "name", "targets", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step",
-    "move_time", "workspace", "constraints", "reference_point",
-)  # fmt: skip
+# Settings that may differ when a run resumes. The objectives of the task are those of the run.
+MAY_DIFFER = {
+    "task": {"description", "provenance", "objectives"},
+    "versions": True,
+    "earlier_versions": True,
+    "reference_point": True,
+}
 PACKAGES = ("armwright", "moocore", "numpy", "optuna", "warp-lang", "pydantic-ai-slim", "scipy", "torch")
 
 
 class Method(BaseModel, frozen=True, extra="forbid"):
-    """How a study searches.
+    """The search settings of a study.
 
-    proposer: its name and settings; None for black-box trials only.
-    in_flight: how many questions go on while black-box trials run; None: the study waits for each.
-    refine_every: after so many counted trials the next free one refines a design of the front; None: never.
-    initial_designs: that the first of the n_init trials are, in place of random ones.
+    Attributes:
+        proposer: Its name and settings; None for black-box trials only.
+        sampler: The name of the sampler.
+        n_init: Number of random trials.
+        n_step: Trials of a block; one of each block is the proposer's.
+        n_total: Number of counted trials.
+        in_flight: Requests to the proposer that run while black-box trials continue; None to wait for each.
+        refine_every: Counted trials between refinements of a design of the front; None for no refinement.
+        initial_designs: Designs of the first of the n_init trials.
     """
 
     proposer: dict[str, Any] | None
@@ -49,14 +56,15 @@ class Method(BaseModel, frozen=True, extra="forbid"):
     @field_validator("proposer")
     @classmethod
     def _check_proposer(cls, settings: dict[str, Any] | None) -> dict[str, Any] | None:
-        """Check the settings that a resumed run asks its proposer with."""
-        kinds = {"name": str} | ({"prompt": str} if settings and "prompt" in settings else {})
-        if "prompt" in kinds:
+        """Check the settings that a resumed run passes to its proposer."""
+        if settings is None:
+            return None
+        kinds: dict[str, type] = {"name": str} | {key: str for key in ("prompt", "template") if key in settings}
+        if "prompt" in settings:
             kinds |= {"memory": str, "answer": str, "proposals": int}
-        kinds |= {"template": str} if settings and "template" in settings else {}
         for key, kind in kinds.items():
-            if settings is not None and not isinstance(settings.get(key), kind):
-                raise ValueError(f"{key} = {settings.get(key)!r} is no {kind.__name__}")
+            if not isinstance(settings.get(key), kind):
+                raise ValueError(f"{key}: expected {kind.__name__}, got {settings.get(key)!r}")
         return settings
 
     @property
@@ -83,14 +91,14 @@ class Method(BaseModel, frozen=True, extra="forbid"):
 
 
 class FrontMethod(BaseModel, frozen=True, extra="forbid"):
-    """The settings of a direct search (study/front_run.py): its initial designs."""
+    """The search settings of a direct search (study/front_run.py): its initial designs."""
 
     search: Literal["front_search"] = "front_search"
     initial_designs: dict[str, Any] | None = None
 
     @property
     def n_init(self) -> int:
-        """Its trials are the front alone."""
+        """0: the trials are the front."""
         return 0
 
 
@@ -111,9 +119,18 @@ def record_objectives(objectives: Sequence[Objective]) -> tuple[ObjectiveRecord,
 class RunConfig(BaseModel, frozen=True, extra="forbid"):
     """Everything needed to repeat a run.
 
-    tolerance, device: `Problem`'s.
-    objectives: what is minimised, in the order of the trials' values.
-    reference_point: as the task states it, or as frozen after the first n_init trials (None until then).
+    Attributes:
+        task: The task.
+        space: The design space.
+        tolerance: Build tolerance of the problem [m].
+        device: Device of the problem.
+        objectives: What is minimised, in the order of the trials' values.
+        reference_point: The task's, or the one chosen after the first n_init trials; None until then.
+        method: The search settings.
+        seed: Seed of all random numbers.
+        evaluator: Name of the custom evaluator; never loaded from here.
+        versions: Versions that the results depend on.
+        earlier_versions: Versions of earlier sessions, if they differ.
     """
 
     task: Task
@@ -124,31 +141,26 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     reference_point: tuple[float, ...] | None
     method: Method | FrontMethod
     seed: int
-    evaluator: str | None = None  # of one's own that measured designs in place of ours, by name; never loaded from here
+    evaluator: str | None = None
     versions: dict[str, str]
-    earlier_versions: list[dict[str, str]] = []  # of sessions that made earlier trials, where they were others
+    earlier_versions: list[dict[str, str]] = []
 
     @property
     def problem(self) -> Problem:
-        """The problem of the run; on the CPU, where its GPU is not here.
+        """The problem of the run, on the CPU if its GPU is missing.
 
-        Objectives of one's own have their names and values here; to compute them again needs the problem itself.
+        Custom objectives have their names and recorded values; their formulas are not in the run folder.
         """
-        return self.problem_with(None)
-
-    def problem_with(self, evaluator: Evaluator | None) -> Problem:
-        """Return the problem of the run with the evaluator that measures its designs."""
-        own = {} if evaluator is None else {objective.name: objective for objective in evaluator.objectives}
-        objectives = tuple(own.get(record.name) or _recorded(record) for record in self.objectives)
-        return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives, evaluator)
+        objectives = tuple(map(_recorded, self.objectives))
+        return Problem(self.task, self.space, self.tolerance, usable_device(self.device), objectives)
 
     @property
     def study(self) -> Method:
-        """The settings of its study; RunFolderError if it is a search for the whole front."""
+        """The settings of the study; RunFolderError if the run is a direct search."""
         if isinstance(self.method, FrontMethod):
             raise RunFolderError(
-                "this run is a search for the whole front, not a study: its front needs no refinement, and "
-                "`armwright design` with a larger --budget continues it"
+                "this run is a direct search, not a study: its front needs no refinement, and `armwright design` with "
+                "a larger --budget continues it"
             )
         return self.method
 
@@ -161,7 +173,7 @@ def _recorded(record: ObjectiveRecord) -> Objective:
 
     def each(evaluation: Evaluation) -> Array:
         raise RunFolderError(
-            f"the run minimised an objective of its own, {record.name}; its formula is not in the run folder"
+            f"the run minimised the custom objective {record.name}; its formula is not in the run folder"
         )
 
     return Objective(record.name, record.unit, record.label.lower(), each, "arm", record.label, record.symbol)
@@ -178,17 +190,17 @@ def versions(evaluator: Evaluator | None = None) -> dict[str, str]:
     return found
 
 
-def check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
-    """Raise RunConflictError if `asked` differs from the existing run; a larger n_total is allowed."""
-    old, new = _identity(there), _identity(asked)
+def check_same_run(path: Path, stored: RunConfig, requested: RunConfig) -> None:
+    """Raise RunConflictError if `requested` differs from the stored run; a larger n_total is allowed."""
+    old, new = _identity(stored), _identity(requested)
     differences = [
-        f"{key}: {_brief(old.get(key))} there, {_brief(new.get(key))} asked"
+        f"{key}: {_brief(old.get(key))} stored, {_brief(new.get(key))} requested"
         for key in {**old, **new}
         if old.get(key) != new.get(key)
     ]
-    n_there, n_asked = (getattr(config.method, "n_total", 0) for config in (there, asked))
-    if n_asked < n_there:
-        differences.append(f"n_total: {n_there} there, {n_asked} asked (it can only grow)")
+    n_old, n_new = (getattr(config.method, "n_total", 0) for config in (stored, requested))
+    if n_new < n_old:
+        differences.append(f"n_total: {n_old} stored, {n_new} requested (it can only grow)")
     if differences:
         raise RunConflictError(
             f"{path} holds a run with other settings ({'; '.join(differences)}). "
@@ -197,22 +209,19 @@ def check_same_run(path: Path, there: RunConfig, asked: RunConfig) -> None:
 
 
 def _brief(value: Any) -> str:
-    """Return a setting on one short line; custom prompts fill a page."""
+    """Return a setting on one short line; custom prompts are long."""
     text = " ".join(str(value).split())
     return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _identity(config: RunConfig) -> dict[str, Any]:
     """Return the settings that identify a run, flat."""
-    content = config.model_dump(mode="json")
-    content["task"] = {key: content["task"][key] for key in IDENTITY}
+    content = config.model_dump(mode="json", exclude=MAY_DIFFER)
     content["objectives"] = [objective["name"] for objective in content["objectives"]]
     method = content.pop("method")
     method.pop("n_total", None)
     if isinstance(method["initial_designs"], dict):
-        method["initial_designs"].pop("run", None)  # a path has many spellings; its content is known by its sha256
-    for key in ("versions", "earlier_versions", "reference_point"):
-        del content[key]
+        method["initial_designs"].pop("run", None)  # a path has many spellings; the sha256 identifies its content
     return _flat({**content, **method})
 
 

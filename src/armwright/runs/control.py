@@ -1,9 +1,9 @@
-"""Between a running study and whoever watches it from another process: two small files in the run folder.
+"""Control of a running study from another process, by two small files in the run folder.
 
-control.json   what is asked of the study: to pause, to stop, hints for its language model; written by the watcher
-status.json    what the study does; written by the study when that changes
+control.json   requests: pause, stop, hints for the language model; written by the watcher
+status.json    activity of the study, written by the study when it changes
 
-Neither waits for the other, and a study without a watcher is the same study.
+Neither process waits for the other, and a study gives the same trials without a watcher.
 """
 
 import os
@@ -17,17 +17,17 @@ from typing import Annotated, ClassVar, Literal, TypeVar
 from filelock import FileLock
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from armwright.exceptions import RunFolderError, SettingsError
-from armwright.files import replace_file, replace_surrogates
+from armwright.exceptions import SettingsError
+from armwright.files import naming_write_errors, replace_file, replace_surrogates
 
 CONTROL = "control.json"
 STATUS = "status.json"
-LOCK = ".control.lock"  # held while control.json is changed, for there may be several watchers
+LOCK = ".control.lock"  # held while control.json is changed; there may be several watchers
 CHANNEL_FILES = (CONTROL, f"{CONTROL}.part", STATUS, f"{STATUS}.part", LOCK)
-LONGEST_HINT = 2_000  # characters
-MOST_HINTS = 100  # of a run
-LARGEST_FILE = 4 * 1024 * 1024  # [bytes]; the most hints, each letter escaped, have some 2.4 MB
-LOCK_SECONDS = 5.0  # that a change waits for others
+MAX_HINT_LENGTH = 2_000  # characters
+MAX_HINTS = 100  # of a run
+MAX_FILE_SIZE = 4 * 1024 * 1024  # [bytes]; the longest allowed hints, each letter escaped, take about 2.4 MB
+LOCK_SECONDS = 5.0  # to wait for changes by other watchers
 
 Doing = Literal["evaluating", "asking", "paused", "stopped", "finished"]
 
@@ -39,36 +39,40 @@ class Hint:
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True)
 
     id: Annotated[int, Field(ge=1)]
-    text: Annotated[str, Field(min_length=1, max_length=LONGEST_HINT)]
+    text: Annotated[str, Field(min_length=1, max_length=MAX_HINT_LENGTH)]
 
 
 class Control(BaseModel, frozen=True, extra="forbid", strict=True):
     """A request to a study.
 
-    paused: no trial begins.  stop: its session ends before the next trial.
-    hints: all of the run, those that were used included, by rising id.
+    Attributes:
+        paused: No trial begins.
+        stop: The session ends before the next trial.
+        hints: All hints of the run, used ones included, by increasing id.
     """
 
     paused: bool = False
     stop: bool = False
-    hints: tuple[Hint, ...] = Field(default=(), max_length=MOST_HINTS)
+    hints: tuple[Hint, ...] = Field(default=(), max_length=MAX_HINTS)
 
     @field_validator("hints")
     @classmethod
     def _ids_rise(cls, hints: tuple[Hint, ...]) -> tuple[Hint, ...]:
         ids = [hint.id for hint in hints]
         if ids != sorted(set(ids)):
-            raise ValueError("the ids of hints must rise")
+            raise ValueError("expected increasing ids of hints")
         return hints
 
 
 class Status(BaseModel, frozen=True, extra="forbid", strict=True):
     """The status of a study.
 
-    pid: of its process, which may have been killed since.
-    number: the trial that it came to when it began to do so; of a finished study, how many trials there are.
-    since: when it began to do so [s since 1970]; by a wrong clock before that.
-    fault: why the last question, or the session, failed; empty where it did not.
+    Attributes:
+        pid: Its process, which may have been killed since.
+        doing: Its activity.
+        number: The trial at which the activity began; the number of trials of a finished study.
+        since: When the activity began [s since 1970].
+        fault: Why the last request to the model, or the session, failed; empty if it did not.
     """
 
     pid: int = Field(gt=0, lt=2**31)
@@ -81,9 +85,9 @@ class Status(BaseModel, frozen=True, extra="forbid", strict=True):
 Content = TypeVar("Content", bound=BaseModel)
 
 
-def read_control(folder: Path) -> Control:
+def read_control(folder: Path | None) -> Control:
     """Return the request for the study in a run folder; empty if the file is missing or damaged."""
-    return _read(folder / CONTROL, Control) or Control()
+    return (None if folder is None else _read(folder / CONTROL, Control)) or Control()
 
 
 def read_status(folder: Path) -> Status | None:
@@ -93,114 +97,90 @@ def read_status(folder: Path) -> Status | None:
 
 def pause_study(folder: Path) -> None:
     """Begin no new trial until `resume_study`."""
-    _change(folder, lambda asked: asked.model_copy(update={"paused": True}))
+    _change(folder, lambda control: control.model_copy(update={"paused": True}))
 
 
 def resume_study(folder: Path) -> None:
     """Continue a paused study."""
-    _change(folder, lambda asked: asked.model_copy(update={"paused": False}))
+    _change(folder, lambda control: control.model_copy(update={"paused": False}))
 
 
 def stop_study(folder: Path) -> None:
     """End the study's session after the current trial, or at once if it is paused."""
-    _change(folder, lambda asked: asked.model_copy(update={"stop": True}))
+    _change(folder, lambda control: control.model_copy(update={"stop": True}))
 
 
 def add_hint(folder: Path, text: str) -> Hint:
     """Give the language model a hint for its next prompt; SettingsError if the text is empty or too long."""
     message = replace_surrogates(text).strip()
-    if not 1 <= len(message) <= LONGEST_HINT:
-        raise SettingsError(f"a hint of {len(message):,} characters: from 1 to {LONGEST_HINT:,} are possible")
+    if not 1 <= len(message) <= MAX_HINT_LENGTH:
+        raise SettingsError(f"expected a hint of 1 to {MAX_HINT_LENGTH:,} characters, got {len(message):,}")
 
-    def added(asked: Control) -> Control:
-        if len(asked.hints) >= MOST_HINTS:
-            raise SettingsError(f"{folder} has {MOST_HINTS} hints, and more are not possible")
-        hint = Hint(asked.hints[-1].id + 1 if asked.hints else 1, message)
-        return asked.model_copy(update={"hints": (*asked.hints, hint)})
+    def add(control: Control) -> Control:
+        if len(control.hints) >= MAX_HINTS:
+            raise SettingsError(f"expected at most {MAX_HINTS} hints for a run; {folder} has as many already")
+        hint = Hint(control.hints[-1].id + 1 if control.hints else 1, message)
+        return control.model_copy(update={"hints": (*control.hints, hint)})
 
-    return _change(folder, added).hints[-1]
-
-
-class ControlFile:
-    """control.json of a run folder, parsed again only where it has changed; without a folder nothing is ever asked."""
-
-    def __init__(self, folder: Path | None) -> None:
-        self._folder = folder
-        self._seen: tuple[int, int, int] | None = None  # the file's time [ns], size [bytes] and place
-        self._asked = Control()
-
-    def read(self) -> Control:
-        """Return the current request."""
-        if self._folder is None:
-            return self._asked
-        try:
-            there = os.stat(self._folder / CONTROL)
-        except OSError:
-            self._seen, self._asked = None, Control()
-            return self._asked
-        seen = there.st_mtime_ns, there.st_size, there.st_ino
-        if seen != self._seen:
-            self._seen, self._asked = seen, read_control(self._folder)
-        return self._asked
+    return _change(folder, add).hints[-1]
 
 
 class Channel:
-    """The study's end: what is asked of it, and what it says of itself. Without a folder nobody is at the other end."""
+    """The study's end of the channel: reads requests and writes the status. Without a folder there is no watcher."""
 
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
-        self._control = ControlFile(folder)
-        self._said: Status | None = None  # in this session
+        self._status: Status | None = None  # written in this session
 
     def begin(self, number: int) -> None:
         """Begin a session with this trial; clear earlier requests, but keep hints."""
-        earlier = self.asked()
+        earlier = self.control()
         if self._folder is not None and (earlier.paused or earlier.stop):
-            _change(self._folder, lambda asked: Control(hints=asked.hints))
-        self.say("evaluating", number)
+            _change(self._folder, lambda control: Control(hints=control.hints))
+        self.report("evaluating", number)
 
-    def asked(self) -> Control:
+    def control(self) -> Control:
         """Return the current request."""
-        return self._control.read()
+        return read_control(self._folder)
 
-    def say(self, doing: Doing, number: int, fault: str | None = None) -> None:
+    def report(self, doing: Doing, number: int, fault: str | None = None) -> None:
         """Write the status if it has changed; ignore a file that cannot be written.
 
-        fault: None where there is nothing new to say of it.
+        Args:
+            doing: The activity.
+            number: The current trial.
+            fault: Why the last request to the model failed, empty if it did not; None if nothing has changed.
         """
         if self._folder is None:
             return
-        before = self._said
-        message = before.fault if before is not None and fault is None else replace_surrogates(fault or "")
-        if before is not None and (doing, message) == (before.doing, before.fault):
+        old = self._status
+        message = old.fault if old is not None and fault is None else replace_surrogates(fault or "")
+        if old is not None and (doing, message) == (old.doing, old.fault):
             return
-        since = before.since if before is not None and doing == before.doing else time.time()
-        self._said = Status(pid=os.getpid(), doing=doing, number=number, since=since, fault=message)
+        since = old.since if old is not None and doing == old.doing else time.time()
+        self._status = Status(pid=os.getpid(), doing=doing, number=number, since=since, fault=message)
         with suppress(OSError):
-            replace_file(self._folder / STATUS, self._said.model_dump_json().encode())
+            replace_file(self._folder / STATUS, self._status.model_dump_json().encode())
 
     def finish(self, number: int) -> None:
         """Mark the study as finished, unless an earlier session did."""
-        there = None if self._folder is None else read_status(self._folder)
-        if self._said is not None or there is None or there.doing != "finished":
-            self.say("finished", number)
+        written = None if self._folder is None else read_status(self._folder)
+        if self._status is not None or written is None or written.doing != "finished":
+            self.report("finished", number)
 
 
 def _change(folder: Path, change: Callable[[Control], Control]) -> Control:
     """Replace the request by the result of `change`."""
-    try:
-        with FileLock(folder / LOCK, timeout=LOCK_SECONDS):
-            asked = change(read_control(folder))
-            replace_file(folder / CONTROL, asked.model_dump_json().encode())
-    except OSError as fault:
-        raise RunFolderError(f"cannot write {folder / CONTROL}: {fault.strerror or fault}") from fault
-    return asked
+    with naming_write_errors(folder / CONTROL), FileLock(folder / LOCK, timeout=LOCK_SECONDS):
+        control = change(read_control(folder))
+        replace_file(folder / CONTROL, control.model_dump_json().encode())
+    return control
 
 
 def _read(path: Path, schema: type[Content]) -> Content | None:
-    """Return the content of a file that another process wrote; None if it is unusable."""
+    """Return the content of a file that another process wrote; None if it is missing or damaged."""
     try:
-        if not path.is_file() or path.stat().st_size > LARGEST_FILE:
+        if not path.is_file() or path.stat().st_size > MAX_FILE_SIZE:
             return None
         return schema.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):

@@ -1,13 +1,13 @@
-"""The run folder: a run's settings and finished trials on disk, written, read and checked here.
+"""The run folder: the settings and finished trials of a run on disk, written, read and checked here.
 
     config.yaml        everything needed to repeat the run
-    trials.jsonl       one line a finished trial, written before the next begins: the truth
+    trials.jsonl       one line per finished trial, written before the next begins
     transcripts.jsonl  every call to a language model (llm/transcript.py)
-    control.json, status.json  between a running study and whoever watches it (control.py)
+    control.json, status.json  channel between a running study and its watchers (control.py)
     search.npz, proposals/  state and initial designs of a direct search (study/front_run.py)
     trials.csv, front.csv, summary.json, designs/NNNN/ (results.py), and figures/ (report/figures.py)
 
-What stands in the last lines is made from the finished trials, and can be made again.
+The files of the last line are derived from the finished trials and can be written again.
 """
 
 import errno
@@ -15,6 +15,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self, cast
@@ -22,7 +23,7 @@ from typing import BinaryIO, Self, cast
 from filelock import FileLock, Timeout
 
 from armwright.exceptions import RunConflictError, RunFolderError
-from armwright.files import replace_file
+from armwright.files import naming_write_errors, replace_file
 from armwright.problem.evaluators import Evaluator
 from armwright.runs.config import RunConfig, check_same_run, versions
 from armwright.runs.control import CHANNEL_FILES
@@ -31,9 +32,10 @@ from armwright.runs.trial import FinishedTrial, trial_line
 from armwright.runs.trials_file import TRIALS, read_trials
 from armwright.yaml_documents import dump_document, parse_document
 
-LOCK = ".lock"  # held by whoever writes; the system lets go of a dead process's, and the file stays
-LOCK_SECONDS = 2.0  # that a command waits for it: the workers of a killed experiment take a moment to end
+LOCK = ".lock"  # locked by the process that writes; the system releases the lock of a dead process
+LOCK_SECONDS = 2.0  # to wait for it: the workers of a killed experiment take a moment to end
 CONFIG = "config.yaml"
+KEPT = ". What was written before is safe; free room or give another --out DIR, and run the same command again"
 PROPOSALS = "proposals"
 SEARCH = "search.npz"
 BEFORE_TRIALS = {
@@ -47,20 +49,19 @@ class RunFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._lock = FileLock(path / LOCK)
-        self._place: os.stat_result | None = None
+        self._stat: os.stat_result | None = None
         self._trials: BinaryIO | None = None
 
     def __enter__(self) -> Self:
-        try:
+        with naming_write_errors(self.path, KEPT):
             self.path.mkdir(parents=True, exist_ok=True)
-            self._lock.acquire(timeout=LOCK_SECONDS)
-            self._place = self.path.stat()
-        except Timeout as fault:
-            raise RunFolderError(
-                f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
-            ) from fault
-        except OSError as fault:
-            raise _write_error(Path(fault.filename or self.path), fault) from fault
+            try:
+                self._lock.acquire(timeout=LOCK_SECONDS)
+            except Timeout as fault:
+                raise RunFolderError(
+                    f"{self.path} is in use by another armwright process; wait for it, or give another --out DIR"
+                ) from fault
+            self._stat = self.path.stat()
         return self
 
     def __exit__(
@@ -74,22 +75,23 @@ class RunFolder:
     def adopt(self, config: RunConfig) -> RunConfig:
         """Return the folder's configuration: `config` for a folder without trials, or for one whose run it extends.
 
-        RunConflictError with the differences where the folder holds a run with other settings.
+        Raises:
+            RunConflictError: The folder holds a run with other settings, or other files.
         """
-        if not self._holds_run():
+        if not (self.path / SEARCH).exists() and not self._n_trials():
             self._check_free()
             self.write_config(config)
             return config
-        there = read_config(self.path)
-        check_same_run(self.path, there, config)
-        if config.method != there.method:  # a larger n_total
-            if self._n_trials() > there.study.n_trials:
+        stored = read_config(self.path)
+        check_same_run(self.path, stored, config)
+        if config.method != stored.method:  # a larger n_total
+            if self._n_trials() > stored.study.n_trials:
                 raise RunConflictError(
-                    f"{self.path} was refined, so its study cannot go on; give another --out DIR, or refine it again"
+                    f"{self.path} was refined, so its study cannot resume; give another --out DIR, or refine it again"
                 )
-            there = there.model_copy(update={"method": config.method})
-            self.write_config(there)
-        return there
+            stored = stored.model_copy(update={"method": config.method})
+            self.write_config(stored)
+        return stored
 
     def note_versions(self, config: RunConfig, evaluator: Evaluator | None = None) -> RunConfig:
         """Return the configuration of a resumed run, with earlier versions if they differ."""
@@ -100,16 +102,12 @@ class RunFolder:
             self.write_config(config)
         return config
 
-    def _holds_run(self) -> bool:
-        """Whether a run lies here that came to a trial, or a first state of its search."""
-        return (self.path / SEARCH).exists() or self._n_trials() > 0
-
     def _n_trials(self) -> int:
         trials = self.path / TRIALS
         return trials.read_bytes().count(b"\n") if trials.is_file() else 0
 
     def _check_free(self) -> None:
-        """RunConflictError where the folder holds anything but what a run without trials leaves."""
+        """Raise RunConflictError if the folder holds other files than those of a run without trials."""
         others = sorted({entry.name for entry in self.path.iterdir()} - BEFORE_TRIALS)
         if (self.path / CONFIG).exists():
             read_config(self.path)
@@ -125,19 +123,16 @@ class RunFolder:
 
     def write_config(self, config: RunConfig) -> None:
         """Replace config.yaml atomically."""
-        content = config.model_dump(mode="json")
-        self.write_text(CONFIG, dump_document(content))
+        self.write_text(CONFIG, dump_document(config.model_dump(mode="json")))
 
     def open_trials(self, config: RunConfig) -> list[FinishedTrial]:
         """Return the finished trials without a truncated last line, and open the file for `append`."""
         path = self.path / TRIALS
         trials, intact = read_trials(path, config)
-        try:
+        with naming_write_errors(path, KEPT):
             self._trials = cast("BinaryIO", open(path, "ab", buffering=0))  # noqa: SIM115 (closed in __exit__)
-            if intact < self._trials.tell():  # else the file keeps its time
+            if intact < self._trials.tell():  # otherwise the file keeps its modification time
                 self._trials.truncate(intact)
-        except OSError as fault:
-            raise _write_error(path, fault) from fault
         return trials
 
     def append(self, trial: FinishedTrial) -> None:
@@ -145,28 +140,20 @@ class RunFolder:
         assert self._trials is not None, "open_trials comes first"
         self._check_here()
         line = trial_line(trial)
-        try:
+        with naming_write_errors(self.path / TRIALS, KEPT):
             if os.fstat(self._trials.fileno()).st_nlink == 0:
-                raise OSError(errno.ENOENT, "the file was deleted while the run went on")
-            written = self._trials.write(line)
-            if written != len(line):
+                raise OSError(errno.ENOENT, "the file was deleted during the run")
+            if self._trials.write(line) != len(line):
                 raise OSError(errno.ENOSPC, "No space left on device")
-        except OSError as fault:
-            raise _write_error(self.path / TRIALS, fault) from fault
 
     def _check_here(self) -> None:
-        """RunFolderError where the folder is another than the one that is held: nothing is written beside its run."""
-        try:
-            is_here = self._place is not None and os.path.samestat(self._place, self.path.stat())
-        except FileNotFoundError:
-            is_here = False
-        except OSError as fault:
-            raise _write_error(self.path, fault) from fault
-        if not is_here:
-            raise RunFolderError(
-                f"{self.path} was moved or deleted while the run went on; move it back, and the same command goes on "
-                "from its last finished trial"
-            )
+        """Raise RunFolderError if the path is no longer the folder that is locked: nothing is written elsewhere."""
+        with naming_write_errors(self.path, KEPT), suppress(FileNotFoundError):
+            if self._stat is not None and os.path.samestat(self._stat, self.path.stat()):
+                return
+        raise RunFolderError(
+            f"{self.path} was moved or deleted during the run; move it back, and rerun the same command to resume"
+        )
 
     def replace_trials(self, trials: Iterable[FinishedTrial]) -> None:
         """Rewrite all trials."""
@@ -180,16 +167,14 @@ class RunFolder:
         """Replace a binary file atomically."""
         target = self.path / name
         self._check_here()
-        try:
+        with naming_write_errors(target, KEPT):
             target.parent.mkdir(parents=True, exist_ok=True)
             replace_file(target, content)
-        except OSError as fault:
-            raise _write_error(target, fault) from fault
 
 
 def is_held(folder: Path) -> bool:
-    """Whether a process holds a run folder for writing, here or, where the file system knows, on another machine."""
-    if sys.platform == "win32":  # no looking without holding it oneself
+    """Return whether a process has locked a run folder for writing, here or on another machine."""
+    if sys.platform == "win32":  # a lock cannot be tested there without taking it
         return True
     import fcntl
 
@@ -202,7 +187,7 @@ def is_held(folder: Path) -> bool:
     except OSError:
         return True
     finally:
-        os.close(lock)  # and with it what was taken
+        os.close(lock)  # also releases the shared lock
     return False
 
 
@@ -222,9 +207,9 @@ def read_config(path: Path) -> RunConfig:
 
 
 def _writer(config: str) -> str:
-    """Which armwright wrote a config.yaml that cannot be read, where it was another."""
-    said, ours = re.search(r"^  armwright: '?([^'\s]+)", config, re.MULTILINE), versions().get("armwright")
-    return f" (written by armwright {said[1]}; this is {ours})" if said and said[1] != ours else ""
+    """Return which other version of armwright wrote a config.yaml that cannot be read; empty if this one did."""
+    match, own = re.search(r"^  armwright: '?([^'\s]+)", config, re.MULTILINE), versions().get("armwright")
+    return f" (written by armwright {match[1]}; this is {own})" if match and match[1] != own else ""
 
 
 def read_run(path: str | Path) -> tuple[RunConfig, History]:
@@ -233,10 +218,3 @@ def read_run(path: str | Path) -> tuple[RunConfig, History]:
     config = read_config(path)
     trials, _ = read_trials(path / TRIALS, config)
     return config, History(config.problem, trials, config.method.n_init, config.reference_point)
-
-
-def _write_error(path: Path, fault: OSError) -> RunFolderError:
-    return RunFolderError(
-        f"cannot write {path}: {fault.strerror or fault}. What was written before is safe; "
-        "free room or give another --out DIR, and run the same command again"
-    )

@@ -1,26 +1,26 @@
-"""Write the results of a run folder: the summary, tables, and the front's designs.
+"""Write the results of a run folder: the summary, the tables, and the designs of the front.
 
-summary.json              what the run came to
+summary.json              the result of the run
 trials.csv, front.csv     all trials, and those of the front
 designs/NNNN/arm.urdf     each design of the front, for simulators
-designs/NNNN/design.json  and its postures, errors and torques at every target
+designs/NNNN/design.json  its postures, errors and torques at every target
 """
 
 import json
 import shutil
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
-from armwright.files import replace_folder, to_csv
+from armwright.files import naming_write_errors, replace_folder, to_csv
 from armwright.pareto import hypervolume, total_violation
+from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import unreached_reason
+from armwright.robot.arm import Arm
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.best_known import front_gap
@@ -28,7 +28,7 @@ from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.proposer_bias import proposer_bias
-from armwright.runs.summary import ProposerSummary, checked_summary
+from armwright.runs.summary import ProposerSummary, parse_summary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify_front
 
@@ -37,8 +37,9 @@ DESIGNS = "designs"
 FIGURES = "figures"  # drawn by report/figures.py
 REPORT = "report.html"  # made by report/page.py
 TABLES = ("trials.csv", "front.csv")
-MOST_FALLBACKS = 0.1  # of a proposer's turns, beyond which its run is flagged and kept out of its row in tables
+MAX_FALLBACK_SHARE = 0.1  # of a proposer's trials; runs with more are flagged, and tables leave them out
 PARTS = ("total", "sampling", "evaluation", "proposing")  # of a trial's seconds
+CASES = ("exact", "moved", "started")  # in which the objectives of a design are verified
 
 
 def write_results(
@@ -46,13 +47,17 @@ def write_results(
 ) -> None:
     """Write all results, and the summary last: it marks them as complete.
 
-    verification: of the front, by rising position error; None where none was made.
+    Args:
+        folder: The run folder.
+        history: The trials.
+        summary: The content of summary.json.
+        verification: Verification of the front; None if it was not verified.
     """
     verdicts = _verdicts(history, verification)
-    folder.write_text("trials.csv", to_csv(_rows(history)))
-    on_front = {member.number for member in history.front}
-    rows = [row | _flat_verdict(verdicts.get(row["number"])) for row in _rows(history) if row["number"] in on_front]
-    folder.write_text("front.csv", to_csv(rows))
+    rows = [_row(history, trial) for trial in history]
+    folder.write_text("trials.csv", to_csv(rows))
+    on_front = sorted(member.number for member in history.front)
+    folder.write_text("front.csv", to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
     _write_designs(folder, history, verdicts)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
@@ -63,7 +68,7 @@ def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
     config, history = read_run(path)
     summary = read_summary(path)
     if summary is None:
-        raise RunFolderError(f"{path} is not finished: give the command that began it once more")
+        raise RunFolderError(f"{path} is not finished; rerun the command that began it")
     with RunFolder(path) as folder:
         verification = verify_front(history)
         summary = resummarize(summary, history, config, verification)
@@ -80,19 +85,17 @@ def complete_summary(path: Path, history: History) -> dict[str, Any] | None:
 
 
 def discard_results(path: Path) -> None:
-    """Remove the summary, the page and the figures of a run, so that it is not finished."""
-    try:
+    """Remove the summary, the page and the figures of a run, which is then no longer finished."""
+    with naming_write_errors(path):
         (path / SUMMARY).unlink(missing_ok=True)
         (path / REPORT).unlink(missing_ok=True)
         replace_folder(path / FIGURES)
-    except OSError as fault:
-        raise RunFolderError(f"cannot remove the old results in {path}: {fault.strerror or fault}") from fault
 
 
 def read_summary(path: Path) -> dict[str, Any] | None:
-    """summary.json of a run folder, or None where the run has not ended (or the file is damaged)."""
+    """Return the summary of a run folder; None if the run has not ended or the file is damaged."""
     try:
-        return checked_summary(json.loads((path / SUMMARY).read_text(encoding="utf-8")))
+        return parse_summary((path / SUMMARY).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return None
 
@@ -105,25 +108,17 @@ def summarize(
 ) -> dict[str, Any]:
     """Return the content of summary.json for a study."""
     curve = history.hypervolume
-    counted = curve[: config.study.n_total]  # without what was refined afterwards
+    counted = curve[: config.study.n_total]  # without refined designs
     seconds: Counter[str] = Counter()
     for trial in history:
         seconds.update(trial.seconds)
+    volume = {
+        "final": float(curve[-1]) if len(curve) else None,
+        "mean": float(counted.mean()) if len(counted) else None,
+        "history": curve.tolist(),
+    }
     return {
-        "task": history.problem.task.name,
-        "seed": config.seed,
-        "n_trials": len(history),
-        "by_source": dict(Counter(trial.source for trial in history)),
-        **_feasibility_record(history),
-        "hypervolume": {
-            "reference_point": list(history.reference_point or ()),
-            "final": float(curve[-1]) if len(curve) else None,
-            "mean": float(counted.mean()) if len(counted) else None,
-            "history": curve.tolist(),
-        },
-        "best_known": _front_gap_record(history, history.masked_objectives),
-        "front_size": len(history.front),
-        "verification": _verification_record(history, verification),
+        **_common_record(history, config, history.masked_objectives, volume, verification),
         "evaluations": sum(trial.evaluations for trial in history),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
         "refine": None,
@@ -138,24 +133,43 @@ def summarize(
 def summarize_front(
     history: History, config: RunConfig, found: Array, search: Mapping[str, Any], verification: Verification | None
 ) -> dict[str, Any]:
-    """Return the content of summary.json for a search for the whole front.
+    """Return the content of summary.json for a direct search.
 
-    found: (N, M) the whole front, of which `history` may hold a part only.
-    search: evaluations, seconds, why it ended, and the hypervolume over the evaluations.
+    Args:
+        history: The designs of the front that became trials.
+        config: The settings of the run.
+        found: (N, M) objective values of the whole front.
+        search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
+        verification: Verification of the front; None if it was not verified.
     """
-    reference = history.reference_point or ()
+    volume = {"final": hypervolume(found, history.reference_point or ())}
+    return {
+        **_common_record(history, config, found, volume, verification),
+        "search": dict(search),
+        "versions": dict(config.versions),
+    }
+
+
+def _common_record(
+    history: History,
+    config: RunConfig,
+    found: Array,
+    volume: Mapping[str, Any],
+    verification: Verification | None,
+) -> dict[str, Any]:
+    """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
+    reference = history.reference_point
+    gap = None if reference is None else front_gap(history.problem, found, reference)
     return {
         "task": history.problem.task.name,
         "seed": config.seed,
         "n_trials": len(history),
         "by_source": dict(Counter(trial.source for trial in history)),
         **_feasibility_record(history),
-        "hypervolume": {"reference_point": list(reference), "final": hypervolume(found, reference)},
-        "best_known": _front_gap_record(history, found),
+        "hypervolume": {"reference_point": list(reference or ()), **volume},
+        "best_known": None if gap is None else asdict(gap),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
-        "search": dict(search),
-        "versions": dict(config.versions),
     }
 
 
@@ -172,55 +186,43 @@ def resummarize(
     return new
 
 
-def unmet(history: History) -> str:
-    """Where no design is feasible: how near the nearest comes, and which constraint is in the way."""
+def describe_infeasibility(history: History) -> str:
+    """Describe the nearest design of a history without feasible designs, and the constraints that it violates."""
     (number,) = history.nearest(1)
-    broken = history.violations[number]
-    constraints = history.problem.constraints
-    words = [
-        f"{constraints[i].description} ({constraints[i].measured(float(broken[i])):.4g} {constraints[i].quantity.unit})"
-        for i in np.argsort(-broken, kind="stable")
-        if broken[i] > 0.0
-    ]
-    rest = f", and {', '.join(words[1:])}" if len(words) > 1 else ""
-    return f"no design meets all constraints yet; the nearest, #{number}, breaks {words[0]} most{rest}"
+    pairs = zip(history.problem.constraints, history.violations[number].tolist(), strict=True)
+    worst_first = sorted(pairs, key=lambda pair: -pair[1])
+    violated = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in worst_first if v > 0.0]
+    others = f", and {', '.join(violated[1:])}" if len(violated) > 1 else ""
+    return f"no design meets all constraints yet; the nearest, #{number}, violates {violated[0]} most{others}"
 
 
 def _feasibility_record(history: History) -> dict[str, Any]:
-    """How many designs break constraints, and which; nothing of a task without any.
+    """Return how many designs violate each constraint; empty for a task without constraints.
 
-    nearest: of no feasible design, the one that breaks them least, and by how much, in the quantities' own units.
+    nearest: If no design is feasible, the one with the smallest violation, and the quantities that it violates.
     """
     constraints = history.problem.constraints
     if not constraints:
         return {}
-    breaking = (history.violations > 0.0).sum(axis=0).tolist()
+    names = [constraint.description for constraint in constraints]
     nearest = None
     if len(history) and not history.feasible.any():
         (number,) = history.nearest(1)
-        measured = {
-            c.description: c.measured(value) for c, value in zip(constraints, history.violations[number], strict=True)
-        }
+        violations = history.violations[number]
+        measured = [constraint.measured(value) for constraint, value in zip(constraints, violations, strict=True)]
         nearest = {
             "number": number,
-            "violation": float(total_violation(history.violations[[number]])[0]),
-            "measured": measured,
+            "violation": float(total_violation(violations[None])[0]),
+            "measured": dict(zip(names, measured, strict=True)),
         }
+    counts = (history.violations > 0.0).sum(axis=0).tolist()
     return {
         "feasibility": {
             "infeasible": int((~history.feasible).sum()),
-            "violated_by": {c.description: n for c, n in zip(constraints, breaking, strict=True)},
+            "violated_by": dict(zip(names, counts, strict=True)),
             "nearest": nearest,
         }
     }
-
-
-def _front_gap_record(history: History, found: Array) -> dict[str, Any] | None:
-    """Compare a front with the best known one, if there is one."""
-    if history.reference_point is None:
-        return None
-    gap = front_gap(history.problem, found, history.reference_point)
-    return None if gap is None else asdict(gap)
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:
@@ -240,16 +242,14 @@ def _verification_record(history: History, verification: Verification | None) ->
 
 
 def _verdicts(history: History, verification: Verification | None) -> dict[int, dict[str, Any]]:
-    """Return for each design of the front whether it is robust, and its objectives in each case."""
+    """Return for each design of the front whether it is robust, and its objectives in each case, by trial number."""
     if verification is None:
         return {}
     return {
         member.number: {
             "robust": bool(verification.robust[i]),
             "from_any_start": bool(verification.from_any_start[i]),
-            "exact": _objectives(history, verification.exact[i].tolist()),
-            "moved": _objectives(history, verification.moved[i].tolist()),
-            "started": _objectives(history, verification.started[i].tolist()),
+            **{case: _objectives(history, getattr(verification, case)[i].tolist()) for case in CASES},
         }
         for i, member in enumerate(history.front)
     }
@@ -259,49 +259,44 @@ def _flat_verdict(verdict: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return a verdict as columns of front.csv."""
     if verdict is None:
         return {}
-    kinds = ("exact", "moved", "started")
-    columns = {f"{name}_{kind}": value for kind in kinds for name, value in verdict[kind].items()}
-    verdict_ = "robust" if verdict["robust"] else "sensitive"
-    return {"verdict": verdict_, "from_any_start": "yes" if verdict["from_any_start"] else "no", **columns}
-
-
-def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:
-    turns = [trial for trial in history if trial.proposal is not None or trial.fault is not None]
-    fallbacks = sum(trial.fault is not None for trial in turns)
     return {
-        "name": proposer.name,
-        "model": proposer.model,
-        "origin": proposer.origin,
-        "calls": proposer.calls,
-        "call_failures": dict(proposer.call_failures),
-        "failures": dict(Counter(trial.fault for trial in turns if trial.fault)),
-        "fallback_share": round(fallbacks / len(turns), 4) if turns else 0.0,
-        "flagged": fallbacks > MOST_FALLBACKS * len(turns),
-        "tokens": proposer.input_tokens + proposer.output_tokens,
-        "input_tokens": proposer.input_tokens,
-        "output_tokens": proposer.output_tokens,
-        "cost_usd": proposer.cost_usd,
-        "call_seconds": proposer.seconds,
-        **proposer.notes,
-        "overlap": _overlap_record(history, config, turns),
+        "verdict": "robust" if verdict["robust"] else "sensitive",
+        "from_any_start": "yes" if verdict["from_any_start"] else "no",
+        **{f"{name}_{case}": value for case in CASES for name, value in verdict[case].items()},
     }
 
 
-def _overlap_record(history: History, config: RunConfig, turns: Sequence[FinishedTrial]) -> dict[str, Any] | None:
-    """Return the share of proposals among the counted trials and the age of their feedback [trials] (`in_flight`).
+def _proposer_record(history: History, config: RunConfig, proposer: ProposerSummary) -> dict[str, Any]:
+    reserved = [trial for trial in history if trial.request is not None]
+    fallbacks = sum(trial.fault is not None for trial in reserved)
+    record = asdict(proposer)
+    notes = record.pop("notes")
+    return {
+        **record,
+        "failures": dict(Counter(trial.fault for trial in reserved if trial.fault)),
+        "fallback_share": round(fallbacks / len(reserved), 4) if reserved else 0.0,
+        "flagged": fallbacks > MAX_FALLBACK_SHARE * len(reserved),
+        "tokens": proposer.input_tokens + proposer.output_tokens,
+        **notes,
+        "overlap": _overlap_record(history, config, reserved),
+    }
 
-    ratio_with_failures: the share of the proposer's turns, those included that became black-box trials.
+
+def _overlap_record(history: History, config: RunConfig, reserved: Sequence[FinishedTrial]) -> dict[str, Any] | None:
+    """Return the share of proposals among the counted trials and the age of their feedback [trials].
+
+    ratio_with_failures: The share of the trials reserved for the proposer, failed requests included.
     """
     method = config.study
     if method.in_flight is None:
         return None
-    ages = [trial.number - trial.feedback if trial.feedback is not None else 0 for trial in turns if trial.proposal]
+    ages = [trial.number - trial.request[1] for trial in reserved if trial.request and trial.proposal]
     counted = max(1, len(history) - history.n_init)
     return {
         "in_flight": method.in_flight,
         "ratio_planned": round(method.n_proposals / method.n_total, 4),
         "ratio": round(len(ages) / counted, 4),
-        "ratio_with_failures": round(len(turns) / counted, 4),
+        "ratio_with_failures": round(len(reserved) / counted, 4),
         "feedback_age": {"mean": round(sum(ages) / len(ages), 2), "max": max(ages)} if ages else None,
     }
 
@@ -311,61 +306,58 @@ def _write_designs(folder: RunFolder, history: History, verdicts: Mapping[int, M
     for stale in (folder.path / DESIGNS).glob("[0-9]*"):
         if stale.name not in names:
             shutil.rmtree(stale)
-    for member, record in zip(history.front, _design_records(history, history.front), strict=True):
+    for member, record in zip(history.front, _design_records(history), strict=True):
         place = f"{DESIGNS}/{_name(member)}"
-        urdf = to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}")
-        folder.write_text(f"{place}/arm.urdf", urdf)
-        verdict = verdicts.get(member.number)
-        content = record if verdict is None else record | {"verification": dict(verdict)}
-        folder.write_text(f"{place}/design.json", json.dumps(content, indent=2) + "\n")
+        folder.write_text(f"{place}/arm.urdf", to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}"))
+        if member.number in verdicts:
+            record["verification"] = verdicts[member.number]
+        folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
 
 
 def _name(member: FrontMember) -> str:
     return f"{member.number:04d}"
 
 
-def _design_records(history: History, members: Sequence[FrontMember]) -> Iterable[dict[str, Any]]:
-    evaluation = history.evaluation([member.number for member in members])
-    for row, member in enumerate(members):
+def _design_records(history: History) -> Iterator[dict[str, Any]]:
+    """Yield the content of design.json for each design of the front."""
+    evaluation = history.evaluation([member.number for member in history.front])
+    for row, member in enumerate(history.front):
+        trial = history.trials[member.number]
         yield {
             "number": member.number,
             "source": member.source,
-            "reason": history.trials[member.number].reason,
+            "reason": trial.reason,
             "params": dict(member.design.params),
             "objectives": _objectives(history, member.values),
-            **_violations(history, member.number),
+            **({"violations": _violations(history, trial)} if trial.violations else {}),
             "masses": history.problem.space.mass_note,
-            "targets": [
-                {
-                    "target": evaluation.targets[t].tolist(),
-                    "q": evaluation.q[row, t, : len(member.arm.joints)].tolist(),
-                    "reached": evaluation.reached[row, t].tolist(),
-                    "position_error": float(evaluation.position_error[row, t]),
-                    **(
-                        {"angle_error": float(evaluation.angle_error[row, t])}
-                        if evaluation.target_arrays.n_angular[t]
-                        else {}
-                    ),
-                    "unreached_reason": unreached_reason(member.arm, evaluation, row, t) or None,
-                    "joint_torques": evaluation.joint_torques[row, t, : len(member.arm.joints)].tolist(),
-                }
-                for t in range(len(evaluation.targets))
-            ],
+            "targets": [_target_record(evaluation, row, t, member.arm) for t in range(len(evaluation.targets))],
         }
 
 
-def _rows(history: History) -> Iterable[dict[str, Any]]:
-    for trial in history:
-        objectives = _objectives(history, trial.values)
-        params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
-        broken = dict(zip((c.description for c in history.problem.constraints), trial.violations, strict=True))
-        yield {"number": trial.number, "source": trial.source, **params, **objectives, **broken}
+def _target_record(evaluation: Evaluation, row: int, target: int, arm: Arm) -> dict[str, Any]:
+    """Return the posture of an arm, which is row `row` of an evaluation, at a target."""
+    angle_error = float(evaluation.angle_error[row, target])
+    return {
+        "target": evaluation.targets[target].tolist(),
+        "q": evaluation.q[row, target, : len(arm.joints)].tolist(),
+        "reached": evaluation.reached[row, target].tolist(),
+        "position_error": float(evaluation.position_error[row, target]),
+        **({"angle_error": angle_error} if evaluation.target_arrays.n_angular[target] else {}),
+        "unreached_reason": unreached_reason(arm, evaluation, row, target) or None,
+        "joint_torques": evaluation.joint_torques[row, target, : len(arm.joints)].tolist(),
+    }
 
 
-def _violations(history: History, number: int) -> dict[str, Any]:
-    """Return the violation of each constraint by one design; empty for a task without any."""
-    names = [constraint.description for constraint in history.problem.constraints]
-    return {"violations": dict(zip(names, history.trials[number].violations, strict=True))} if names else {}
+def _row(history: History, trial: FinishedTrial) -> dict[str, Any]:
+    """Return a trial as a row of trials.csv."""
+    params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
+    objectives, violations = _objectives(history, trial.values), _violations(history, trial)
+    return {"number": trial.number, "source": trial.source, **params, **objectives, **violations}
+
+
+def _violations(history: History, trial: FinishedTrial) -> dict[str, float]:
+    return {c.description: value for c, value in zip(history.problem.constraints, trial.violations, strict=True)}
 
 
 def _objectives(history: History, values: Sequence[float]) -> dict[str, float]:

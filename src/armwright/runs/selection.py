@@ -12,7 +12,7 @@ from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.pareto import knee_index
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
-from armwright.runs.results import read_summary, unmet
+from armwright.runs.results import describe_infeasibility, read_summary
 from armwright.spaces.parameters import FloatParameter
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
@@ -98,7 +98,7 @@ def pick(
     if by is not None and weights is not None:
         raise SettingsError("expected one quantity or weights, got both")
     if len(history) and not history.front:
-        raise FailureError(unmet(history))
+        raise FailureError(describe_infeasibility(history))
     quantities = {member.number: numbers_of(history, member) for member in history.front}
     names = list(quantities[history.front[0].number]) if history.front else []
     objectives = [objective.name for objective in history.problem.objectives]

@@ -1,16 +1,20 @@
-"""What a summary.json has to hold, so that what reads it need not doubt it; more may stand there."""
+"""Schema of summary.json: readers may rely on its fields, and ignore others."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, Field, TypeAdapter
+from pydantic import BaseModel, Field
 
-Count = Annotated[int, Field(ge=0, lt=2**63)]
+from armwright.runs.attribution import Attribution
+from armwright.runs.best_known import FrontGap
+from armwright.runs.proposer_bias import ProposerBias
+from armwright.runs.trial import Count
 
 
 class _Record(BaseModel, extra="allow", strict=True, allow_inf_nan=False):
-    """Kept as it was read."""
+    """A part of a summary; its settings also hold for the dataclasses in its fields."""
 
 
 class _Volume(_Record):
@@ -23,13 +27,6 @@ class _Curve(_Volume):
     history: list[float]
 
 
-class _Standing(_Record):
-    hypervolume: float
-    share: float
-    beyond: Count
-    gain: float
-
-
 class _Verification(_Record):
     robust: Count
     sensitive: Count
@@ -37,12 +34,6 @@ class _Verification(_Record):
     hypervolume_of_robust: float
     robust_from_any_start: Count
     hypervolume_worst_case: float
-
-
-class _Attribution(_Record):
-    trials: Count
-    front: Count
-    hypervolume_gained: float | None
 
 
 class _Age(_Record):
@@ -73,17 +64,6 @@ class _Proposer(_Record):
     overlap: _Overlap | None
 
 
-class _SourceBias(_Record):
-    lengths_5_cm: float
-    base_on_symmetry_plane: float | None
-    near_repeats: float
-
-
-class _ProposerBias(_Record):
-    proposer: _SourceBias | None
-    black_box: _SourceBias | None
-
-
 class _Refinement(_Record):
     rounds: Count
     in_vain: Count
@@ -110,38 +90,36 @@ class _Search(_Record):
 class _Summary(_Record):
     n_trials: Count
     by_source: dict[str, Count]
-    best_known: _Standing | None
+    best_known: FrontGap | None
     front_size: Count
     verification: _Verification | None
 
 
 class StudySummary(_Summary):
-    """Of a study."""
+    """Summary of a study."""
 
     hypervolume: _Curve
     evaluations: Count
     duplicates: Count
     refine: _Refinement | None
-    attribution: dict[str, _Attribution]
+    attribution: dict[str, Attribution]
     proposer: _Proposer | None
-    proposer_bias: _ProposerBias | None
+    proposer_bias: ProposerBias | None
     seconds: _Seconds
 
 
 class SearchSummary(_Summary):
-    """Of a search for the whole front."""
+    """Summary of a direct search."""
 
     hypervolume: _Volume
     search: _Search
 
 
-_OF_STUDY, _OF_SEARCH = TypeAdapter(StudySummary), TypeAdapter(SearchSummary)
-
-
-def checked_summary(content: Any) -> dict[str, Any]:
-    """Validate and return the content of a summary.json; ValueError if it is none."""
-    is_search = isinstance(content, dict) and "search" in content
-    (_OF_SEARCH if is_search else _OF_STUDY).validate_python(content)
+def parse_summary(text: str) -> dict[str, Any]:
+    """Validate and return the content of a summary.json; ValueError if it is damaged."""
+    content = json.loads(text)
+    schema = SearchSummary if isinstance(content, dict) and "search" in content else StudySummary
+    schema.model_validate_json(text)
     return cast("dict[str, Any]", content)
 
 
@@ -149,22 +127,26 @@ def checked_summary(content: Any) -> dict[str, Any]:
 class ProposerSummary:
     """What a run's proposer did and cost, for summary.json.
 
-    model: who answered.  origin: what answered: `model`, `manual` (people), `scripted` (a stand-in).
-    calls, requests: questions, and requests to the server (more, where answers were refused).
-    call_failures: failed calls by kind.
-    cost_usd: None where a price is not known.
-    seconds: of all calls together.
-    notes: what else should be known, such as where a replay differs from its record.
+    Attributes:
+        name: The proposer.
+        model: The model that answered.
+        origin: What answered: `model`, `manual` (people) or `scripted` (a stand-in).
+        calls: Requests to the server; more than proposals if answers were refused.
+        call_failures: Failed calls by kind.
+        input_tokens: Tokens of all prompts.
+        output_tokens: Tokens of all answers.
+        cost_usd: Cost; None if a price is unknown.
+        call_seconds: Time of all calls together.
+        notes: Further entries of the record, such as where a replay differs from its source.
     """
 
     name: str
     model: str | None = None
     origin: str | None = None
     calls: int = 0
-    requests: int = 0
     call_failures: Mapping[str, int] = field(default_factory=dict[str, int])
     input_tokens: int = 0
     output_tokens: int = 0
     cost_usd: float | None = None
-    seconds: float = 0.0
+    call_seconds: float = 0.0
     notes: Mapping[str, Any] = field(default_factory=dict[str, Any])

@@ -14,6 +14,8 @@ from armwright.files import replace_surrogates
 from armwright.runs.config import RunConfig
 from armwright.spaces.parameters import Design, ParameterValue
 
+Count = Annotated[int, Field(ge=0, lt=2**63)]
+
 _PARAMS: TypeAdapter[dict[str, ParameterValue]] = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True))
 
 _Params = Annotated[  # a design is written as its parameters
@@ -62,12 +64,20 @@ class FinishedTrial:
     asked: int | None = None
     feedback: int | None = None
     refines: int | None = None
-    evaluations: Annotated[int, Field(ge=0)] = 1
+    evaluations: Count = 1
     duplicate_of: int | None = None
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     violations: tuple[float, ...] = ()
     failure: _Text = ""
+
+    @property
+    def request(self) -> tuple[int, int] | None:
+        """The trial that a proposal was requested for and the number of finished trials known then, if one was."""
+        if self.proposal is None and self.fault is None:
+            return None
+        asked, feedback = (self.number if value is None else value for value in (self.asked, self.feedback))
+        return asked, feedback
 
     @property
     def is_feasible(self) -> bool:

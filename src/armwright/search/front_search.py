@@ -58,7 +58,6 @@ class FrontSearch:
         reference_point: (M,) bound of the hypervolume; points beyond it in any objective do not count.
         seed: of all random numbers.
         known: (N, P) designs that the first batch includes.
-        known_values: (N, M) values of `known`, if these are evaluated already; they join the pool at once.
     """
 
     def __init__(
@@ -68,7 +67,6 @@ class FrontSearch:
         reference_point: Sequence[float],
         seed: int,
         known: Array | None = None,
-        known_values: Array | None = None,
     ) -> None:
         self._encoding = DesignEncoding(parameters)
         self._evaluate = evaluate
@@ -84,13 +82,10 @@ class FrontSearch:
         self._side_matrix: Array = self._matrix
         self._side_values: Array = self._values
         self._side_evaluations = self._side_age = 0
-        if known_values is not None:
-            self._select(self._known, known_values)
-            self._known = self._known[:0]
 
     @property
     def evaluations(self) -> int:
-        """Number of designs evaluated, without those given with their values."""
+        """Number of designs evaluated."""
         return self._evaluations
 
     @property

@@ -40,18 +40,6 @@ SamplerFactory = Callable[[int], BaseSampler]
 POPULATION = 10
 
 
-def _tpe(seed: int) -> BaseSampler:
-    return TPESampler(n_startup_trials=10, multivariate=False, constant_liar=True, seed=seed)
-
-
-def _tpe_multivariate(seed: int) -> BaseSampler:
-    return TPESampler(n_startup_trials=10, multivariate=True, constant_liar=True, seed=seed)
-
-
-def _nsga2(seed: int) -> BaseSampler:
-    return NSGAIISampler(population_size=POPULATION, seed=seed)
-
-
 def _gp(seed: int) -> BaseSampler:
     with warnings.catch_warnings():
         # Optuna calls the argument experimental. It declares that the objectives have no noise.
@@ -59,16 +47,12 @@ def _gp(seed: int) -> BaseSampler:
         return GPSampler(n_startup_trials=10, deterministic_objective=True, seed=seed)
 
 
-def _random(seed: int) -> BaseSampler:
-    return RandomSampler(seed=seed)
-
-
 SAMPLERS: dict[str, SamplerFactory] = {
-    "tpe": _tpe,
-    "tpe-multivariate": _tpe_multivariate,
-    "nsga2": _nsga2,
+    "tpe": lambda seed: TPESampler(n_startup_trials=10, multivariate=False, constant_liar=True, seed=seed),
+    "tpe-multivariate": lambda seed: TPESampler(n_startup_trials=10, multivariate=True, constant_liar=True, seed=seed),
+    "nsga2": lambda seed: NSGAIISampler(population_size=POPULATION, seed=seed),
     "gp": _gp,
-    "random": _random,
+    "random": lambda seed: RandomSampler(seed=seed),
 }
 
 
@@ -192,7 +176,7 @@ class BlackBox:
         """Return a trial with the sampler's next design, drawn uniformly if `source` is `random`."""
         seed = derived_seed(self._seed, SAMPLING, number)
         sampler = self._factory(seed)
-        self._study.sampler = _random(seed) if source == RANDOM else sampler
+        self._study.sampler = RandomSampler(seed=seed) if source == RANDOM else sampler
         trial = self._study.ask()
         design = self._suggest(trial)
         self._assign_generation(sampler, trial)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from armwright.exceptions import DesignError, ProposalError
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.history import History
-from armwright.runs.trial import FinishedTrial
 from armwright.seeding import PROPOSING, derived_seed
 
 
@@ -104,12 +103,5 @@ def _check_design(history: History, number: int, proposal: Proposal) -> Proposal
 
 
 def past_slots(history: History) -> list[ProposalSlot]:
-    """Return the slots that the finished trials were."""
-    return [slot for slot in map(_past_slot, history) if slot is not None]
-
-
-def _past_slot(trial: FinishedTrial) -> ProposalSlot | None:
-    if trial.proposal is None and trial.fault is None:
-        return None
-    asked = trial.number if trial.asked is None else trial.asked
-    return ProposalSlot(asked, trial.number if trial.feedback is None else trial.feedback, fault=trial.fault)
+    """Return the slots that the finished trials took."""
+    return [ProposalSlot(*trial.request, fault=trial.fault) for trial in history if trial.request is not None]

@@ -10,7 +10,7 @@ import numpy as np
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import REFINE, FrontMember, History
-from armwright.runs.results import discard_results, read_summary, resummarize, unmet, write_results
+from armwright.runs.results import describe_infeasibility, discard_results, read_summary, resummarize, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
 from armwright.search.cma_es import POPULATION, Refined
@@ -71,7 +71,7 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
         before = History(config.problem, tuple(trials), method.n_init, config.reference_point)
         members = worth_refining(before)
         if not members:
-            raise RunFolderError(f"{path} has no front to refine: {unmet(before)}")
+            raise RunFolderError(f"{path} has no front to refine: {describe_infeasibility(before)}")
         earlier = summary.get("refine") or {"rounds": 0, "in_vain": 0}
         seed = derived_seed(config.seed, REFINING, len(before), earlier["rounds"])
         refined = refine_members(before, members, seed, evaluations)

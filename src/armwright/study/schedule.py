@@ -6,18 +6,17 @@ ReplaySchedule        a recorded run is repeated: each proposal enters at its re
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
-from typing import Protocol
 
-from armwright.proposers.proposer import Record
 from armwright.runs.config import Method
 from armwright.runs.history import History
+from armwright.runs.trial import FinishedTrial
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
 
 
-class Schedule(Protocol):
-    """Assigns each trial to the black box or to the proposer.
+class Schedule:
+    """Assigns each trial to the black box or to the proposer. This base class assigns all trials to the black box.
 
     Attributes:
         n_in_flight: number of requests that run while trials go on.
@@ -27,18 +26,10 @@ class Schedule(Protocol):
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return the slot of trial `number`, or None if it is the black box's."""
-        ...
+        return None
 
     def close(self) -> None:
         """End all requests."""
-
-
-class NoProposer(Schedule):
-    """Every trial is the black box's."""
-
-    def next(self, number: int) -> ProposalSlot | None:
-        """Return None."""
-        return None
 
 
 class AlternatingSchedule(Schedule):
@@ -72,7 +63,11 @@ class ReplaySchedule(Schedule):
     """
 
     def __init__(
-        self, requests: ProposalRequests, record: Record, method: Method, history: Callable[[], History]
+        self,
+        requests: ProposalRequests,
+        record: Sequence[FinishedTrial],
+        method: Method,
+        history: Callable[[], History],
     ) -> None:
         self._requests = requests
         self._record = record
@@ -86,14 +81,16 @@ class ReplaySchedule(Schedule):
 
     def next(self, number: int) -> ProposalSlot | None:
         """Return what was recorded for this trial."""
-        recorded = self._record.turns.get(number)
-        if recorded is None:
+        if number >= len(self._record):
             return self._next_after_end(number)
-        asked = recorded.asked
+        recorded = self._record[number]
+        if recorded.request is None:
+            return None
+        asked, feedback = recorded.request
         if (asked, recorded.proposal) not in self._ready and asked not in self._asked:
-            self._add(self._requests.request(self._history().before(recorded.feedback), asked))
+            self._add(self._requests.request(self._history().before(feedback), asked))
         self._asked.add(asked)
-        missing = ProposalSlot(asked, recorded.feedback, fault="missing", note=f"no design is left of call {asked}")
+        missing = ProposalSlot(asked, feedback, fault="missing", note=f"no design is left of call {asked}")
         return self._ready.pop((asked, recorded.proposal), self._ready.pop((asked, None), missing))
 
     def _add(self, slots: Iterable[ProposalSlot]) -> None:
@@ -101,8 +98,8 @@ class ReplaySchedule(Schedule):
             self._ready[slot.asked, None if slot.proposal is None else slot.proposal.id] = slot
 
     def _next_after_end(self, number: int) -> ProposalSlot | None:
-        if number < self._record.n_trials or len(past_slots(self._history())) >= self._method.n_started(number):
+        if len(past_slots(self._history())) >= self._method.n_started(number):
             return None
-        note = "" if self._end_is_reported else f"the record ends with trial {self._record.n_trials - 1}"
+        note = "" if self._end_is_reported else f"the record ends with trial {len(self._record) - 1}"
         self._end_is_reported = True
         return ProposalSlot(number, number, fault="missing", note=note)

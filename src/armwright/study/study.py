@@ -32,7 +32,7 @@ from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
-from armwright.study.schedule import NoProposer, ReplaySchedule, Schedule
+from armwright.study.schedule import ReplaySchedule, Schedule
 from armwright.study.settings import check_proposer, check_settings, run_config, study_method
 
 POLL_SECONDS = 0.1  # between two checks for requests of the watcher, while there is nothing else to do
@@ -141,7 +141,7 @@ class Study:
             self._tracker.add(values)
         self._freeze_reference_point()
         self._backend: EvaluationBackend = InProcessBackend(problem)
-        self._schedule: Schedule = NoProposer()
+        self._schedule: Schedule = Schedule()
         self._pending: dict[int, PendingTrial] = {}  # by number; a trial is recorded when all before it are
         self._is_paused = False
 
@@ -156,7 +156,9 @@ class Study:
             result = self._finish(resumed, verify)
         except BaseException as end:
             is_deliberate = isinstance(end, (KeyboardInterrupt, StoppedError))
-            self._channel.say("stopped", len(self._trials), None if is_deliberate else str(end) or type(end).__name__)
+            self._channel.report(
+                "stopped", len(self._trials), None if is_deliberate else str(end) or type(end).__name__
+            )
             raise
         finally:
             self._backend.close()
@@ -190,7 +192,7 @@ class Study:
         forecast = self._proposer.forecast(self._problem, n_due)
         if forecast:
             self._report("beginning", len(self._trials), self._proposer.name, note=forecast)
-        self._channel.say("asking", len(self._trials))
+        self._channel.report("asking", len(self._trials))
         try:
             self._proposer.check()
         except ModelError as fault:
@@ -201,13 +203,13 @@ class Study:
                 self._requests.stop(fault.final)
                 consequence = "no questions are asked in this session"
             self._report("beginning", len(self._trials), self._proposer.name, note=f"{fault}; {consequence}")
-            self._channel.say("evaluating", len(self._trials), str(fault))
+            self._channel.report("evaluating", len(self._trials), str(fault))
 
     def _new_schedule(self) -> Schedule:
         if self._proposer is None or self._requests is None:
-            return NoProposer()
-        record = self._proposer.record()
-        if record is not None:
+            return Schedule()
+        record = self._proposer.recorded_trials()
+        if record:
             return ReplaySchedule(self._requests, record, self._method, self._history)
         return request_schedule(self._requests, self._method, self._history)
 
@@ -216,21 +218,21 @@ class Study:
         self._take_results(0.0)
         while not self._may_start(number):
             self._take_results(POLL_SECONDS)
-        self._channel.say("evaluating", number)
+        self._channel.report("evaluating", number)
 
     def _may_start(self, number: int) -> bool:
         """Return whether the watcher allows one more trial and a worker is free for it.
 
         The first counted trial waits for all random ones, on which it depends.
         """
-        control = self._channel.asked()
+        control = self._channel.control()
         if control.stop:
             if self._pending:
                 return False
             assert self._folder is not None
             raise StoppedError(self._folder.path)
         if control.paused and not self._is_paused:
-            self._channel.say("paused", number)
+            self._channel.report("paused", number)
             self._report("paused", number, note="paused by its watcher, who can let it go on; Ctrl-C ends it")
         self._is_paused = control.paused
         if control.paused or (self._pending and number == self._method.n_init):
@@ -241,7 +243,7 @@ class Study:
         """Choose the design of a trial and start its evaluation; a duplicate takes the values of the first."""
         started = time.perf_counter()
         slot = self._schedule.next(number)
-        self._channel.say("evaluating", number, None if slot is None else slot.fault_message)
+        self._channel.report("evaluating", number, None if slot is None else slot.fault_message)
         proposed = time.perf_counter()
         refinement = self._refine_next(number) if slot is None else None
         optuna_trial, design, source = self._choose_design(number, slot, refinement)
@@ -350,7 +352,7 @@ class Study:
 
     def _report_request(self, number: int) -> None:
         assert self._proposer is not None
-        self._channel.say("asking", number)
+        self._channel.report("asking", number)
         self._report("proposing", number, self._proposer.name, note=self._proposer.announce(number))
 
     def _report_news(self, note: str) -> None:
