@@ -344,7 +344,7 @@ def test_dynamic_objectives_require_timed_moves(objective: str) -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"]})
     with pytest.raises(SettingsError, match=r"move_time: 1\.5"):
         Problem(task(objectives=[objective]), space).evaluate(space.sample(1, 0))
-    with pytest.raises(SettingsError, match="need some in the task: moves: in_order"):
+    with pytest.raises(SettingsError, match="need moves in the task; try moves: in_order"):
         Problem(task(objectives=[objective], moves=()), space).evaluate(space.sample(1, 0))
 
 

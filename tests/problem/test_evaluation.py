@@ -85,7 +85,7 @@ def test_objectives_are_the_sums_of_the_method() -> None:
 
 @pytest.mark.parametrize("targets", [np.zeros((0, 3)), np.zeros((2, 2)), np.zeros(3), np.array([[0.0, np.nan, 1.0]])])
 def test_targets_that_cannot_be(targets: np.ndarray) -> None:
-    with pytest.raises(TaskError, match=r"finite numbers in an array \(T, 3\)"):
+    with pytest.raises(TaskError, match=r"finite numbers of shape \(T, 3\)"):
         evaluate(paper_arms(1, 4, 37), targets)
 
 

@@ -45,9 +45,14 @@ class FixedProblem(Problem):
         arms = stack_designs(self.space, rows)
         error = np.linalg.norm(reached - targets, axis=-1)
         angle = np.zeros_like(error)
-        known = (arms, targets, self.task.payloads, q, reached, error, angle, torques, self.task.target_arrays)
         evaluation = Evaluation(
-            *known, self.task.obstacles, moves=self.task.straight_moves, workspace=self.task.workspace
+            **vars(self.scene()),
+            arms=arms,
+            q=q,
+            reached=reached,
+            position_error=error,
+            angle_error=angle,
+            joint_torques=torques,
         )
         if evaluation.moves:
             vars(evaluation)["paths"] = _fixed_paths(evaluation)

@@ -264,7 +264,7 @@ def test_moves_cost_nothing_where_nothing_asks_for_them() -> None:
 
 def test_objectives_of_moves_need_moves() -> None:
     problem = Problem(task(objectives=["position_error", "path_error"]))
-    with pytest.raises(SettingsError, match="need some in the task: moves: in_order"):
+    with pytest.raises(SettingsError, match="need moves in the task; try moves: in_order"):
         problem.evaluate(paper_space().sample(1, 0))
 
 

@@ -130,7 +130,7 @@ def test_a_workspace_costs_nothing_where_nothing_asks_for_it() -> None:
 
 
 def test_without_a_workspace_nothing_is_unreached() -> None:
-    with pytest.raises(SettingsError, match="uncovered_fraction needs a workspace in the task: workspace: "):
+    with pytest.raises(SettingsError, match="uncovered_fraction needs a workspace in the task; try workspace: "):
         Problem(
             random_task(1).model_copy(update={"reference_point": None}), objectives=(OBJECTIVES["uncovered_fraction"],)
         ).evaluate(paper_space().sample(1, 0))

@@ -47,34 +47,26 @@ class Scene:
         """Check that the arrays are finite and belong to the same targets."""
         targets = self.targets
         if targets.ndim != 2 or targets.shape[1] != 3 or not len(targets) or not np.all(np.isfinite(targets)):
-            raise TaskError(f"targets must be finite numbers in an array (T, 3), T >= 1, not {targets.shape}")
+            raise TaskError(f"targets: expected finite numbers of shape (T, 3), T >= 1, got shape {targets.shape}")
         object.__setattr__(self, "payload", _payloads(self.payload, len(targets)))
         if len(self.target_arrays) != len(targets):
-            raise TaskError(
-                f"target_arrays are of {len(self.target_arrays)} targets, not of the {len(targets)} that are given"
-            )
+            raise TaskError(f"target_arrays: expected {len(targets)} targets, got {len(self.target_arrays)}")
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """N arms of up to J joints at T targets; 0 for joints that an arm does not have.
+@dataclass(frozen=True, kw_only=True)
+class Evaluation(Scene):
+    """A scene in which N arms of up to J joints were evaluated; 0 for joints that an arm does not have.
 
-    Clearances, moves, the workspace and Jacobians are computed when they are first asked for.
+    Clearances, moves, the workspace and Jacobians are computed on first use.
     """
 
     arms: ArmArrays
-    targets: Array  # (T, 3) [m]
-    payload: Array  # (T,) that the tip carries there [kg]
-    q: Array  # (N, T, J) kept joint angles [rad], or ways [m]; 0 for a fixed joint
+    q: Array  # (N, T, J) kept joint angles [rad] or displacements [m]; 0 for a fixed joint
     reached: Array  # (N, T, 3) position of the tip [m]
     position_error: Array  # (N, T) distance from the target [m]
     angle_error: Array  # (N, T) of the tool from the target's axis or orientation [rad]; 0 where it has none
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
-    target_arrays: TargetArrays  # how the targets are to be reached
-    obstacles: tuple[Obstacle, ...] = ()
     device: Device = "cpu"
-    moves: Moves = NO_MOVES
-    workspace: tuple[Region, ...] = ()  # to cover, by W points together
 
     def __len__(self) -> int:
         return len(self.q)
@@ -100,8 +92,8 @@ class Evaluation:
         """The arms along the moves; SettingsError if the task has none."""
         if not self.moves:
             raise SettingsError(
-                "path_error, max_joint_step and all else of moves need some in the task: moves: in_order, or "
-                "moves: [[1, 2], [2, 3]]"
+                "path_error, max_joint_step and other quantities of moves need moves in the task; "
+                "try moves: in_order, or moves: [[1, 2], [2, 3]]"
             )
         return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
 
@@ -111,8 +103,8 @@ class Evaluation:
         paths = self.paths
         if not self.moves.times:
             raise SettingsError(
-                "dynamic_torque, dynamic_utilisation and speed_utilisation need the duration of the task's moves: "
-                "move_time: 1.5 [s], or one for each move"
+                "dynamic_torque, dynamic_utilisation and speed_utilisation need the duration of the task's moves [s]; "
+                "try move_time: 1.5, or one value per move"
             )
         return drives_along(self.arms, paths)
 
@@ -146,8 +138,8 @@ class Evaluation:
         """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
         if not self.workspace:
             raise SettingsError(
-                "uncovered_fraction needs a workspace in the task: "
-                "workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
+                "uncovered_fraction needs a workspace in the task; "
+                "try workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
             )
         points = sample_regions(self.workspace)
         reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
@@ -199,11 +191,15 @@ def evaluate(
 ) -> Evaluation:
     """Evaluate every arm at every target. An unreached target is a result, never an exception.
 
-    targets: (T, 3) [m]. payload: (T,), or one for all: what the tip carries there [kg].
-    obstacles: what clearances are measured from; the inverse kinematics knows nothing of them.
-    target_arrays: how they are to be reached (`Task.target_arrays`); without them, as points.
-    moves: lines between targets that the tip goes along.
-    workspace: boxes to cover.
+    Args:
+        arms: N arms.
+        targets: (T, 3) positions [m].
+        device: Where the arms are evaluated.
+        payload: (T,) mass carried by the tip at each target, or one for all [kg].
+        obstacles: The solids that clearances are measured from; the inverse kinematics ignores them.
+        target_arrays: How the targets are to be reached (`Task.target_arrays`); by default as points.
+        moves: Lines between targets that the tip follows.
+        workspace: Boxes to cover.
 
     Examples:
         >>> import armwright as aw
@@ -249,19 +245,14 @@ def evaluate_arrays(
         postures = _nearer(postures, solve(other), targets, scene.target_arrays)
     reached = postures.reached.astype(np.float64)
     return Evaluation(
+        **vars(scene),
         arms=arrays,
-        targets=targets,
-        payload=scene.payload,
         q=postures.q.astype(np.float64),
         reached=reached,
         position_error=np.linalg.norm(reached - targets, axis=-1),
         angle_error=postures.angle.astype(np.float64),
         joint_torques=postures.torque.astype(np.float64),
-        target_arrays=scene.target_arrays,
-        obstacles=scene.obstacles,
         device=device,
-        moves=scene.moves,
-        workspace=scene.workspace,
     )
 
 
@@ -292,8 +283,8 @@ def _nearer(first: Postures, second: Postures, targets: Array, target_arrays: Ta
 
 
 def _payloads(payload: ArrayLike, t: int) -> Array:
-    """(T,) [kg]."""
+    """Return the (T,) payloads [kg]."""
     loads = np.asarray(payload, dtype=np.float64)
     if loads.shape not in ((), (t,)) or not np.all((loads >= 0.0) & np.isfinite(loads)):
-        raise TaskError(f"payload must be one number >= 0 kg, or one for each of the {t} targets, not {payload}")
+        raise TaskError(f"payload: expected 1 or {t} values >= 0 kg, got {payload}")
     return np.broadcast_to(loads, (t,)).copy()

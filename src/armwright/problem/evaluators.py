@@ -1,4 +1,4 @@
-"""Evaluators of one's own: a Python function, such as a simulation, that measures an arm in place of our objectives.
+"""Custom evaluators: Python functions, such as simulations, that measure an arm in place of the built-in objectives.
 
 @evaluator("settling_error [m]", "energy [J]")
 def simulate(arm, task):
@@ -11,12 +11,11 @@ import importlib
 import importlib.abc
 import importlib.util
 import math
-import os
 import re
 import sys
 import traceback
-from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import chdir
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
@@ -37,18 +36,21 @@ from armwright.tasks.task import Task
 Measure = Callable[[Arm, Task], Sequence[float] | float]
 
 NAMED = re.compile(r"([a-z][a-z0-9_]*)(?: \[([^\[\]]{1,40})\])?")  # such as "energy [J]"
-LONGEST_NAME = 40  # characters
+MAX_NAME_LENGTH = 40
 
 
 @dataclass(frozen=True)
 class Evaluator:
     """A function that measures an arm for a task; each number is an objective, minimised.
 
-    name: `file.py:function` or `module:function`, by which a run's settings know it.
-    worst: what an arm counts for which the function raises, or gives what is no finite number; None: the run stops.
-    version: of the file that it is from; empty where it is from none.
-    place: as `load_evaluator` was given it.
-    source: of the file; a pickle holds it, so that other processes need no copy.
+    Attributes:
+        name: `file.py:function` or `module:function`, as stored in the settings of a run.
+        measure: The function.
+        objectives: The objectives that it measures.
+        worst: Values of an arm for which the function raises or returns other than finite numbers; None stops the run.
+        version: Part of the sha256 of its file; empty without a file.
+        place: The argument of `load_evaluator`.
+        source: Content of the file. A pickle holds it, so that other processes need no copy.
     """
 
     name: str
@@ -71,7 +73,7 @@ class Evaluator:
     def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
         """Return the objectives of an arm; EvaluatorError if the function fails or exits."""
         try:
-            with _staying():
+            with chdir("."):  # solvers change the working folder, to which the run's folder may be relative
                 made = self.measure(arm, task)
         except (Exception, SystemExit) as fault:
             failure = EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})")
@@ -80,21 +82,19 @@ class Evaluator:
         names = [objective.name for objective in self.objectives]
         values = _numbers(made)
         if len(values) != len(names):
-            raise EvaluatorError(f"{self.name} gave {made!r:.80}; {len(names)} numbers are needed: {', '.join(names)}")
+            raise EvaluatorError(f"{self.name}: expected {len(names)} numbers ({', '.join(names)}), got {made!r:.80}")
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):
-                raise EvaluatorError(
-                    f"{self.name} gave {name} = {value}; it must be a finite number for every arm, a large one for a "
-                    "bad arm"
-                )
+                raise EvaluatorError(f"{self.name}: expected finite numbers, got {name} = {value}")
         return values
 
 
 def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callable[[Measure], Evaluator]:
     """Make an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
 
-    objectives: their names, each with its unit in brackets where it has one: "energy [J]".
-    worst: what an arm counts for which the function fails, one number for each; without it, the run stops there.
+    Args:
+        objectives: Names, each with its unit in brackets if it has one: "energy [J]".
+        worst: Values of an arm for which the function fails, one per objective; by default the run stops.
 
     Examples:
         >>> @evaluator("reach [m]")
@@ -104,10 +104,10 @@ def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callabl
         'm'
     """
     if not 1 <= len(objectives) <= MAX_OBJECTIVES or len(set(objectives)) < len(objectives):
-        raise SettingsError(f"evaluator({', '.join(objectives)}): 1 to {MAX_OBJECTIVES} different names are needed")
+        raise SettingsError(f"evaluator({', '.join(objectives)}): expected 1 to {MAX_OBJECTIVES} different names")
     values = None if worst is None else tuple(float(value) for value in worst)
     if values is not None and (len(values) != len(objectives) or not all(map(math.isfinite, values))):
-        raise SettingsError(f"worst = {values}: {len(objectives)} finite numbers are needed, one for each objective")
+        raise SettingsError(f"worst: expected {len(objectives)} finite numbers, one per objective, got {values}")
 
     def decorated(measure: Measure) -> Evaluator:
         name = f"{measure.__module__}:{measure.__qualname__}"
@@ -121,11 +121,12 @@ def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callabl
 def load_evaluator(place: str) -> Evaluator:
     """Load the evaluator `file.py:function` or `module:function`, which runs its code.
 
-    SettingsError where there is none.
+    Raises:
+        SettingsError: There is none.
     """
     where, _, function = place.rpartition(":")
     if not where or not function:
-        raise SettingsError(f'--evaluator "{place}": FILE.py:FUNCTION or MODULE:FUNCTION is needed')
+        raise SettingsError(f'--evaluator: expected FILE.py:FUNCTION or MODULE:FUNCTION, got "{place}"')
     if where.endswith(".py"):
         if not Path(where).is_file():
             raise SettingsError(f"cannot read {where}: there is no such file")
@@ -179,31 +180,17 @@ def _number(one: Real) -> float:
         return math.inf
 
 
-@contextmanager
-def _staying() -> Generator[None]:
-    """Solvers change the working folder, in which the run's folder may be named."""
-    try:
-        here = os.getcwd()
-    except FileNotFoundError:  # it was deleted, and there is nothing to come back to
-        here = None
-    try:
-        yield
-    finally:
-        if here is not None:
-            os.chdir(here)
-
-
 def _objective(given: str, description: str, name: str) -> Objective:
     """Return the objective of a name with a unit; its value comes from the evaluator alone."""
     match = NAMED.fullmatch(given)
-    if match is None or len(match[1]) > LONGEST_NAME:
+    if match is None or len(match[1]) > MAX_NAME_LENGTH:
         raise SettingsError(
-            f'objective "{given}": a name of at most {LONGEST_NAME} small letters, digits and _, with its unit in '
-            'brackets where it has one, is needed, such as "energy [J]"'
+            f'objective "{given}": expected at most {MAX_NAME_LENGTH} lowercase letters, digits and _, then the unit '
+            'in brackets if there is one; try "energy [J]"'
         )
     own, unit = match[1], match[2] or ""
     if own in OBJECTIVES:
-        raise SettingsError(f'objective "{own}" is one of armwright\'s own; give another name')
+        raise SettingsError(f'objective "{own}" is built in; give another name')
 
     def each(_: Evaluation) -> Array:
         raise SettingsError(f"{own} is measured by {name}, design by design, and only in `armwright optimize`")
@@ -257,10 +244,8 @@ def _traceback(fault: BaseException) -> str:
 
 
 def _place(fault: BaseException) -> str:
-    """Where it was raised, in the deepest frame: `file.py, line 12`."""
-    trace: Any = fault.__traceback__
+    """Return where it was raised: `file.py, line 12`."""
     if isinstance(fault, SyntaxError):
         return f"{Path(fault.filename or '').name}, line {fault.lineno}"
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    return "" if trace is None else f"{Path(trace.tb_frame.f_code.co_filename).name}, line {trace.tb_lineno}"
+    frame = traceback.extract_tb(fault.__traceback__)[-1]
+    return f"{Path(frame.filename).name}, line {frame.lineno}"

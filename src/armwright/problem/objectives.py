@@ -288,9 +288,10 @@ MOVE_QUANTITIES = (*PATH_QUANTITIES, PATH_ERROR, MAX_JOINT_STEP, *TIMED_QUANTITI
 
 
 def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> tuple[Objective, ...]:
-    """Return the objectives of these names; SettingsError if one is unknown or repeated, or there are too many.
+    """Return the objectives of these names, built in or among `others`.
 
-    others: that may be named as well.
+    Raises:
+        SettingsError: One is unknown or repeated, or there are too many.
     """
     known = {objective.name: objective for objective in others} | dict(OBJECTIVES)
     for name in names:
@@ -300,6 +301,6 @@ def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> 
             )
     if not 1 <= len(names) <= MAX_OBJECTIVES or len(set(names)) < len(names):
         raise SettingsError(
-            f"objectives: {', '.join(names) or 'none'}; 1 to {MAX_OBJECTIVES} different ones are needed"
+            f"objectives: expected 1 to {MAX_OBJECTIVES} different ones, got {', '.join(names) or 'none'}"
         )
     return tuple(known[name] for name in names)
