@@ -98,12 +98,11 @@ class LlmBackend(Protocol):
     origin: str
 
     def begin(self) -> None:
-        """Start a session; an earlier cancellation no longer counts."""
-        ...
+        """Start a session; an earlier cancellation no longer counts. Does nothing by default."""
 
     def check(self) -> Reply:
-        """Ask CHECK before any work is done; raises CallError if there is no answer."""
-        ...
+        """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default."""
+        return Reply()
 
     def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
         """Return the answer, free text by default; raises CallError if there is none.
@@ -116,5 +115,4 @@ class LlmBackend(Protocol):
         ...
 
     def cancel(self) -> None:
-        """Cancel all calls at once; none starts before the next session."""
-        ...
+        """Cancel all calls at once; none starts before the next session. Does nothing by default."""

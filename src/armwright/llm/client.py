@@ -114,11 +114,7 @@ class ModelClient(LlmBackend):
         self._model = _RetryingModel(_vendor_model(model) if self._server is None else _model_on(self._server))
         auto = "tool" if self._server is None else "native"
         self._output = _OUTPUTS[auto if options.output == "auto" else options.output]
-        self._settings = ModelSettings()
-        if options.temperature is not None:
-            self._settings["temperature"] = options.temperature
-        if options.seed is not None:
-            self._settings["seed"] = options.seed
+        self._settings = options.model_dump(include={"temperature", "seed"}, exclude_none=True)
         self._pending: set[Future[Any]] = set()
         self._cancelled = False
 
@@ -172,22 +168,25 @@ class ModelClient(LlmBackend):
 
     def _run(self, agent: Agent[None, Any], question: Question, most_requests: int | None, seconds: float) -> Reply:
         started = time.perf_counter()
-        settings: ModelSettings = {**self._settings, "request_timeout": seconds, "max_retries": 0}
+        settings = ModelSettings(**self._settings, request_timeout=seconds, max_retries=0)
         limits = UsageLimits(request_limit=most_requests)
+        fault: BaseException | None = None
         with capture_run_messages() as messages:
             try:
                 self._wait(agent.run(question.prompt, model_settings=settings, usage_limits=limits))
-            except CancelledError as fault:
-                reply = self._reply(messages, time.perf_counter() - started)
+            except (KeyboardInterrupt, CancelledError, *CALL_FAULTS) as error:
+                fault = error
+        reply = self._reply(messages, time.perf_counter() - started)
+        match fault:
+            case None:
+                return reply
+            case KeyboardInterrupt():
+                raise Interrupted(reply) from fault
+            case CancelledError():
                 raise CallError("cancelled", f"{self.model}: the call was cancelled", reply) from fault
-            except KeyboardInterrupt as fault:
-                raise Interrupted(self._reply(messages, time.perf_counter() - started)) from fault
-            except CALL_FAULTS as fault:
-                reply = self._reply(messages, time.perf_counter() - started)
-                raise CallError(
-                    kind_of_fault(fault), f"{self.model}: {_one_line(describe_fault(fault))}", reply
-                ) from fault
-        return self._reply(messages, time.perf_counter() - started)
+            case _:
+                reason = _one_line(describe_fault(fault))
+                raise CallError(kind_of_fault(fault), f"{self.model}: {reason}", reply) from fault
 
     def _reply(self, messages: Sequence[ModelMessage], seconds: float) -> Reply:
         responses = [message for message in messages if isinstance(message, ModelResponse)]

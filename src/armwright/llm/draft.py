@@ -3,6 +3,7 @@
 Nothing is run. Only files that their own models accept are written; every call is kept in drafts.jsonl.
 """
 
+import errno
 import json
 import os
 import shlex
@@ -25,7 +26,7 @@ from armwright.exceptions import (
     SpaceError,
     TaskError,
 )
-from armwright.files import replace_file
+from armwright.files import naming_write_errors, replace_file
 from armwright.llm.backend import MOST_REQUESTS, CallError, OutputFormat, Question
 from armwright.llm.budget import CallBudget
 from armwright.llm.configuration import ConfiguredModel, configuration_path, configured_model
@@ -95,9 +96,10 @@ class Draft:
             "files": [str(path) for path in self.files],
             "by": self.by,
             **{name: getattr(self.usage, name) for name in usage},
-            **{name: list(getattr(self, name)) for name in ("assumptions", "questions")},
+            "assumptions": list(self.assumptions),
+            "questions": list(self.questions),
             "task": self.task.model_dump(mode="json"),
-            "space": None if self.space is None else self.space.model_dump(mode="json"),
+            "space": self.space and self.space.model_dump(mode="json"),
         }
 
 
@@ -120,7 +122,10 @@ class Drafter(LlmSession):
         self.force = force
         self._identity = ""
         if out is not None:
-            _make_folder(out)
+            with naming_write_errors(out, error=FailureError):  # before a call is paid for, not after it
+                out.mkdir(parents=True, exist_ok=True)
+                if not os.access(out, os.W_OK):
+                    raise PermissionError(errno.EACCES, "no permission")
             # Earlier drafts in this folder are only counted: each has a budget of its own.
             self._transcript = Transcript(out / DRAFTS)
 
@@ -196,14 +201,10 @@ class Drafter(LlmSession):
         places = _places(out, draft.task.name, draft.space)
         head = _head(draft, description, _command(places))
         for place, text in reversed(list(zip(places, (draft.task_yaml, draft.space_yaml), strict=False))):
-            try:
-                if self.force:
-                    replace_file(place, (head + text).encode())
-                else:
-                    with open(place, "xb") as file:
-                        file.write((head + text).encode())
-            except OSError as fault:
-                raise FailureError(f"cannot write {place}: {fault.strerror or fault}. {self._kept()}") from fault
+            with naming_write_errors(place, f". {self._kept()}", FailureError):
+                if not self.force:
+                    place.touch(exist_ok=False)
+                replace_file(place, (head + text).encode())
         return places
 
     def _by(self) -> str:
@@ -316,13 +317,3 @@ def _places(out: Path | None, name: str, space: DesignSpace | None) -> tuple[Pat
 def _command(places: Sequence[Path]) -> str:
     task, *spaces = map(str, places)
     return shlex.join(["armwright", "optimize", task, *(part for space in spaces for part in ("--space", space))])
-
-
-def _make_folder(out: Path) -> None:
-    """Raise FailureError before a call is paid for, not after it."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as fault:
-        raise FailureError(f"cannot write {out}: {fault.strerror or fault}") from fault
-    if not os.access(out, os.W_OK):
-        raise FailureError(f"cannot write {out}: no permission")

@@ -100,15 +100,15 @@ class Feedback:
             "e_each": points(self._each[row, shown], at.shares) if at.shares else "",
             "p_ik": points(evaluation.reached[row, shown], at.length),
             "a_ik": _angles(evaluation, row, shown),
-            "missed": self._missed(number, row, shown),
+            "unreached": self._unreached(number, row, shown),
             "tau_ik": points(evaluation.motor_torques[row, shown, : len(joints)], at.torque),
             "limits": _limits(evaluation, row, joints),
             "load": _load(evaluation.motor_torques[row], joints),
             "e_all": vector(self._history.trials[number].values, at.objectives),
-            "broken": _violated(self._history, number),
+            "violated": _violated(self._history, number),
         }
 
-    def _missed(self, number: int, row: int, shown: list[int]) -> str:
+    def _unreached(self, number: int, row: int, shown: list[int]) -> str:
         """Explain unreached targets by the numbers shown; empty for positions, which the other lists explain."""
         if not self._evaluation.target_arrays.oriented:
             return ""
@@ -126,7 +126,7 @@ def proposal_records(history: History, name: str) -> list[Record]:
             **_parameters(history, trial.number, at.length),
             "expected": "not said" if trial.expected is None else vector(trial.expected, at.objectives),
             "e_all": vector(trial.values, at.objectives),
-            "broken": _violated(history, trial.number),
+            "violated": _violated(history, trial.number),
             "on_front": trial.number in front,
             "reason": one_line(trial.reason, LONGEST_REASON) or "not said",
         }

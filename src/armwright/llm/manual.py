@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armwright.exceptions import AnswerPendingError, FailureError, UsageError
+from armwright.files import naming_write_errors
 from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply
 
 LOOK_EVERY = 0.5  # [s]
@@ -34,10 +35,6 @@ class ManualBackend(LlmBackend):
     def begin(self) -> None:
         """Start a session."""
         self._cancelled.clear()
-
-    def check(self) -> Reply:
-        """Return an empty reply: there is nothing to check before the first question."""
-        return Reply()
 
     def cancel(self) -> None:
         """Stop waiting."""
@@ -108,20 +105,16 @@ class ManualBackend(LlmBackend):
             raise FailureError(f"cannot read {file}: {fault.strerror or fault}") from fault
 
     def _refuse(self, number: int, answer: Path, reason: str) -> None:
-        try:
-            before = len(list(self.folder.glob(f"{number:03d}-refused-*")))
-            kept = self.folder / f"{number:03d}-refused-{before + 1}{answer.suffix}"
+        before = len(list(self.folder.glob(f"{number:03d}-refused-*")))
+        kept = self.folder / f"{number:03d}-refused-{before + 1}{answer.suffix}"
+        with naming_write_errors(kept, error=FailureError):
             os.replace(answer, kept)
-        except OSError as fault:
-            raise FailureError(f"cannot rename {answer}: {fault.strerror or fault}") from fault
         self._write(
             self.folder / f"{number:03d}-refused.md",
             f"{kept.name} was refused:\n\n{reason}\n\nGive another {answer.name}.\n",
         )
 
     def _write(self, file: Path, text: str) -> None:
-        try:
+        with naming_write_errors(file, error=FailureError):
             self.folder.mkdir(parents=True, exist_ok=True)
             file.write_text(text, encoding="utf-8")
-        except OSError as fault:
-            raise FailureError(f"cannot write {file}: {fault.strerror or fault}") from fault

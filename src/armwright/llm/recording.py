@@ -28,9 +28,6 @@ class ReplayBackend(LlmBackend):
         self.origin = next((call.origin for call in calls), "model")
         self.differing: list[str] = []
 
-    def begin(self) -> None:
-        """Do nothing."""
-
     def check(self) -> Reply:
         """Return the first recorded check."""
         return self._play(next(call for call in self.calls if call.step == "check"))
@@ -50,9 +47,6 @@ class ReplayBackend(LlmBackend):
             if question.proposal not in self.differing:
                 self.differing.append(question.proposal)
         return self._play(call)
-
-    def cancel(self) -> None:
-        """Do nothing: no call is ever in flight."""
 
     def _play(self, call: Call) -> Reply:
         if call.fault is not None:

@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
+from armwright.files import naming_write_errors
 from armwright.llm.backend import Question, Reply
 from armwright.runs.control import Hint
 
@@ -61,11 +62,8 @@ class Transcript:
             self._calls.append(call)
             if self._path is None:
                 return
-            try:
-                with open(self._path, "ab", buffering=0) as file:
-                    _append(file, (json.dumps(_record(call)) + "\n").encode())
-            except OSError as fault:
-                raise RunFolderError(f"cannot write {self._path}: {fault.strerror or fault}") from fault
+            with naming_write_errors(self._path), open(self._path, "ab", buffering=0) as file:
+                _append(file, (json.dumps(_record(call)) + "\n").encode())
 
     def answered(self, proposal: str, step: str) -> Call | None:
         """Return the call that answered this step of a proposal, if any."""
@@ -128,10 +126,8 @@ def _read(path: Path, mend: bool) -> Iterator[Call]:
         raise RunFolderError(f"cannot read {path}: {fault.strerror or fault}") from fault
     end = content.rfind(b"\n") + 1
     if mend and end < len(content):
-        try:
+        with naming_write_errors(path):
             os.truncate(path, end)
-        except OSError as fault:
-            raise RunFolderError(f"cannot write {path}: {fault.strerror or fault}") from fault
     for number, line in enumerate(content[:end].split(b"\n")[:-1], start=1):
         try:
             yield _CALL.validate_json(line)

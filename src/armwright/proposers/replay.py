@@ -98,11 +98,7 @@ class ReplayProposer(PromptedProposer):
         if recorded is not None:  # never asked or not answered: no budget, or a model that was given up
             assert recorded.fault is not None
             return recorded.fault, f"recorded: {recorded.fault}"
-        numbers = sorted({int(c.proposal.rpartition("-")[2]) for c in self.recording.calls if c.proposal})
-        return "missing", (
-            f"{self.recording.source} holds no proposal for trial {number}, but for {', '.join(map(str, numbers[:4]))}"
-            f"{', …' if len(numbers) > 4 else ''}; were n_init and n_step others?"
-        )
+        return "missing", f"{self.recording.source} holds no proposal for trial {number}; check n_init and n_step"
 
 
 def recorded_options(config: RunConfig | None) -> tuple[Prompt | None, PromptOptions]:

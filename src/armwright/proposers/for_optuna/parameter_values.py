@@ -6,8 +6,8 @@ an unknown category RUNNING.
 
 import json
 import math
-from numbers import Integral, Real
-from typing import Any
+from numbers import Real
+from typing import Any, cast
 
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 
@@ -111,7 +111,7 @@ def _checked_number(name: str, value: Any, distribution: IntDistribution | Float
     low, high, step = distribution.low, distribution.high, distribution.step
     allowed = f"{_number(low)} <= {name} <= {_number(high)}{_steps(distribution)}"
     whole = isinstance(distribution, IntDistribution)
-    number = _as_int(value) if whole else _as_float(value)
+    number = _as_number(value, whole)
     if number is None:
         raise DesignError(f"{name} = {_shown(value)} is not a {'whole' if whole else 'finite'} number with {allowed}")
     if not low <= number <= high:
@@ -127,24 +127,17 @@ def _checked_number(name: str, value: Any, distribution: IntDistribution | Float
     raise DesignError(f"{name} = {_number(number)} is between the steps of {allowed}")
 
 
-def _as_int(value: Any) -> int | None:
-    return int(value) if _is_whole(value) and -LARGEST < value < LARGEST else None
-
-
-def _is_whole(value: Any) -> bool:
-    if isinstance(value, bool):
-        return False
-    return isinstance(value, Integral) or (isinstance(value, Real) and float(value).is_integer())
-
-
-def _as_float(value: Any) -> float | None:
+def _as_number(value: Any, whole: bool) -> int | float | None:
+    """Return a finite number, as an integer of 64 bits if it has to be whole; None for anything else."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
     try:
         number = float(value)
     except OverflowError:
         return None
-    return number if math.isfinite(number) else None
+    if not whole:
+        return number if math.isfinite(number) else None
+    return int(cast("Any", value)) if number.is_integer() and abs(number) < LARGEST else None
 
 
 def _closest_choice(value: Any, distribution: CategoricalDistribution) -> Any:

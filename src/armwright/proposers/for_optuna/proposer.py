@@ -15,7 +15,8 @@ import optuna
 from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
-from armwright.exceptions import DesignError, RunFolderError, SettingsError
+from armwright.exceptions import DesignError, SettingsError
+from armwright.files import naming_write_errors
 from armwright.problem.problem import Problem
 from armwright.proposers.for_optuna.parameters import Space, stated_space
 from armwright.proposers.proposer import Proposal, Proposer
@@ -133,10 +134,8 @@ class ArmProposer(StudyProposer):
     def _open(self, study: optuna.Study, history: History) -> None:
         folder = None if self.folder is None else self.folder / _folder_name(study)
         if folder is not None:
-            try:
+            with naming_write_errors(folder):
                 folder.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise RunFolderError(f"cannot write {folder}: {error.strerror or error}") from error
         self.proposer.open(folder)
         self._study = study
         used = {trial.user_attrs.get("proposal") for trial in study.get_trials(deepcopy=False)}
