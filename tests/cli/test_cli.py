@@ -432,11 +432,11 @@ import armwright.cli.app as cli
 class Finalised:
     def __del__(self):
         os.kill(os.getpid(), signal.{name})
-        threading.Event().wait(30)  # here the signal is heeded, and what it raises is dropped
+        threading.Event().wait(600)  # here the signal is heeded, and what it raises is dropped
 
 def app():
     Finalised()
-    threading.Event().wait(30)
+    threading.Event().wait(600)
     print("not heeded")
 
 cli.app = app

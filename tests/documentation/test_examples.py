@@ -51,10 +51,12 @@ def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["optimize", str(task), *spaces, *options])
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["n_trials"] == 15
-    # What the first lines of a file say can be typed.
-    for line in task.read_text().splitlines():
-        if (said := re.search(r"armwright optimize (\S+)(?: --space (\S+))?", line)) and line.startswith("#"):
-            assert all((EXAMPLES.parent / file).is_file() for file in said.groups() if file)
+    # The command in the file's first comment names existing files.
+    ((named_task, named_space),) = re.findall(
+        r"^#.*armwright (?:optimize|design) (\S+)(?: --space (\S+))?", task.read_text(), re.MULTILINE
+    )
+    assert (EXAMPLES.parent / named_task).samefile(task)
+    assert not named_space or (EXAMPLES.parent / named_space).samefile(space)
 
 
 @pytest.mark.slow

@@ -52,7 +52,8 @@ LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/
 # Pages whose programs are run elsewhere, where what comes of them is looked at, too.
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 
-LONGEST_WAIT = 900.0  # [s] for a command: one that waits for something that never comes is a fault of the page
+FOLLOWED = [page for page in PAGES if commands(page)]
+LONGEST_WAIT = 900.0  # [s] for a command; only one that waits forever takes this long
 
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
 SHORT = "--n-total 40 --no-figures"
@@ -94,7 +95,7 @@ def parsed(arguments: Sequence[str]) -> None:
     cli()[name].make_context(f"armwright {name}", list(rest))
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", FOLLOWED)
 def test_every_command_and_option_exists(page: str) -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
@@ -132,22 +133,29 @@ def test_what_is_said_in_passing_exists() -> None:
     scripts = "".join(file.read_text() for place in ("benchmarks", "tests") for file in (ROOT / place).rglob("*.py"))
     ours = set(re.findall(r'add(?:_argument|option)\(\s*"(--[a-z-]+)"', scripts))
     known = set[str]().union(*options.values()) | {"--version", "--help"} | ours
+    checked = 0
     for page in PAGES:
         for span in code_spans(page):
             words = span.split()
+            checked += words[0] == "armwright" or words[0].startswith("--")
             said = {word.split("=")[0] for word in words if re.fullmatch(r"--[a-z][a-z-]+(=.*)?", word)}
             if words[0] == "armwright" and len(words) > 1 and not words[1].startswith("-"):
                 assert words[1] in options, f"{page}: {span}"
                 assert said <= options[words[1]] | {"--help"}, f"{page}: {span}"
             elif words[0].startswith("--"):
                 assert said <= known, f"{page}: {span}"
+    assert checked > 100
 
 
 def test_every_file_that_is_named_exists() -> None:
-    for page in PAGES:
-        for span in code_spans(page):
-            if re.fullmatch(r"(src|tests|benchmarks|examples|tools|optunahub)/[\w./-]+", span):
-                assert (ROOT / span).exists(), f"{page}: {span}"
+    named = [
+        (page, span)
+        for page in PAGES
+        for span in code_spans(page)
+        if re.fullmatch(r"(src|tests|benchmarks|examples|tools|optunahub)/[\w./-]+", span)
+    ]
+    assert len(named) > 20
+    assert [(page, span) for page, span in named if not (ROOT / span).exists()] == []
 
 
 def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[str]:
@@ -216,9 +224,6 @@ def file_of(block: Block) -> str | None:
     before = "\n".join((ROOT / block.page).read_text(encoding="utf-8").splitlines()[: block.line - 1]).rstrip()
     found = re.search(r"`([\w-]+\.\w+)`:$", before)
     return found[1] if found else None
-
-
-FOLLOWED = [page for page in PAGES if commands(page)]
 
 
 @pytest.mark.slow

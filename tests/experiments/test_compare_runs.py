@@ -216,18 +216,20 @@ def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: P
     assert {path.name for path in files} >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "time-to.csv"}
     text = (tmp_path / "table.md").read_text()
     rows = list(csv.DictReader((tmp_path / "table.csv").read_text().splitlines()))
+    assert len(rows) == len(comparison.rows) == 4
     for row in rows:
         assert f"{float(row['e_hv']):.2f} ({float(row['sigma_hv']):.2f})" in text
     assert "6.70 (2.03)" in text
     assert "The Paper" in text
     assert "one cell is missing" in text
     assert "smallest possible p is 0.25 (seeds in common: 3)" in text
-    for line in re.findall(r"(?m)^\|.*$", text):
-        assert line.endswith("|")
+    table = re.findall(r"(?m)^\|.*$", text)
+    assert len(table) > len(rows)
+    assert all(line.endswith("|") for line in table)
     tex = (tmp_path / "table.tex").read_text()
     body = [line for line in tex.splitlines() if line.endswith(r"\\")]
     columns = re.search(r"\{tabular\}\{(\w+)\}", tex)[1]
-    assert all(line.count("&") == len(columns) - 1 for line in body[1:])
+    assert {line.count("&") for line in body[1:]} == {len(columns) - 1}
     assert tex.count("{") == tex.count("}")
     assert "_" not in re.sub(r"\\_|[E\\]?\w*_\{hv\}", "", tex)
 

@@ -16,6 +16,7 @@ from armwright.kinematics.ik import solve_postures
 from armwright.problem import problem
 from armwright.problem.problem import Problem
 from armwright.tasks.catalogue import load_task
+from tests.support.command_line import PATIENCE
 
 THREADS = """
 import sys, threading
@@ -45,7 +46,7 @@ raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE)
 
 
 @pytest.mark.slow
@@ -121,7 +122,7 @@ for kernel in kernels.values():
 def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
     """To PTX, by the compiler that Warp brings. What they compute there, only a GPU can say."""
     command = [sys.executable, "-c", COMPILE_FOR_CUDA, str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     written = [path.read_text() for path in tmp_path.glob("*.ptx")]
     assert len(written) == int((tmp_path / "count").read_text()) >= 9

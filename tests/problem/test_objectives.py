@@ -240,7 +240,8 @@ def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: t
     point = front.summary["hypervolume"]["reference_point"]
     assert front.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(values, ref=point), rel=0.02)
     assert front.summary["best_known"] is None
-    assert verify_run(tmp_path / "run")[1]["verification"]["robust"] >= 0
+    verification = verify_run(tmp_path / "run")[1]["verification"]
+    assert verification["robust"] + verification["sensitive"] == len(history.front)
     page = RunContent(tmp_path / "run")
     assert page.packed()
 

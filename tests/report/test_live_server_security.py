@@ -22,6 +22,7 @@ from armwright.report.page import write_report
 from armwright.runs.control import read_control
 from tests.fuzz.targets import a_server
 from tests.support.browser import FLAGS, Tab, program
+from tests.support.command_line import PATIENCE
 from tests.support.live_server import ask, post_control, served
 
 __all__ = ["served"]  # a fixture
@@ -33,7 +34,7 @@ LINK = (
 
 def said(port: int, request: bytes) -> tuple[int, dict[str, str], bytes]:
     """The answer to these very bytes, which are no more than a part of a request perhaps."""
-    with socket.create_connection(("127.0.0.1", port), timeout=60) as connection:
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
         connection.sendall(request)
         answer = http.client.HTTPResponse(connection, method=request.split(b" ")[0].decode())
         answer.begin()
@@ -171,7 +172,7 @@ def test_endless_body_is_refused_early(served: tuple[Path, int, str]) -> None:
 def test_slow_clients_do_not_block_others(served: tuple[Path, int, str]) -> None:
     folder, port, token = served
     begun = lines("POST /control HTTP/1.1", *right(port, token), "Content-Length: 18") + b'{"action":'
-    slow = [socket.create_connection(("127.0.0.1", port), timeout=20) for _ in range(50)]
+    slow = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(50)]
     for number, connection in enumerate(slow):
         connection.sendall(begun if number % 2 else begun[:30])
     assert ask(port, "GET", "/run")[0] == 200

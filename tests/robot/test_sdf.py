@@ -108,7 +108,9 @@ def test_links_on_the_edge_load() -> None:
     for link in links:
         arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -1.0, 1.0),), (link,))
         assert Loaded(arm).plant.num_positions() == 1
-        for inertial in ElementTree.fromstring(to_sdf(arm)).findall("model/link/inertial"):
+        inertials = ElementTree.fromstring(to_sdf(arm)).findall("model/link/inertial")
+        assert inertials
+        for inertial in inertials:
             least = min(float(inertial.findtext(f"inertia/{moment}", "")) for moment in ("ixx", "iyy", "izz"))
             assert least >= 1e-14
             assert float(inertial.findtext("mass", "")) >= 1e-12

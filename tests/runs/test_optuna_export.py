@@ -208,6 +208,7 @@ def test_optuna_draws_an_exported_study(which: str, request: pytest.FixtureReque
         assert optuna.visualization.plot_slice(study, **about).data
         assert optuna.visualization.plot_parallel_coordinate(study, **about).data
         importances = set(optuna.visualization.plot_param_importances(study, **about).data[0].y)
+        assert importances
         assert importances == names if which == "plain" else importances <= names  # all parameters of each design
         optuna.visualization.matplotlib.plot_slice(study, **about)
         plt.close("all")
@@ -226,6 +227,7 @@ def test_each_design_of_the_front_has_its_urdf_as_an_artifact(run: Path, tmp_pat
     _, history = read_run(run)
     store = FileSystemArtifactStore(run / ARTIFACTS)
     front = {member.number for member in history.front}
+    assert front
     with opened(run / STUDY_DB) as study:
         found = {trial.number: get_all_artifact_meta(trial, storage=study._storage) for trial in study.trials}
     assert {number for number, artifacts in found.items() if artifacts} == front
@@ -377,14 +379,14 @@ def test_optuna_dashboard_shows_an_exported_study(run: Path, browser: Browser) -
     page = tab.page
     with dashboard(command, free_port()) as address:
         page.goto(f"{address}/studies/1")
-        expect(page.get_by_text("Pareto Front")).to_be_visible(timeout=60_000)
+        expect(page.get_by_text("Pareto Front")).to_be_visible()
         expect(page.locator("body")).to_contain_text("worst_error")
         expect(page.locator(".scatterlayer .point")).not_to_have_count(0)
         expect(page.locator("body")).to_contain_text("Hyperparameter Importance")
 
         page.goto(f"{address}/studies/1/trials?numbers={number}")
         shown = page.locator("body")
-        expect(shown).to_contain_text(f"Trial {number} (trial_id={number + 1})", timeout=60_000)
+        expect(shown).to_contain_text(f"Trial {number} (trial_id={number + 1})")
         expect(shown).to_contain_text("Best Trial")
         expect(shown).to_contain_text(f"source {history.trials[number].source}")
         expect(shown).to_contain_text(f"joints {history.trials[number].design.joints}")
@@ -398,12 +400,12 @@ def test_optuna_dashboard_shows_an_exported_study(run: Path, browser: Browser) -
 
         # A model's words are shown as they are: no picture is fetched, no script runs.
         page.goto(f"{address}/studies/1/trials?numbers={proposed.number}")
-        expect(shown).to_contain_text("source talker", timeout=60_000)
+        expect(shown).to_contain_text("source talker")
         expect(shown).to_contain_text('one <img src=x onerror="document.title=1"> | **two**, $x^2$ and [three]')
         expect(page.get_by_role("link", name="three")).to_have_count(0)
 
         page.goto(f"{address}/studies/1/note")
-        expect(page.get_by_role("cell", name=str(number), exact=True).first).to_be_visible(timeout=60_000)
+        expect(page.get_by_role("cell", name=str(number), exact=True).first).to_be_visible()
     assert not [url for url in tab.requests if not url.startswith(address.removesuffix("/dashboard"))]
     assert not tab.faults
     tab.close()

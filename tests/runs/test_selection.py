@@ -42,6 +42,7 @@ def test_what_is_picked_meets_the_conditions_and_is_the_best(history: History) -
     picked = pick(history, conditions, by="torque")
     told = [numbers_of(history, member) for member in history.front]
     meeting = [numbers for numbers in told if numbers["position_error"] <= 2.0 and numbers["length"] < 0.6]
+    assert 0 < len(meeting) < len(history.front)
     assert [member.values[1] for member in picked] == sorted(numbers["torque"] for numbers in meeting)
 
 
@@ -60,6 +61,7 @@ def test_weights_are_shares_of_the_reference_point(history: History) -> None:
 
 def test_pick_can_be_restricted_to_robust_designs(run: Path) -> None:
     robust = json.loads((run / "summary.json").read_text())["verification"]["robust_numbers"]
+    assert robust
     _, picked = pick_from(run, robust=True)
     assert sorted(member.number for member in picked) == sorted(robust)
 
@@ -125,6 +127,7 @@ def test_the_build_sheet_says_what_the_joints_hold(run: Path, history: History) 
     arm, evaluation = history.member(number).arm, history.evaluation([number])
     rows = list(csv.DictReader(io.StringIO(invoke("export", run, "--design", number, "--format", "sheet-csv"))))
     torques = np.abs(evaluation.joint_torques[0])
+    assert len(rows) == len(arm.links) == 4
     for j, row in enumerate(rows):
         assert float(row["length"]) == pytest.approx(arm.links[j].length)
         assert float(row["torque"]) == pytest.approx(torques[:, j].max())

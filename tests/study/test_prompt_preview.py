@@ -18,7 +18,7 @@ from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
-from tests.support.command_line import armwright
+from tests.support.command_line import PATIENCE, armwright
 from tests.support.fixed_problem import SIX_AXIS
 from tests.support.wire_formats import llm_proposer, model_options
 
@@ -153,7 +153,7 @@ def test_after_an_interrupt_what_is_printed_is_what_is_sent_next(chat_server: Ch
 
     def answer(request: Request) -> Answer:
         if len(chat_server.requests) > 1:
-            answered.wait(60)
+            answered.wait(PATIENCE)
         return designer(request)
 
     chat_server.answer = answer

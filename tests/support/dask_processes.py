@@ -14,8 +14,8 @@ from typing import Any
 import psutil
 
 import armwright as aw
+from tests.support.command_line import PATIENCE
 
-PATIENCE = 120.0  # [s]
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 
 EVALUATOR = """

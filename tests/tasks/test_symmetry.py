@@ -68,18 +68,22 @@ def test_a_mirrored_set_has_its_plane_wherever_it_is_turned(
 
 @given(POINTS)
 def test_a_quarter_turn_about_z_turns_the_planes(half: np.ndarray) -> None:
+    assume(np.abs(half[:, 1]).max() > 0.01)
     points = np.vstack([half, half * (1.0, -1.0, 1.0)])
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     before, after = symmetry_planes(points), symmetry_planes(points @ turn.T)
-    assert len(before) == len(after)
+    assert len(before) == len(after) > 0
     assert all(has(after, turn @ normal) for normal in before)
 
 
 @given(POINTS, ROTATIONS)
-def test_every_plane_mirrors_the_set_onto_itself(points: np.ndarray, quaternion: np.ndarray) -> None:
-    points = points @ rotation(quaternion).T
+def test_every_plane_mirrors_the_set_onto_itself(half: np.ndarray, quaternion: np.ndarray) -> None:
+    assume(np.abs(half[:, 1]).max() > 0.01)
+    points = np.vstack([half, half * (1.0, -1.0, 1.0)]) @ rotation(quaternion).T
     offsets = points - centre(points)
-    for normal in symmetry_planes(points):
+    planes = symmetry_planes(points)
+    assert len(planes) > 0
+    for normal in planes:
         assert np.linalg.norm(normal) == pytest.approx(1.0)
         mirrored = offsets - 2.0 * np.outer(offsets @ normal, normal)
         apart = np.linalg.norm(mirrored[:, None] - offsets[None], axis=2)
