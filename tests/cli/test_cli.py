@@ -83,7 +83,7 @@ def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer
 
     table = shown("rules").split("Attribution")[1].splitlines()[1:5]
     assert table[0].split("  ")[0] == "source"
-    assert [row.split()[:2] for row in table[1:]] == [["random", "4"], ["rules", "1"], ["bbo", "5"]]
+    assert [re.split(r"\s\s+", row)[:2] for row in table[1:]] == [["random", "4"], ["rules", "1"], ["black box", "5"]]
     assert max(map(len, table)) < 60
     assert "Attribution" not in shown("none")
 

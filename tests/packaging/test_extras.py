@@ -14,7 +14,7 @@ import armwright as aw
 from armwright import extras
 from armwright.exceptions import MissingExtraError, UsageError
 from armwright.extras import EXTRAS, missing_packages, requires_extra
-from armwright.report.live_server import begin_server, serve
+from armwright.report.live_server import serve, start_server
 from armwright.robot.robot_descriptions import find_urdf
 from tests import ROOT
 from tests.support.extras import NEEDS_GP
@@ -57,7 +57,7 @@ ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
     "distributed": ("distributed", "distributed", lambda: aw.Workers(2)),
     "gp": ("gp", "torch", lambda: aw.optimize(aw.Problem(aw.load_task("target-1")), sampler="gp")),
     "page": ("live", "uvicorn", lambda: serve(Path("run"), print)),
-    "page of a run": ("live", "starlette", lambda: begin_server(Path("run"))),
+    "page of a run": ("live", "starlette", lambda: start_server(Path("run"))),
     "model": ("llm", "pydantic_ai", lambda: aw.LlmProposer("openai-chat:gpt-4o")),
     "model of a study": ("llm", "openai", lambda: aw.StudyLlmProposer("openai-chat:gpt-4o", "two numbers")),
     "draft": ("llm", "openai", lambda: aw.draft("reach a shelf", "openai-chat:gpt-4o")),

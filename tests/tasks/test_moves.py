@@ -342,7 +342,7 @@ def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
     assert "move_step: 0.02 stored, 0.01 requested" in str(again.exception)
     (in_folder / "line.yaml").write_text(f"{text} [position_error, torque]\n")
     told = CliRunner().invoke(app, [*words, "--no-figures", "--out", "other"])
-    assert "no objective uses the task's moves" in told.output
+    assert "no objective or constraint uses the task's moves" in told.output
 
 
 def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:

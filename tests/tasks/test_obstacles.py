@@ -167,7 +167,7 @@ def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
     assert all(f"  obstacle: {words}\n" in armwright("tasks", file) for words in DESCRIPTIONS)
     size = ["--n-init", 5, "--n-total", 10]
     output = armwright("optimize", file, *size, "--out", tmp_path / "run")
-    assert "no objective uses" not in output
+    assert "no objective or constraint uses" not in output
     config, history = read_run(tmp_path / "run")
     assert config.task.obstacles == load_task(file).obstacles
     assert np.array_equal(history.problem.evaluate([trial.design for trial in history]).values, history.values)
@@ -176,7 +176,7 @@ def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
     assert "Orientation does not matter. The inverse kinematics steers around nothing" in prompt
     assert repeat_command(config).startswith("armwright optimize TASK.yaml")
     options = ["--objectives", "position_error", *size, "--no-figures", "--out", tmp_path / "other"]
-    assert "no objective uses the task's obstacles" in armwright("optimize", file, *options)
+    assert "no objective or constraint uses the task's obstacles" in armwright("optimize", file, *options)
 
 
 def test_a_task_with_other_obstacles_is_another_run(tmp_path: Path) -> None:

@@ -208,4 +208,4 @@ def test_covering_a_box_from_the_command_line(in_folder: Path) -> None:
     told = CliRunner().invoke(
         app, ["optimize", "cover.yaml", "--objectives", "torque", "--n-total", "2", "--no-figures", "--out", "other"]
     )
-    assert "no objective uses the task's workspace; objectives for it: uncovered_fraction" in told.output
+    assert "no objective or constraint uses the task's workspace; quantities for it: uncovered_fraction" in told.output

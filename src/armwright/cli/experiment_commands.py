@@ -16,8 +16,7 @@ from armwright.cli.options import (
     TaskName,
     select_workers,
 )
-from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import print_json, repeat_command, stderr_console, stdout_console
+from armwright.cli.streams import exit_interrupted, print_json, stderr_console, stdout_console
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -74,8 +73,8 @@ def experiment(
     before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
     finished = {done.cell for done in before}
     due = [cell for cell in cells if cell not in finished]
-    default = workers is None and scheduler is None
-    placed = running.default_workers(len(due)) if default else select_workers(workers, scheduler)
+    is_default = workers is None and scheduler is None
+    placed = running.default_workers(len(due)) if is_default else select_workers(workers, scheduler)
     show_plan(console, due, len(before), skipped, placed)
     if print_commands:
         print("\n".join(cell.command for cell in due))
@@ -94,11 +93,10 @@ def experiment(
             console.print("drawing the figures")
         drawn = write_experiment_figures(out, chosen, found) if figures else []
     except KeyboardInterrupt:
-        console.print(f"\nstopped; every finished trial is in {out}/. Resume with:\n  {repeat_command()}")
-        sys.exit(INTERRUPTED)
+        exit_interrupted(console, f"every finished trial is in {out}/")
     if json_:
-        record = {"folder": str(out), "cells": len(cells), "skipped": len(skipped), "failed": len(failed)}
-        print_json({**record, "tables": [str(path) for path in tables], "figures": [str(path) for path in drawn]})
+        counts = {"cells": len(cells), "skipped": len(skipped), "failed": len(failed)}
+        print_json({"folder": out, **counts, "tables": tables, "figures": drawn})
     else:
         show_comparison(console, tables, drawn)
     if failed:

@@ -14,7 +14,7 @@ def unused_parts(problem: Problem) -> list[str]:
         ("workspace", task.workspace, (UNCOVERED_FRACTION,)),
     )
     return [
-        f"no objective uses the task's {part}; objectives for it: {', '.join(quantity.name for quantity in quantities)}"
+        f"no objective or constraint uses the task's {part}; quantities for it: {', '.join(q.name for q in quantities)}"
         for part, given, quantities in parts
         if given and not problem.uses(*quantities)
     ]

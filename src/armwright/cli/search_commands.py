@@ -1,6 +1,5 @@
 """Commands that search designs: design, optimize, refine."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -27,8 +26,7 @@ from armwright.cli.options import (
     load_problem,
     select_workers,
 )
-from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import print_json, repeat_command, stderr_console, stdout_console
+from armwright.cli.streams import exit_interrupted, print_json, repeat_command, stderr_console, stdout_console
 from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
 
@@ -66,13 +64,11 @@ def design(
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
     console = stderr_console() if json_ else stdout_console()
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
-    initial_designs = from_
-    if proposer is not None:
-        choice = choose_proposer(proposer)
+    choice = None if proposer is None else choose_proposer(proposer)
+    if choice is not None:
         if choice.proposer is None:
             raise SettingsError(f"--proposer {proposer} proposes no initial designs; leave it out")
         console.print(choice.reason)
-        initial_designs = choice.proposer
     folder = out or Path("runs") / f"{problem.task.name}-front-seed{seed}"
     try:
         with search_progress(console) as watch:
@@ -80,17 +76,16 @@ def design(
                 problem,
                 budget=budget,
                 seed=seed,
-                initial_designs=initial_designs,
+                initial_designs=from_ if choice is None else choice.proposer,
                 stop_at_stall=stall,
                 out=folder,
                 watch=watch,
             )
         drawn = _draw(folder) if figures else []
     except KeyboardInterrupt:
-        console.print(f"\nstopped; the search is saved in {folder}/. Resume with:\n  {repeat_command()}")
-        sys.exit(INTERRUPTED)
+        exit_interrupted(console, f"the search is saved in {folder}/")
     if json_:
-        print_json({"folder": str(folder), **run.summary})
+        print_json({"folder": folder, **run.summary})
         return
     if run.resumed:
         search = run.summary["search"]
@@ -187,9 +182,9 @@ def optimize(
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
     if live:
-        from armwright.report.live_server import begin_server
+        from armwright.report.live_server import start_server
 
-        console.print(f"live: {begin_server(folder)}")
+        console.print(f"live: {start_server(folder)}")
     try:
         with study_progress(console) as watch:
             run = run_study(
@@ -213,9 +208,7 @@ def optimize(
             console.print("drawing the page and the figures")
         drawn = _draw(folder) if figures else []
     except (KeyboardInterrupt, StoppedError):
-        kept = f"every finished trial is in {folder}/" if folder.exists() else "nothing was started"
-        console.print(f"\nstopped; {kept}. Resume with:\n  {repeat_command()}")
-        sys.exit(INTERRUPTED)
+        exit_interrupted(console, f"every finished trial is in {folder}/" if folder.exists() else "nothing was started")
     except AnswerPendingError as pending:
         if pending.refusal:
             console.print(f"answer rejected: {pending.refusal}")
@@ -223,11 +216,11 @@ def optimize(
             f"{pending.question} waits for your answer in {pending.answer}; then resume with:\n  {repeat_command()}"
         )
         if json_:
-            where = {"folder": str(folder), "question": str(pending.question), "answer": str(pending.answer)}
-            print_json({**where, "refusal": pending.refusal})
+            files = {"folder": folder, "question": pending.question, "answer": pending.answer}
+            print_json({**files, "refusal": pending.refusal})
         return
     if json_:
-        print_json({"folder": str(folder), **run.summary})
+        print_json({"folder": folder, **run.summary})
         return
     if finished_before:
         console.print(f"{folder}/ is finished; nothing was computed again. A larger --n-total extends it.")
@@ -248,7 +241,7 @@ def refine(
     refined = refine_run(run, evaluations)
     _draw(run)
     if json_:
-        print_json({"folder": str(run), **refined.summary})
+        print_json({"folder": run, **refined.summary})
         return
     show_refined(stdout_console(), refined)
 

@@ -5,18 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from armwright.cli.notes import payload_note
-from armwright.cli.streams import format_point
+from armwright.cli.streams import format_point, plain_table
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
 from armwright.experiments.runner import CellOutcome
 from armwright.extras import install_command, missing_packages
-from armwright.problem.objectives import (
-    TORQUE_SCALE,
-)
+from armwright.problem.objectives import TORQUE_SCALE
 from armwright.study.cluster import Workers
 
 
@@ -80,15 +76,14 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     objectives, space = comparison.problem.objectives, comparison.problem.space
     others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
     title = "; ".join(filter(None, (f"Arms on {comparison.problem.task.name}", payload_note(comparison.problem.task))))
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
-    table.add_column("\narm", no_wrap=True)
     measured = [_ARM_COLUMNS[objective.name] for objective in MEASURES]
-    for name in ("\njoints", "reach\nm", "mass\nkg", *measured, *(f"{o.name}\n{o.unit}" for o in others)):
-        table.add_column(Text(name), justify="right", no_wrap=True)
+    numbers = ("\njoints", "reach\nm", "mass\nkg", *measured, *(f"{o.name}\n{o.unit}" for o in others))
+    table = plain_table("\narm", *numbers, right=numbers, title=title, gap=1)
+    table.columns[0].no_wrap = True
     for arm in (*comparison.arms, *comparison.designs):
         values = dict(zip((objective.name for objective in objectives), arm.values, strict=True))
-        numbers = [*arm.measures.values(), *(values[objective.name] for objective in others)]
-        cells = ["-" if value is None else _format_measure(value) for value in numbers]
+        measures = [*arm.measures.values(), *(values[objective.name] for objective in others)]
+        cells = ["-" if value is None else _format_measure(value) for value in measures]
         table.add_row(arm.name, str(arm.joints), f"{arm.reach:.2f}", f"{arm.mass:.3g}", *cells)
     console.print(table)
     console.print(

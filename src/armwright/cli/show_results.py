@@ -13,11 +13,9 @@ from rich.text import Text
 
 from armwright.cli.notes import payload_note, unused_parts
 from armwright.cli.streams import format_point, plain_table
-from armwright.problem.objectives import (
-    POSITION_ERROR,
-    TORQUE,
-    TORQUE_SCALE,
-)
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
+from armwright.report.style import look
 from armwright.runs.history import FrontMember, History
 from armwright.runs.results import REPORT, describe_infeasibility
 from armwright.study.front_run import FrontRun
@@ -31,30 +29,25 @@ MAX_OBJECTIVES_BESIDE_GEOMETRY = 3  # more of them leave no room for base and li
 
 def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> None:
     """Print the front, the hypervolume and the costs of a run."""
-    history = run.history
-    summary = run.summary
+    history, summary, problem = run.history, run.summary, run.history.problem
     show_front(console, history, summary)
     if summary["proposer"] is not None:
         console.print(_attribution_table(summary["attribution"]))
-    volume = summary["hypervolume"]
-    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
-    infeasible = f", {(~history.feasible).sum()} infeasible" if history.problem.constraints else ""
-    sources = ", ".join(f"{count} {source}" for source, count in summary["by_source"].items())
-    console.print(
-        f"hypervolume {volume['final']:.3f} (mean over iterations {volume['mean']:.3f}; reference point {reference})"
-    )
-    _show_empty_front(console, history, volume["final"], "more trials")
-    _show_best_known(console, summary["best_known"])
+    _show_hypervolume(console, history, summary, "more trials")
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
-    console.print(f"{summary['n_trials']} trials{more}{infeasible}: {sources}; {_seconds(summary['seconds'])}")
+    infeasible = f", {(~history.feasible).sum()} infeasible" if problem.constraints else ""
+    sources = ", ".join(f"{count} {look(source).label}" for source, count in summary["by_source"].items())
+    seconds = summary["seconds"]
+    parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
+    console.print(f"{summary['n_trials']} trials{more}{infeasible}: {sources}; {seconds['total']:.1f} s ({parts})")
     if summary["duplicates"]:
         console.print(
             f"{summary['duplicates']} trials repeated the design of an earlier one and were not evaluated again"
         )
-    _show_proposer(console, summary["proposer"])
-    scaled = TORQUE in history.problem.objectives
-    problem = history.problem
-    notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if scaled else []
+    if summary["proposer"] is not None:
+        _show_proposer(console, summary["proposer"])
+    is_scaled = TORQUE in problem.objectives
+    notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if is_scaled else []
     notes += [problem.space.mass_note, payload_note(problem.task), *unused_parts(problem)]
     console.print("; ".join(filter(None, notes)))
     _show_files(console, run.folder, figures)
@@ -79,11 +72,8 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     """Print the result of a front search."""
     summary = run.summary
     show_front(console, run.history, summary)
-    volume, search = summary["hypervolume"], summary["search"]
-    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
-    console.print(f"hypervolume {volume['final']:.3f} (reference point {reference}), {len(run.history)} designs")
-    _show_empty_front(console, run.history, volume["final"], "a larger --budget")
-    _show_best_known(console, summary["best_known"])
+    _show_hypervolume(console, run.history, summary, "a larger --budget")
+    search = summary["search"]
     reason = {"budget": "budget spent", "stall": "hypervolume stalled"}[search["ended_by"]]
     infeasible = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
     console.print(f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}")
@@ -103,14 +93,20 @@ def show_refined(console: Console, refined: RefinedRun) -> None:
     _show_best_known(console, refined.summary["best_known"])
 
 
-def _show_empty_front(console: Console, history: History, hypervolume: float, more: str) -> None:
+def _show_hypervolume(console: Console, history: History, summary: dict[str, Any], remedy: str) -> None:
+    """Print the hypervolume and how it compares; remedy: what may help if the front is empty."""
+    volume = summary["hypervolume"]
+    mean = f"mean over iterations {volume['mean']:.3f}; " if "mean" in volume else ""
+    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    console.print(f"hypervolume {volume['final']:.3f} ({mean}reference point {reference})")
     if len(history) and not history.feasible.any():
-        message = describe_infeasibility(history)
-        console.print(f"{message[0].upper()}{message[1:]}. Use {more} or looser constraints.")
-    elif hypervolume == 0.0:
+        reason = describe_infeasibility(history)
+        console.print(f"{reason[0].upper()}{reason[1:]}. Use {remedy} or looser constraints.")
+    elif volume["final"] == 0.0:
         console.print(
-            f"All designs lie beyond the reference point, so none counts. Use {more} or another reference point."
+            f"All designs lie beyond the reference point, so none counts. Use {remedy} or another reference point."
         )
+    _show_best_known(console, summary["best_known"])
 
 
 def _show_best_known(console: Console, gap: dict[str, Any] | None) -> None:
@@ -155,12 +151,9 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
     """Print the chosen designs and the command that exports the first."""
     console.print(f"{len(picked)} of the front's {len(history.front)} designs meet the conditions")
     for member in picked[:most]:
-        values = ", ".join(
-            f"{o.label.lower()} {value:.4g} {o.unit}"
-            for o, value in zip(history.problem.objectives, member.values, strict=True)
-        )
+        values = ", ".join(map(_format_objective, history.problem.objectives, member.values))
         links = ", ".join(f"{length:.3f}" for length in member.design.links)
-        console.print(Text(f"#{member.number}", style="bold") + Text(f" ({member.source}): {values}"))
+        console.print(Text(f"#{member.number}", style="bold") + Text(f" ({look(member.source).label}): {values}"))
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
         base = format_point([round(value, 3) for value in member.design.origin])
         console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}")
@@ -168,34 +161,37 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
     console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
 
 
-def _format_base(member: FrontMember) -> str:
-    return " ".join(f"{value:5.2f}" for value in member.design.origin)
-
-
-def _format_links(member: FrontMember) -> str:
-    return " ".join(f"{value:.2f}" for value in member.design.links)
+def _format_objective(objective: Objective, value: float) -> str:
+    if objective == TORQUE:  # scaled, as in the paper
+        return f"torque {value:.4g} = {TORQUE_SCALE:g} x {value / TORQUE_SCALE:.4g} N m"
+    return f"{objective.label.lower()} {value:.4g} {objective.unit}"
 
 
 def _front_table(history: History, robust: set[int] | None) -> Table:
-    title = f"Pareto front of {history.problem.task.name}"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 1, 0, 0))
     verdict = () if robust is None else ("verdict",)
     objectives = [SHORT_NAMES.get(o, o.name.replace("_", " ")) for o in history.problem.objectives]
     geometry = ("base [m]", "links [m]") if len(objectives) <= MAX_OBJECTIVES_BESIDE_GEOMETRY else ()
-    for name in ("#", "source", *verdict, *objectives, "joints", *geometry):
-        justify = "right" if name in ("#", *objectives) else "left"
-        table.add_column(Text(name), justify=justify, no_wrap=name != "links [m]")
+    table = plain_table(
+        "#", "source", *verdict, *objectives, "joints", *geometry,
+        right=("#", *objectives), title=f"Pareto front of {history.problem.task.name}", gap=1,
+    )  # fmt: skip
+    for column in table.columns:
+        column.no_wrap = str(column.header) != "links [m]"
     reference = history.reference_point or (math.inf,) * len(objectives)
     inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
     shown: list[int] = np.unique(np.linspace(0, len(inside) - 1, MAX_ROWS).round().astype(int)).tolist()
     for member in (inside[i] for i in shown):
+        base_and_links = (
+            " ".join(f"{value:5.2f}" for value in member.design.origin),
+            " ".join(f"{value:.2f}" for value in member.design.links),
+        )
         table.add_row(
             str(member.number),
-            member.source,
+            look(member.source).label,
             *(() if robust is None else ("robust" if member.number in robust else "sensitive",)),
             *map(_format_value, member.values),
             member.design.joints,
-            *((_format_base(member), _format_links(member)) if geometry else ()),
+            *(base_and_links if geometry else ()),
         )
     left_out = len(history.front) - len(shown)
     if left_out:
@@ -207,19 +203,15 @@ def _front_table(history: History, robust: set[int] | None) -> Table:
 
 def _attribution_table(attribution: dict[str, dict[str, Any]]) -> Table:
     """Return a table of trials and gained hypervolume by source; useful only with a proposer."""
-    table = Table(title="Attribution", title_justify="left", box=None, pad_edge=False)
-    table.add_column("source")
-    for name in ("trials", "on the front", "hypervolume gained"):
-        table.add_column(name, justify="right", no_wrap=True)
+    numbers = ("trials", "on the front", "hypervolume gained")
+    table = plain_table("source", *numbers, right=numbers, title="Attribution")
     for source, share in attribution.items():
         gained = f"{share['hypervolume_gained']:.3f}"
-        table.add_row(source, str(share["trials"]), str(share["front"]), gained)
+        table.add_row(look(source).label, str(share["trials"]), str(share["front"]), gained)
     return table
 
 
-def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
-    if proposer is None:
-        return
+def _show_proposer(console: Console, proposer: dict[str, Any]) -> None:
     if proposer["model"] is not None:
         cost = "cost unknown" if proposer["cost_usd"] is None else f"{proposer['cost_usd']:.4f} USD"
         by = "" if proposer["origin"] == "model" else f" (origin: {proposer['origin']})"
@@ -249,11 +241,6 @@ def _show_proposer(console: Console, proposer: dict[str, Any] | None) -> None:
             f"overlap: {overlap['ratio']:.1%} of the trials were proposals (planned: "
             f"{overlap['ratio_planned']:.1%}){feedback}"
         )
-
-
-def _seconds(seconds: dict[str, float]) -> str:
-    parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
-    return f"{seconds['total']:.1f} s ({parts})"
 
 
 def _format_value(value: float) -> str:

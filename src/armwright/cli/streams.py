@@ -5,10 +5,13 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
+
+from armwright.cli.signals import INTERRUPTED
 
 
 class _Console(Console):
@@ -29,16 +32,30 @@ def stderr_console() -> Console:
 
 
 def print_json(content: Any) -> None:
-    """Print content as indented JSON to stdout."""
-    print(json.dumps(content, indent=2))
+    """Print content as indented JSON to stdout; paths become strings."""
+    print(json.dumps(content, indent=2, default=str))
 
 
-def plain_table(*names: str, right: Sequence[str] = ()) -> Table:
-    """Return a table without lines; the columns in `right` are aligned to the right."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+def plain_table(*names: str, right: Sequence[str] = (), title: str | None = None, gap: int = 2) -> Table:
+    """Return a table without lines.
+
+    Args:
+        names: Heads of the columns.
+        right: The columns that are aligned to the right and do not wrap.
+        title: Title above the table.
+        gap: Spaces between two columns.
+    """
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, gap, 0, 0))
     for name in names:
-        table.add_column(name, justify="right" if name in right else "left")
+        is_number = name in right
+        table.add_column(Text(name), justify="right" if is_number else "left", no_wrap=is_number)
     return table
+
+
+def exit_interrupted(console: Console, kept: str) -> NoReturn:
+    """Print what an interrupted command has kept and how to resume it, and exit."""
+    console.print(f"\nstopped; {kept}. Resume with:\n  {repeat_command()}")
+    sys.exit(INTERRUPTED)
 
 
 def format_point(point: Sequence[float]) -> str:

@@ -115,7 +115,7 @@ def _is_loopback(address: str) -> bool:
     return (mapped or ip).is_loopback
 
 
-def begin_server(folder: Path) -> str:
+def start_server(folder: Path) -> str:
     """Start a process that serves the page of this process's study, and return the page's address.
 
     The server outlives the study while a page is open. If it crashes, the study goes on.
