@@ -32,14 +32,14 @@ def dominates(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 @given(POINTS | ANYWHERE)
-def test_front_is_pymoos_without_later_duplicates(values: np.ndarray) -> None:
+def test_front_agrees_with_pymoo(values: np.ndarray) -> None:
     front = set(NonDominatedSorting().do(values, only_non_dominated_front=True).tolist())
     first = {i for i in front if not any(np.array_equal(values[i], values[k]) for k in range(i))}
     assert set(np.flatnonzero(front_mask(values)).tolist()) == first
 
 
 @given(POINTS)
-def test_front_by_its_definition(values: np.ndarray) -> None:
+def test_front_satisfies_its_definition(values: np.ndarray) -> None:
     """Nothing beats a member; whatever is left out is beaten by a member, or equal to an earlier one."""
     mask = front_mask(values)
     for i, row in enumerate(values):
@@ -51,21 +51,21 @@ def test_front_by_its_definition(values: np.ndarray) -> None:
 
 
 @given(POINTS | ANYWHERE)
-def test_front_numbers_rise_in_the_first_objective_and_fall_in_the_second(values: np.ndarray) -> None:
+def test_front_is_sorted_by_the_first_objective(values: np.ndarray) -> None:
     front = values[front_indices(values)]
     assert np.all(np.diff(front[:, 0]) > 0)
     assert np.all(np.diff(front[:, 1]) < 0)
 
 
 @given(POINTS | ANYWHERE)
-def test_hypervolume_is_pymoos(values: np.ndarray) -> None:
+def test_hypervolume_agrees_with_pymoo(values: np.ndarray) -> None:
     inside = values[np.all(values < REFERENCE, axis=1)]
     expected = HV(ref_point=np.array(REFERENCE))(inside) if len(inside) else 0.0
     assert hypervolume(values, REFERENCE) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 @given(POINTS | ANYWHERE, st.randoms(use_true_random=False))
-def test_order_and_duplicates_do_not_matter(values: np.ndarray, random: object) -> None:
+def test_front_and_hypervolume_ignore_order_and_duplicates(values: np.ndarray, random: object) -> None:
     order = list(range(len(values))) * 2
     random.shuffle(order)
     again = values[order]
@@ -75,7 +75,7 @@ def test_order_and_duplicates_do_not_matter(values: np.ndarray, random: object) 
 
 
 @given(POINTS | ANYWHERE)
-def test_points_outside_the_box_count_nothing(values: np.ndarray) -> None:
+def test_points_outside_the_box_add_no_hypervolume(values: np.ndarray) -> None:
     """On its edge neither: they bound no area."""
     inside = values[np.all(values < REFERENCE, axis=1)]
     assert hypervolume(values, REFERENCE) == hypervolume(inside, REFERENCE)
@@ -84,7 +84,7 @@ def test_points_outside_the_box_count_nothing(values: np.ndarray) -> None:
 
 
 @given(POINTS | ANYWHERE)
-def test_history_is_the_hypervolume_of_every_beginning(values: np.ndarray) -> None:
+def test_hypervolume_history_matches_every_prefix(values: np.ndarray) -> None:
     history = hypervolume_history(values, REFERENCE)
     assert history == pytest.approx([hypervolume(values[: i + 1], REFERENCE) for i in range(len(values))], rel=1e-12)
     assert np.all(np.diff(history) >= -1e-12)
@@ -92,7 +92,7 @@ def test_history_is_the_hypervolume_of_every_beginning(values: np.ndarray) -> No
 
 
 @given(POINTS | ANYWHERE)
-def test_tracker_holds_the_front_at_every_moment(values: np.ndarray) -> None:
+def test_tracker_matches_the_front_after_every_point(values: np.ndarray) -> None:
     tracker = FrontTracker(2, None)
     for i, row in enumerate(values):
         tracker.add(row)
@@ -104,7 +104,7 @@ def test_tracker_holds_the_front_at_every_moment(values: np.ndarray) -> None:
 
 
 @given(POINTS)
-def test_inputs_are_left_as_they_are(values: np.ndarray) -> None:
+def test_pareto_functions_do_not_change_their_input(values: np.ndarray) -> None:
     before = values.copy()
     values.flags.writeable = False
     front_mask(values)
@@ -117,7 +117,7 @@ def test_inputs_are_left_as_they_are(values: np.ndarray) -> None:
     assert np.array_equal(values, before)
 
 
-def test_closed_forms() -> None:
+def test_hypervolume_of_simple_sets_matches_closed_forms() -> None:
     """One point: a rectangle. A staircase: the sum of its steps. Three objectives: a box."""
     assert hypervolume(np.array([[2.0, 1.0]]), REFERENCE) == pytest.approx(12.0)
     staircase = np.array([[1.0, 3.0], [2.0, 2.0], [4.0, 1.0]])
@@ -125,7 +125,7 @@ def test_closed_forms() -> None:
     assert hypervolume(np.array([[1.0, 2.0, 3.0]]), (5.0, 5.0, 5.0)) == pytest.approx(24.0)
 
 
-def test_nothing_evaluated_yet() -> None:
+def test_pareto_functions_accept_no_points() -> None:
     nothing = np.empty((0, 2))
     assert front_mask(nothing).shape == (0,)
     assert front_indices(nothing) == []
@@ -150,7 +150,7 @@ def test_default_reference_point_bounds_the_front(values: np.ndarray) -> None:
 
 
 @given(POINTS | ANYWHERE)
-def test_solutions_are_the_ends_of_the_front_in_the_box(values: np.ndarray) -> None:
+def test_paper_solutions_are_the_ends_of_the_front_in_the_box(values: np.ndarray) -> None:
     """docs/method.md §7: the front's designs of least E_pos and of least E_torque within the reference box."""
     inside = [i for i in np.flatnonzero(front_mask(values)) if np.all(values[i] < REFERENCE)]
     solutions = paper_solution_indices(values, REFERENCE)

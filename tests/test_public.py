@@ -13,7 +13,7 @@ import armwright as aw
 from tests import ROOT
 
 
-def test_all_is_honest() -> None:
+def test_public_names_match_the_stub() -> None:
     stub = ast.parse(Path(str(aw.__file__)).with_suffix(".pyi").read_text())
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
     exported = {alias.asname: node.module for node in imports for alias in node.names}
@@ -26,7 +26,7 @@ def test_all_is_honest() -> None:
 
 
 @pytest.mark.slow
-def test_the_python_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_python_code_of_the_readme_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     readme = (ROOT / "README.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
     names: dict[str, Any] = {}

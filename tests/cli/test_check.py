@@ -71,7 +71,7 @@ def test_targets_beyond_the_longest_arm_are_warned_of() -> None:
         (GROUND, (3.0, 3.0, -0.2), (0.0, 0.0, 0.0)),
     ],
 )
-def test_contains_tells_points_inside_an_obstacle(
+def test_obstacle_contains_points_inside_it(
     obstacle: dict[str, object], inside: tuple[float, float, float], outside: tuple[float, float, float]
 ) -> None:
     (read,) = task_of([[0.0, 0.0, 0.0]], obstacles=[obstacle]).obstacles

@@ -75,7 +75,7 @@ def test_optimize_runs_resumes_and_refuses_other_settings(in_folder: Path) -> No
     assert "proposer.name: rules stored, None requested" in message
 
 
-def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer() -> None:
+def test_attribution_table_fits_a_narrow_terminal_and_needs_a_proposer() -> None:
     def shown(proposer: str) -> str:
         console = Console(file=io.StringIO(), width=80, markup=False, highlight=False)
         show_result(console, optimize(Problem(load_task("target-1")), proposer=proposer, n_init=4, n_total=6), [])
@@ -89,7 +89,7 @@ def test_who_found_what_fits_a_small_terminal_and_is_left_out_without_a_proposer
 
 
 @pytest.mark.slow
-def test_missing_results_of_a_finished_run_are_made_again(in_folder: Path) -> None:
+def test_missing_results_of_a_finished_run_are_rewritten(in_folder: Path) -> None:
     armwright("optimize", "target-1", *DRAWN, "--out", "run")
     run = in_folder / "run"
     before = {path.relative_to(run) for path in run.rglob("*")}
@@ -102,14 +102,14 @@ def test_missing_results_of_a_finished_run_are_made_again(in_folder: Path) -> No
     assert {path.relative_to(run) for path in run.rglob("*")} == before
 
 
-def test_json_is_alone_on_stdout(in_folder: Path) -> None:
+def test_json_output_is_alone_on_stdout(in_folder: Path) -> None:
     done = armwright("optimize", "target-2", *SHORT, "--proposer", "none", "--json", "--out", "here")
     summary = json.loads(done.stdout)
     assert (summary["task"], summary["n_trials"], summary["folder"]) == ("target-2", 10, "here")
     assert "proposer: none" in done.stderr
 
 
-def test_own_task_and_space(in_folder: Path) -> None:
+def test_optimize_accepts_task_and_space_files(in_folder: Path) -> None:
     (in_folder / "points.csv").write_text("x;y;z\n450;0;100\n450;200;300\n")
     made = armwright("init", "shelf.yaml", "--from", "points.csv", "--unit", "mm", "--offset", "0", "0", "0.5")
     assert made.returncode == 0, made.stderr
@@ -122,7 +122,7 @@ def test_own_task_and_space(in_folder: Path) -> None:
     assert config["reference_point"] is not None
 
 
-def test_a_model_by_option_environment_and_file(chat_server: ChatServer, in_folder: Path) -> None:
+def test_model_is_configured_by_option_environment_and_file(chat_server: ChatServer, in_folder: Path) -> None:
     def first_line(*args: str, **environment: str) -> str:
         done = armwright("optimize", "target-1", *SHORT, *args, **environment)
         assert done.returncode == 0, done.stderr
@@ -154,7 +154,7 @@ def test_a_model_by_option_environment_and_file(chat_server: ChatServer, in_fold
     assert len((in_folder / "a" / "transcripts.jsonl").read_text().splitlines()) == 5
 
 
-def test_init_writes_a_file_to_edit_and_overwrites_none(in_folder: Path) -> None:
+def test_init_writes_a_template_and_overwrites_nothing(in_folder: Path) -> None:
     assert "3 targets" in armwright("init", "my-task.yaml").stdout
     text = (in_folder / "my-task.yaml").read_text()
     assert "# " in text
@@ -164,7 +164,7 @@ def test_init_writes_a_file_to_edit_and_overwrites_none(in_folder: Path) -> None
     assert "cannot read" in refused(2, "init", "other.yaml", "--from", "nothing.csv")
 
 
-def test_tasks_are_listed_and_told() -> None:
+def test_tasks_are_listed_and_described() -> None:
     listed = armwright("tasks").stdout
     for word in ("target-1", "slideopt-wide", "shelf", "armwright tasks NAME"):
         assert word in listed
@@ -282,7 +282,7 @@ def test_optimize_shows_its_options_in_groups() -> None:
         (("target-1", "--model", "m", *model_options(origin="x")), 'unknown origin "x"'),
     ],
 )
-def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
+def test_usage_errors_are_one_line_and_exit_with_2(in_folder: Path, args: tuple[str, ...], words: str) -> None:
     (in_folder / "bad.yaml").write_text("name: a\ntarget: [[0, 0, 0]]")
     (in_folder / "nan.yaml").write_text("name: a\ntargets: [[0, 0, .nan]]")
     (in_folder / "empty.yaml").write_text("name: a\ntargets: []")
@@ -292,12 +292,12 @@ def test_bad_usage_is_one_line_and_code_2(in_folder: Path, args: tuple[str, ...]
     assert not (in_folder / "runs").exists()
 
 
-def test_a_server_that_does_not_answer_is_code_1(in_folder: Path) -> None:
+def test_unreachable_server_exits_with_1(in_folder: Path) -> None:
     message = refused(1, "optimize", "target-1", "--model", "m", *model_options(base_url="http://127.0.0.1:9/v1"))
     assert "--proposer rules needs none" in message
 
 
-def test_a_server_that_does_not_answer_may_be_passed_over(in_folder: Path) -> None:
+def test_run_can_continue_without_an_unreachable_server(in_folder: Path) -> None:
     where = ("--model", "m", *model_options(base_url="http://127.0.0.1:9/v1", on_failure="continue"))
     done = armwright("optimize", "target-1", *SHORT, *where)
     assert done.returncode == 0, done.stderr
@@ -306,11 +306,11 @@ def test_a_server_that_does_not_answer_may_be_passed_over(in_folder: Path) -> No
     assert "FLAGGED: 100%" in done.stdout
 
 
-def test_a_record_that_is_not_there_is_code_1(in_folder: Path) -> None:
+def test_missing_recording_exits_with_1(in_folder: Path) -> None:
     assert "there is no nothing to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:nothing")
 
 
-def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer, in_folder: Path) -> None:
+def test_doctor_shows_the_configuration_without_keys(chat_server: ChatServer, in_folder: Path) -> None:
     done = armwright("doctor", OPENAI_API_KEY="sk-planted-in-the-environment")
     assert done.returncode == 0, done.stderr
     assert "ok openai-chat: OPENAI_API_KEY set" in done.stdout
@@ -335,20 +335,20 @@ def test_doctor_says_what_is_configured_and_never_a_key(chat_server: ChatServer,
     )
 
 
-def test_a_damaged_folder_is_code_1(in_folder: Path) -> None:
+def test_damaged_run_folder_exits_with_1(in_folder: Path) -> None:
     armwright("optimize", "target-1", *SHORT, "--out", "run")
     (in_folder / "run" / "trials.jsonl").write_text("garbage\n")
     assert "line 1 is damaged" in refused(1, "optimize", "target-1", *SHORT, "--out", "run")
 
 
 @pytest.mark.parametrize("place", ["file/run", "/proc/armwright"])
-def test_an_output_folder_that_cannot_be_written_is_code_1(in_folder: Path, place: str) -> None:
+def test_unwritable_output_folder_exits_with_1(in_folder: Path, place: str) -> None:
     """Also as root, whom a read-only mode does not stop."""
     (in_folder / "file").write_text("")
     assert f"cannot write {place}" in refused(1, "optimize", "target-1", *SHORT, "--out", place)
 
 
-def test_a_terminal_without_the_characters_shows_the_rest(in_folder: Path) -> None:
+def test_terminal_without_unicode_shows_the_remaining_text(in_folder: Path) -> None:
     (in_folder / "space.yaml").write_text("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}")
     done = armwright("optimize", "target-1", "--space", "space.yaml", *SHORT, encoding="ascii")
     assert done.returncode == 0, done.stderr
@@ -357,7 +357,7 @@ def test_a_terminal_without_the_characters_shows_the_rest(in_folder: Path) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [("tasks",), ("optimize", "target-1", *SHORT)])
-def test_output_that_cannot_be_written_is_one_line(in_folder: Path, command: tuple[str, ...]) -> None:
+def test_unwritable_output_is_one_line(in_folder: Path, command: tuple[str, ...]) -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run(
             [sys.executable, "-m", "armwright", *command], stdout=full, stderr=subprocess.PIPE, text=True
@@ -366,7 +366,7 @@ def test_output_that_cannot_be_written_is_one_line(in_folder: Path, command: tup
     assert done.stderr.strip().splitlines() == ["armwright: No space left on device: the output"]
 
 
-def test_names_of_files_and_folders_mean_nothing_but_themselves(in_folder: Path) -> None:
+def test_file_and_folder_names_are_printed_literally(in_folder: Path) -> None:
     """No markup, no emoji, and a task file of any name."""
     made = armwright("init", "мой [b] файл.yaml")
     assert made.returncode == 0, made.stderr
@@ -376,13 +376,13 @@ def test_names_of_files_and_folders_mean_nothing_but_themselves(in_folder: Path)
     assert (in_folder / "o/[red]a:smile:[/b]/summary.json").exists()
 
 
-def test_an_unknown_option_is_code_2() -> None:
+def test_unknown_option_exits_with_2() -> None:
     done = armwright("optimize", "target-1", "--nstep", "5")
     assert done.returncode == 2
     assert "--n-step" in done.stderr
 
 
-def test_ctrl_c_leaves_a_folder_that_can_be_resumed(in_folder: Path) -> None:
+def test_ctrl_c_leaves_a_resumable_run(in_folder: Path) -> None:
     (in_folder / "mine.py").write_text(INTERRUPTING)
     settings = ["optimize", "target-1", "--proposer", "none", "--sampler", "random", "--n-total", "20"]
     settings += ["--no-figures", "--evaluator", "mine.py:measure", "--out", "run"]
@@ -398,7 +398,7 @@ def test_ctrl_c_leaves_a_folder_that_can_be_resumed(in_folder: Path) -> None:
 
 @pytest.mark.parametrize("in_flight", [None, 1], ids=["waiting", "overlap"])
 @pytest.mark.parametrize("refused", [0, 1])
-def test_ctrl_c_ends_the_calls_under_way(
+def test_ctrl_c_cancels_model_calls_in_flight(
     chat_server: ChatServer, in_folder: Path, in_flight: int | None, refused: int
 ) -> None:
     """While the server holds its answers back, the command ends, keeps what was paid for, and says how to go on."""
@@ -446,14 +446,14 @@ cli.main()
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_a_wish_to_end_that_python_drops_is_heeded(name: str) -> None:
+def test_interrupt_dropped_by_python_still_ends_the_command(name: str) -> None:
     """As in finalisers and in callbacks of libraries, where no exception leads out."""
     done = subprocess.run([sys.executable, "-c", DROPPED.format(name=name)], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
 @pytest.mark.parametrize("width", [60, 120])
-def test_progress_in_a_terminal(width: int) -> None:
+def test_progress_is_shown_in_a_terminal(width: int) -> None:
     console = Console(file=io.StringIO(), force_terminal=True, width=width, markup=False, highlight=False)
     with study_progress(console) as watch:
         optimize(Problem(load_task("target-1")), proposer="rules", n_init=3, n_step=5, n_total=7, watch=watch)
@@ -464,7 +464,7 @@ def test_progress_in_a_terminal(width: int) -> None:
 
 
 @pytest.mark.slow
-def test_help_needs_no_heavy_import() -> None:
+def test_help_imports_no_heavy_package() -> None:
     heavy = {"warp", "optuna", "matplotlib", "moocore", "numpy", "pydantic", "pydantic_ai"}
     code = f"import sys; import armwright.cli.app; sys.exit(', '.join({heavy!r} & set(sys.modules)) or 0)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -78,12 +78,12 @@ def test_robust_and_refine_every(in_folder: Path) -> None:
         (1, ("refine", "nothing"), "not a run folder"),
     ],
 )
-def test_wrong_arguments_end_in_one_line(in_folder: Path, code: int, args: tuple[str, ...], words: str) -> None:
+def test_invalid_search_arguments_are_one_line(in_folder: Path, code: int, args: tuple[str, ...], words: str) -> None:
     assert words in refused(code, *args)
     assert not list(in_folder.glob("runs/*"))
 
 
-def test_a_design_run_is_not_refined_or_continued_by_optimize(in_folder: Path) -> None:
+def test_optimize_and_refine_reject_a_design_run(in_folder: Path) -> None:
     armwright("design", "target-1", "--budget", "300", "--no-figures", "--out", "run")
     assert "not a study" in refused(1, "refine", "run")
     assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")

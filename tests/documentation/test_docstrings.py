@@ -31,7 +31,7 @@ SHOWN = (
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_the_examples_of_a_module(module: str, in_folder: Path) -> None:
+def test_docstring_examples_of_a_module_run(module: str, in_folder: Path) -> None:
     output: list[str] = []
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     results = [runner.run(test, out=output.append) for test in doctest.DocTestFinder().find(import_module(module))]
@@ -40,7 +40,7 @@ def test_the_examples_of_a_module(module: str, in_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", SHOWN)
-def test_what_users_call_is_shown_by_an_example(name: str) -> None:
+def test_public_functions_have_an_example(name: str) -> None:
     thing = getattr(aw, name)
     assert f"{thing.__module__}" in MODULES
     assert ">>> " in thing.__doc__

@@ -43,7 +43,7 @@ def told(server: ChatServer) -> tuple[str, ...]:
         "7-compare-arms",
     ],
 )
-def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
+def test_example_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
     task = next(EXAMPLES.glob(f"{number}*task.yaml"), EXAMPLES / f"{number}.yaml")
     space = EXAMPLES / f"{number}-space.yaml"
     spaces = ["--space", str(space)] if space.is_file() else []
@@ -60,7 +60,7 @@ def test_the_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_scikit_learn_example(chat_server: ChatServer) -> None:
+def test_scikit_learn_example_runs(chat_server: ChatServer) -> None:
     def answer(request: Request) -> Answer:
         if "response_format" not in request:
             return "A linear machine, I should say."
@@ -78,7 +78,7 @@ def test_the_scikit_learn_example(chat_server: ChatServer) -> None:
 
 
 @pytest.mark.slow
-def test_the_zdt1_example(chat_server: ChatServer) -> None:
+def test_zdt1_example_runs(chat_server: ChatServer) -> None:
     def answer(request: Request) -> Answer:
         if "response_format" not in request:
             return "All but the first at 0."
@@ -96,7 +96,7 @@ def test_the_zdt1_example(chat_server: ChatServer) -> None:
 
 
 @pytest.mark.slow
-def test_without_a_model_an_example_says_so() -> None:
+def test_example_without_a_model_falls_back_to_rules() -> None:
     """And that rules propose in its place."""
     said = run("optuna_zdt1.py", "--n-trials", "20")
     assert "No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead." in said
@@ -104,7 +104,7 @@ def test_without_a_model_an_example_says_so() -> None:
 
 
 @pytest.mark.slow
-def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_python_code_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out="runs/target-1-seed0")
     export_study(Path("runs/target-1-seed0"))
     page = (EXAMPLES.parent / "docs" / "optuna.md").read_text()
@@ -122,7 +122,7 @@ def test_the_python_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.Capt
     assert counts == "3 Counter()"
 
 
-def test_the_mujoco_example_follows_our_postures() -> None:
+def test_mujoco_example_follows_the_ik_postures() -> None:
     """Motors strong enough bring the tip to where the inverse kinematics has it, within what gravity bends."""
     follow = aw.load_evaluator(f"{EXAMPLES}/mujoco_simulation.py:follow")
     problem = aw.Problem(aw.load_task("target-1"))

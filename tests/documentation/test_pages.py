@@ -96,7 +96,7 @@ def parsed(arguments: Sequence[str]) -> None:
 
 
 @pytest.mark.parametrize("page", FOLLOWED)
-def test_every_command_and_option_exists(page: str) -> None:
+def test_documented_commands_and_options_exist(page: str) -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     for command in commands(page):
@@ -117,7 +117,7 @@ def test_every_command_and_option_exists(page: str) -> None:
                 assert run, f"{command.where}: {command.text} can neither be run, nor is it excused"
 
 
-def test_what_is_not_run_is_there_to_be_excused() -> None:
+def test_every_excuse_matches_a_documented_command() -> None:
     shown = [command.text for page in PAGES for command in commands(page)]
     for pattern in NOT_RUN:
         assert any(re.fullmatch(pattern, command) for command in shown), pattern
@@ -125,7 +125,7 @@ def test_what_is_not_run_is_there_to_be_excused() -> None:
         assert Path(page).name in next((ROOT / "tests").rglob(file)).read_text(), page
 
 
-def test_what_is_said_in_passing_exists() -> None:
+def test_options_named_in_sentences_exist() -> None:
     """`armwright design`, `--budget` and the like within sentences."""
     options = {
         name: {o for p in command.params for o in (*p.opts, *p.secondary_opts)} for name, command in cli().items()
@@ -147,7 +147,7 @@ def test_what_is_said_in_passing_exists() -> None:
     assert checked > 100
 
 
-def test_every_file_that_is_named_exists() -> None:
+def test_files_named_in_sentences_exist() -> None:
     named = [
         (page, span)
         for page in PAGES
@@ -195,7 +195,7 @@ EXPERIMENTS = {command.text for page in PAGES for command in commands(page) if L
 
 @pytest.mark.slow
 @pytest.mark.parametrize("experiment", sorted(EXPERIMENTS - {"armwright experiment mine.yaml"}))
-def test_long_experiments_are_planned(experiment: str, in_folder: Path) -> None:
+def test_long_experiments_can_be_planned(experiment: str, in_folder: Path) -> None:
     shutil.copytree(ROOT / "examples", in_folder / "examples")
     planned(experiment, in_folder, experiment)
 
@@ -228,7 +228,7 @@ def file_of(block: Block) -> str | None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", FOLLOWED)
-def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
+def test_page_can_be_followed(page: str, in_folder: Path) -> None:
     """Its commands, files and programs, from the first to the last, in one folder."""
     shutil.copytree(ROOT / "examples", in_folder / "examples")
     for name, file in (("ur3", "ur3_robot"), ("so101", "so101")):
@@ -259,7 +259,7 @@ def test_a_page_can_be_followed(page: str, in_folder: Path) -> None:
 @pytest.mark.parametrize(
     "block", [b for page in PAGES for b in blocks(page) if b.language == "yaml"], ids=lambda b: b.where
 )
-def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
+def test_files_shown_on_a_page_load(block: Block, in_folder: Path) -> None:
     content = yaml.safe_load(block.text)
     for name, text in FILES.get("docs/experiments.md", {}).items():
         (in_folder / name).write_text(text)
@@ -284,7 +284,7 @@ def test_the_files_that_are_shown_load(block: Block, in_folder: Path) -> None:
         assert aw.load_space("shown.yaml").parameters
 
 
-def test_every_block_is_of_a_kind_that_is_tried() -> None:
+def test_every_code_block_has_a_tested_language() -> None:
     """What commands print is text; formulas and drawings have no language."""
     for page in PAGES:
         for block in blocks(page):
@@ -293,7 +293,7 @@ def test_every_block_is_of_a_kind_that_is_tried() -> None:
             assert block.language or formulas, f"{block.where}: a block of no language"
 
 
-def test_every_key_of_an_experiment_s_method_is_an_option() -> None:
+def test_keys_of_an_experiment_method_are_options() -> None:
     """The reference tells them by the help of `armwright optimize`."""
     options = {parameter.name for parameter in cli()["optimize"].params}
     assert set(ExperimentPlan.model_fields["methods"].annotation.__args__[1].model_fields) <= options | {

@@ -38,16 +38,16 @@ def names_in_code(page: str) -> set[str]:
 
 
 @pytest.mark.parametrize("page", KEYS)
-def test_every_key_of_a_file_is_documented(page: str) -> None:
+def test_file_keys_are_documented(page: str) -> None:
     keys = {key for model in KEYS[page] for key in model.model_fields}
     assert keys - names_in_code(page) == set()
 
 
-def test_every_quantity_is_documented() -> None:
+def test_quantities_are_documented() -> None:
     assert QUANTITIES.keys() - names_in_code("tasks.md") == set()
 
 
-def test_the_python_reference_lists_every_public_name_once() -> None:
+def test_python_reference_lists_every_public_name_once() -> None:
     listed = re.findall(r"^::: armwright\.(\w+)$", (ROOT / "docs/reference/python.md").read_text(), re.MULTILINE)
     assert sorted(listed) == sorted(aw.__all__)
 
@@ -76,7 +76,7 @@ def guide(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def test_the_guide_fetches_nothing(guide: Path) -> None:
+def test_guide_fetches_nothing(guide: Path) -> None:
     pages = list(guide.rglob("*.html"))
     assert len(pages) > 20
     for page in pages:
@@ -88,14 +88,14 @@ def test_the_guide_fetches_nothing(guide: Path) -> None:
         assert not re.search(r"@import|url\((['\"]?)(https?:)?//", file.read_text(encoding="utf-8")), file
 
 
-def test_the_command_line_page_lists_every_command(guide: Path) -> None:
+def test_command_line_page_lists_every_command(guide: Path) -> None:
     text = (guide / "reference" / "cli.html").read_text(encoding="utf-8")
     for command in ("optimize", "experiment", "compare-arms"):
         assert f'id="armwright-{command}"' in text
     assert "--n-total" in text
 
 
-def test_a_browser_reads_and_searches_it_without_a_server(guide: Path, browser: Browser) -> None:
+def test_guide_is_readable_and_searchable_without_a_server(guide: Path, browser: Browser) -> None:
     tab = Tab(browser)
     tab.page.set_default_timeout(180_000)  # a busy machine builds the search index slowly
     tab.page.goto((guide / "reference" / "cli.html").as_uri())
@@ -111,7 +111,7 @@ def test_a_browser_reads_and_searches_it_without_a_server(guide: Path, browser: 
     tab.close()
 
 
-def test_it_fits_a_phone(guide: Path, browser: Browser) -> None:
+def test_guide_fits_a_phone(guide: Path, browser: Browser) -> None:
     tab = Tab(browser, viewport={"width": 390, "height": 800})
     for page in ("index", "tutorial", "suite", "method", "spaces", "reference/python", "reference/cli"):
         tab.page.goto((guide / f"{page}.html").as_uri())

@@ -10,7 +10,7 @@ from armwright.tasks.catalogue import builtin_tasks
 from tests import ROOT
 
 
-def test_every_task_has_its_baselines() -> None:
+def test_every_builtin_task_has_baselines() -> None:
     for name, task in builtin_tasks().items():
         best = best_known_hypervolume(task)
         found = baselines_of(name)
@@ -24,7 +24,7 @@ def test_every_task_has_its_baselines() -> None:
     assert {baseline.task for baseline in baselines()} == set(builtin_tasks())
 
 
-def test_the_page_is_the_stored_one() -> None:
+def test_suite_page_matches_the_stored_baselines() -> None:
     script = runpy.run_path(str(ROOT / "benchmarks" / "baselines.py"))
     stored = (ROOT / "docs" / "suite.md").read_text(encoding="utf-8")
     assert stored == script["page"](), "python benchmarks/baselines.py makes it anew"

@@ -15,13 +15,13 @@ VALUES = st.floats(-1e3, 1e3).map(lambda x: round(x, 3))
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
-def test_holm_is_that_of_statsmodels(p_values: list[float]) -> None:
+def test_holm_correction_agrees_with_statsmodels(p_values: list[float]) -> None:
     gc.freeze()  # each call of theirs collects, which takes long after many other tests
     assert holm(p_values) == pytest.approx(multipletests(p_values, method="holm")[1], abs=1e-12)
 
 
 @given(st.lists(VALUES, min_size=3, max_size=15), st.integers(0, 2**32 - 1))
-def test_an_interval_holds_its_mean_and_is_the_same_again(values: list[float], seed: int) -> None:
+def test_interval_contains_its_mean_and_is_reproducible(values: list[float], seed: int) -> None:
     found = interval(values, seed)
     assert found.mean == pytest.approx(np.mean(values))
     assert min(values) - 1e-9 <= found.low <= found.mean + 1e-9
@@ -29,27 +29,27 @@ def test_an_interval_holds_its_mean_and_is_the_same_again(values: list[float], s
     assert interval(values, seed) == found
 
 
-def test_intervals_cover_the_mean_nearly_as_often_as_they_say() -> None:
+def test_intervals_have_nearly_nominal_coverage() -> None:
     rng = np.random.default_rng(0)
     found = [interval(rng.normal(2.0, 1.0, 20)) for _ in range(100)]
     assert 88 <= sum(one.low <= 2.0 <= one.high for one in found) <= 99
 
 
 @pytest.mark.parametrize("values", [[3.0], [2.0, 2.0, 2.0]])
-def test_equal_values_have_an_interval_without_width(values: list[float]) -> None:
+def test_equal_values_have_a_zero_width_interval(values: list[float]) -> None:
     found = interval(values)
     assert (found.low, found.high) == (values[0], values[0])
 
 
 @pytest.mark.parametrize("n", range(1, 12))
-def test_the_least_p_is_that_of_pairs_that_all_agree(n: int) -> None:
+def test_smallest_p_value_is_that_of_unanimous_pairs(n: int) -> None:
     test = paired_test(np.arange(n) + 1.0 + np.arange(n), np.arange(n))
     assert test.p == pytest.approx(least_p(n))
     assert (test.better, test.effect) == (n, 1.0)
     assert can_reject(n) == (n >= 6) == (test.p <= 0.05)
 
 
-def test_the_test_is_scipys_and_the_effect_that_of_its_rank_sums() -> None:
+def test_paired_test_agrees_with_scipy() -> None:
     rng = np.random.default_rng(1)
     first, second = rng.normal(0.4, 1.0, (2, 20)) + np.array([[0.3], [0.0]])
     test = paired_test(first, second)
@@ -60,14 +60,14 @@ def test_the_test_is_scipys_and_the_effect_that_of_its_rank_sums() -> None:
     assert test.difference.mean == pytest.approx(np.mean(first - second))
 
 
-def test_equal_pairs_tell_nothing() -> None:
+def test_equal_pairs_have_no_effect() -> None:
     test = paired_test([1.0, 2.0], [1.0, 2.0])
     assert (test.n, test.better, test.p, test.effect) == (2, 0, 1.0, 0.0)
     some = paired_test([1.0, 5.0, 2.0], [1.0, 1.0, 1.0])
     assert (some.n, some.better, some.effect) == (3, 2, 1.0)
 
 
-def test_the_other_way_round_speaks_against() -> None:
+def test_swapped_pairs_reverse_the_effect() -> None:
     one, other = paired_test([3.0, 1.0, 5.0], [1.0, 2.0, 2.0]), paired_test([1.0, 2.0, 2.0], [3.0, 1.0, 5.0])
     assert one.effect == -other.effect
     assert one.p == other.p

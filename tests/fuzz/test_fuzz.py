@@ -18,7 +18,7 @@ def inputs(name: str) -> int:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_changed_documents_are_read_or_refused_in_one_line(name: str) -> None:
+def test_mutated_documents_are_read_or_refused(name: str) -> None:
     target = TARGETS[name]
 
     @hypothesis.settings(
@@ -34,7 +34,7 @@ def test_changed_documents_are_read_or_refused_in_one_line(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_documents_are_valid_before_they_are_changed(name: str) -> None:
+def test_seed_documents_are_valid(name: str) -> None:
     """Or the fuzzer would reach little. Some command lines are wrong on purpose."""
     seeds = seeds_of(TARGETS[name])
     passed = [check(TARGETS[name], one) for one in seeds]

@@ -123,7 +123,7 @@ def random_postures(arms: Sequence[Arm], t: int, seed: int) -> Array:
 
 
 @pytest.mark.parametrize("kind", SHAPES)
-def test_one_link_and_one_obstacle(kind: str) -> None:
+def test_clearance_of_one_link_agrees_with_coal(kind: str) -> None:
     rng = np.random.default_rng(SHAPES.index(kind))
     arms = moving_arms(60, 1, 3)
     q = random_postures(arms, 1, 4)
@@ -141,7 +141,7 @@ def test_one_link_and_one_obstacle(kind: str) -> None:
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 @pytest.mark.parametrize("dof", [3, 6, 8])
-def test_whole_arms(dof: int, precision: Precision) -> None:
+def test_clearance_of_whole_arms_agrees_with_coal(dof: int, precision: Precision) -> None:
     rng = np.random.default_rng(dof)
     arms = [*moving_arms(12, dof, 1), *(paper_space(dof).arm(design) for design in paper_space(dof).sample(12, 1))]
     obstacles = [random_obstacle(rng, kind, 1.0) for kind in (*SHAPES[:3], *SHAPES[:3])]
@@ -159,7 +159,7 @@ def test_whole_arms(dof: int, precision: Precision) -> None:
     assert 6 < free < 69, "some arms are free, some are not"
 
 
-def test_nearly_parallel_and_touching_segments() -> None:
+def test_clearance_of_nearly_parallel_segments_is_accurate() -> None:
     """Thousands of arms that fold onto themselves, nearly in a plane, where a common normal is hard to find."""
     rng = np.random.default_rng(0)
     arms = []
@@ -276,7 +276,7 @@ def planar(lengths: Sequence[float], radius: float = 0.015) -> Arm:
 
 
 @pytest.mark.parametrize("short", [0.0, 0.001, 0.02, 0.03, 0.05, 0.06, 0.2])
-def test_a_straight_arm_is_never_near_to_itself(short: float) -> None:
+def test_straight_arm_is_clear_of_itself(short: float) -> None:
     """However short its middle links are, the nearest is two radii away; folded back it is in itself."""
     arm = planar([0.2, short, 0.2, short, short, 0.2])
     straight = clearances(stack_arms([arm]), np.zeros((1, 1, 6)))[0][0, 0]
@@ -286,7 +286,7 @@ def test_a_straight_arm_is_never_near_to_itself(short: float) -> None:
     assert (found < 0.0) == (short < 0.06)
 
 
-def test_the_first_link_may_stand_on_what_its_foot_touches() -> None:
+def test_first_link_may_stand_on_an_obstacle_at_its_base() -> None:
     ground = [Ground(kind="ground", z=0.0)]
 
     def of(base: float, q: Sequence[float], *, lengths: Sequence[float] = (0.2, 0.3)) -> float:

@@ -50,14 +50,14 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.slow
-def test_first_use_by_many_threads_leaves_stderr_as_it_was() -> None:
+def test_first_use_by_many_threads_restores_stderr() -> None:
     """Warp's native code is silenced while it starts, and only then."""
     assert run(THREADS).stderr.splitlines()[-1] == "still heard"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", ["", "import os; os.close(2)\n"])
-def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
+def test_kernels_are_silent_and_work_with_closed_stderr(closed: str) -> None:
     done = run(
         closed + "from armwright.kinematics.devices import load; load('float32', 8, 'revolute', 'position', 'cpu')"
     )
@@ -65,7 +65,7 @@ def test_stderr_is_silent_and_may_be_closed(closed: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_forked_child_solves_too() -> None:
+def test_forked_child_can_solve() -> None:
     """It has the parent's pool, but not its threads."""
     assert run(FORK).returncode == 0
 
@@ -132,7 +132,7 @@ def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
 # Memory
 
 
-def test_chunk_is_halved_until_the_gpu_has_memory_for_it() -> None:
+def test_chunk_is_halved_until_it_fits_gpu_memory() -> None:
     solved: list[range] = []
 
     def solving(rows: slice) -> None:
@@ -157,7 +157,7 @@ def test_chunk_is_halved_until_the_gpu_has_memory_for_it() -> None:
         in_chunks(broken, 107, 100, "cuda")
 
 
-def test_chunks_do_not_change_the_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_do_not_depend_on_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither those of the solver, bounded by bytes, nor those of designs whose postures are in memory at a time."""
     asked = Problem(load_task("target-2"))
     matrix = asked.space.matrix(asked.space.sample(100, 3))

@@ -162,7 +162,7 @@ def test_jacobian_rate_agrees_with_finite_differences() -> None:
 # Along timed lines
 
 
-def test_a_move_begins_and_ends_at_rest_and_covers_its_line() -> None:
+def test_move_starts_and_ends_at_rest_and_covers_its_line() -> None:
     t = np.linspace(0.0, 1.0, 2001)
     s = t**3 * (10 - 15 * t + 6 * t**2)
     speed, acceleration = quintic_rates(s)
@@ -215,7 +215,7 @@ def by_differences(step: float, time: float) -> tuple[Array, Array]:
     return np.array(theirs), drives.torques[0, samples]
 
 
-def test_without_joints_to_spare_torques_are_those_of_the_samples_differences() -> None:
+def test_torques_of_nonredundant_arms_match_finite_differences() -> None:
     """Fast enough that gravity is the smaller part; what is left is the damping, and the samples' own 0.1 mm."""
     for step in (0.04, 0.02, 0.01):
         theirs, ours = by_differences(step, 0.25)
@@ -241,7 +241,7 @@ def timed(arms: Sequence[Arm], *times: float) -> Any:
     return evaluate(arms, CORNERS, payload=0.3, moves=Moves(((0, 1), (1, 2)), 0.02, times))
 
 
-def test_a_slow_move_takes_what_gravity_takes_and_twice_the_speed_four_times_the_rest() -> None:
+def test_dynamic_torque_grows_with_the_square_of_speed() -> None:
     arms = any_arms(40, 9)
     slow, fast, faster = (timed(arms, time, time) for time in (1e7, 1.0, 0.5))
     (dynamic,) = named_objectives(["dynamic_torque"])

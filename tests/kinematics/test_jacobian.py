@@ -97,7 +97,7 @@ def test_three_orthogonal_rails_have_dexterity_one() -> None:
     assert evaluation.dexterity[0, 0] == pytest.approx(1.0)
 
 
-def test_a_larger_arm_is_as_dexterous_and_moves_more() -> None:
+def test_dexterity_does_not_depend_on_arm_size() -> None:
     """Manipulability of turning joints is a volume, so that it says nothing of arms of other sizes; dexterity does."""
     small = moving_arms(30, 5, 1)
     large = [

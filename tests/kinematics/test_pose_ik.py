@@ -212,7 +212,7 @@ def test_reachable_poses_are_reached(rows: int) -> None:
 
 @pytest.mark.parametrize("lanes", [1, 2])
 @pytest.mark.slow
-def test_lanes_do_not_change_the_bits(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_do_not_depend_on_simd_lanes(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     arms, asked = stack_arms(tooled_arms(60, 6, 12)), target_arrays([2, 3, 0, 3, 2, 2, 3, 0, 2])
     points = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 3))
     whole = solve_postures(arms, points, target_arrays=asked)

@@ -105,7 +105,7 @@ def test_jacobian_and_torque_are_derivatives(arms_of: ArmMaker) -> None:
         assert np.abs(dv - torque[..., j]).max() < 1e-7
 
 
-def test_kernel_torque_is_the_slope_of_the_potential_energy() -> None:
+def test_kernel_torque_is_the_gradient_of_potential_energy() -> None:
     """The kernels' torque against finite differences of the reference's energy, general arms: +dV/dq."""
     arms = general_arms(200, 4, 4)
     chains = reference.chains(arms)
@@ -274,7 +274,7 @@ def test_whole_solves_in_float64_agree_with_the_reference(arms_of: ArmMaker) -> 
         pytest.param(8, 3e-3, marks=pytest.mark.slow),
     ],
 )
-def test_other_numbers_of_joints_agree_with_the_reference_in_distribution(dof: int, bound: float) -> None:
+def test_solves_of_any_joint_count_agree_in_distribution(dof: int, bound: float) -> None:
     """400 general arms each, 3 targets: the mean errors differ by less than `bound` times the straight start's.
 
     With one and two joints nothing is chaotic; with six and eight much is.
@@ -327,7 +327,7 @@ def test_more_updates_never_increase_the_error() -> None:
     assert errors[-1].mean() < 0.6 * errors[0].mean()
 
 
-def test_target_on_the_arms_own_line_is_not_approached() -> None:
+def test_target_in_line_with_the_arm_is_not_approached() -> None:
     """Straight up, J has no row along the arm: the first of the two properties in docs/method.md §2."""
     for arm in paper_arms(40, 4, 11):
         x, y, z = np.float64(np.float32(arm.base))
@@ -357,7 +357,7 @@ def test_result_does_not_depend_on_batch_or_threads(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("lanes", [1, 2])
-def test_lanes_do_not_change_the_bits(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_do_not_depend_on_simd_lanes(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """On the CPU, whatever the vector's length: no operation mixes lanes, or is contracted across functions."""
     targets = load_task("target-2").target_positions
     stacked = [stack_arms(paper_arms(300, 4, 12)), stack_arms(general_arms(300, 6, 12))]
@@ -368,7 +368,7 @@ def test_lanes_do_not_change_the_bits(lanes: int, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("n_targets", [1, 9, 10])
-def test_few_targets_at_the_end_give_the_same_bits(n_targets: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_remainder_targets_give_identical_results(n_targets: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of many arms the last one or two targets are solved apart, in fewer lanes."""
     arms, targets = stack_arms(paper_arms(50, 4, 16)), np.random.default_rng(16).uniform(-0.7, 0.7, (n_targets, 3))
     together = solve_postures(arms, targets)
@@ -479,7 +479,7 @@ def test_result_rotates_with_the_world() -> None:
 # What the kernels refuse
 
 
-def test_refused_arms_are_named() -> None:
+def test_refused_arms_name_joint_and_limit() -> None:
     """The message names the joint and the limit."""
     link = uniform_link((0.0, 0.0, 0.2), 0.1, 0.015)
     turning = Joint("revolute", "y", -2.0, 2.0)
@@ -498,7 +498,7 @@ def test_refused_arms_are_named() -> None:
             stack_arms(arms)
 
 
-def test_refused_settings_are_named() -> None:
+def test_refused_solver_settings_are_named() -> None:
     arms, targets = stack_arms(paper_arms(2, 4, 20)), np.zeros((3, 3))
     with pytest.raises(SettingsError, match="updates = -1 is outside 0 <= updates"):
         solve_postures(arms, targets, updates=-1)
@@ -521,7 +521,7 @@ def test_zero_outside_the_limits_is_clipped() -> None:
     assert np.array_equal(solve_postures(arrays, np.zeros((1, 3)), 0).q[0, 0], np.float32([0.5, -0.25, 0.1]))
 
 
-def test_sixteen_joints_and_limits_of_a_full_turn_are_taken() -> None:
+def test_sixteen_joints_and_full_turn_limits_are_accepted() -> None:
     joints = [Joint("revolute", "y", -2 * np.pi, 2 * np.pi)] * 15 + [Joint("fixed", "x")]
     links = (uniform_link((0.0, 0.0, 0.1), 0.1, 0.015),) * 16
     arrays = stack_arms([Arm((0.0, 0.0, 0.0), tuple(joints), links)])

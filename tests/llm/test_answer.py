@@ -48,7 +48,7 @@ reasons = st.text(max_size=400)
     expected=st.one_of(st.none(), st.tuples(finite, finite)),
     thoughts=st.text(max_size=50),
 )
-def test_what_is_written_is_read_back(
+def test_written_answers_are_read_back(
     joints: int, n: int, seed: int, reason: str, expected: tuple[float, float] | None, thoughts: str
 ) -> None:
     problem = Problem(load_task("target-2"), paper_space(joints))
@@ -62,7 +62,7 @@ def test_what_is_written_is_read_back(
 
 
 @given(joints=st.integers(1, 8), proposals=st.integers(1, 3), expected=st.booleans(), reasoning=st.booleans())
-def test_the_schema_is_what_is_read(joints: int, proposals: int, expected: bool, reasoning: bool) -> None:
+def test_schema_describes_accepted_answers(joints: int, proposals: int, expected: bool, reasoning: bool) -> None:
     problem = Problem(load_task("target-2"), paper_space(joints))
     told = (1.0, 2.0) if expected else None
     answers = [Answer(design, "so", told) for design in problem.space.sample(proposals, 1)]
@@ -98,7 +98,7 @@ def test_the_schema_is_what_is_read(joints: int, proposals: int, expected: bool,
         changed(expected_position_error="so so", expected_torque=None),
     ],
 )
-def test_the_form_does_not_matter(content: dict[str, Any]) -> None:
+def test_equivalent_forms_are_read_alike(content: dict[str, Any]) -> None:
     assert read_answers(content, PROBLEM)[0].design == DESIGN
     assert one(json.dumps(content)).design == DESIGN
 
@@ -134,7 +134,7 @@ def test_the_form_does_not_matter(content: dict[str, Any]) -> None:
         ('"two\\nlines\\u001b[31m": 1', 'unknown parameter "two lines"'),
     ],
 )
-def test_refused_in_the_words_of_the_space(change: str, message: str) -> None:
+def test_refusals_name_parameter_and_range(change: str, message: str) -> None:
     text = JSON[:-1] + ", " + change + "}"
     if change.split('"')[1] in GOOD_DESIGN and change.count(change.split('"')[1]) == 1:  # the value, not a second one
         rest = {key: value for key, value in GOOD_DESIGN.items() if key != change.split('"')[1]}
@@ -182,7 +182,7 @@ def test_refused_in_the_words_of_the_space(change: str, message: str) -> None:
         (f"{JSON}</think> I do not know.", "no design found"),
     ],
 )
-def test_nothing_is_guessed(text: str, message: str) -> None:
+def test_ambiguous_answers_are_refused(text: str, message: str) -> None:
     with pytest.raises(DesignError) as refusal:
         one(text)
     assert message in str(refusal.value)
@@ -238,11 +238,11 @@ def test_nothing_is_guessed(text: str, message: str) -> None:
         f"{LINES}\nREASON: It is good. LINKS = long, JOINTS = strong.",
     ],
 )
-def test_free_text(text: str) -> None:
+def test_design_is_found_in_free_text(text: str) -> None:
     assert one(text).design == DESIGN
 
 
-def test_reason_and_expectation_in_lines() -> None:
+def test_reason_and_expectation_are_read_from_lines() -> None:
     answer = one(LINES + "EXPECTED: (1.25, 3.5)\nREASON: a shoulder\x1b[31m in   the centre" + " far" * 200)
     assert answer.expected == (1.25, 3.5)
     assert answer.reason.startswith("a shoulder in the centre far")
@@ -266,11 +266,11 @@ def test_reason_and_expectation_in_lines() -> None:
         json.dumps({"designs": [dict(d.params) for d in (DESIGN, OTHER, THIRD, THIRD)]}),
     ],
 )
-def test_several_designs(text: str) -> None:
+def test_several_designs_are_read(text: str) -> None:
     assert [answer.design for answer in read_text(text, PROBLEM, 3)] == [DESIGN, OTHER, THIRD]
 
 
-def test_of_several_designs_the_refused_one_is_named() -> None:
+def test_refused_design_among_several_is_named() -> None:
     for text in (
         LINES + OTHER_LINES.replace("0.05", "5"),
         json.dumps({"designs": [dict(DESIGN.params), {**OTHER.params, "link_1": 5}]}),
@@ -323,7 +323,7 @@ def test_garbled_answers_are_read_or_refused() -> None:
 
 
 @given(text=st.text(), proposals=st.integers(1, 3))
-def test_any_text_is_read_or_refused(text: str, proposals: int) -> None:
+def test_arbitrary_text_is_read_or_refused(text: str, proposals: int) -> None:
     read_or_refuse(text, proposals)
 
 
@@ -355,7 +355,7 @@ def test_any_text_is_read_or_refused(text: str, proposals: int) -> None:
     ],
     ids=range(22),
 )
-def test_a_long_answer_takes_no_long_time(text: str) -> None:
+def test_long_answers_are_read_quickly(text: str) -> None:
     started = time.process_time()
     read_or_refuse(text, 1)
     read_or_refuse(LINES.replace("\n", "\n" + text[:3000] + "\n"), 3)

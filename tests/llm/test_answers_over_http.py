@@ -112,7 +112,7 @@ def test_one_step_answers_hold_reasoning_and_design(
 
 
 @spread(REFUSED)
-def test_refused_values_are_asked_again_with_the_reason(
+def test_refused_values_are_requested_again_with_the_reason(
     chat_server: ChatServer, ask: Callable[..., StudyResult], tmp_path: Path, wire: str, output: str, case: str
 ) -> None:
     refused, words = REFUSED[case]
@@ -142,7 +142,7 @@ def test_refused_answers_are_recorded_with_the_text_around_them(
 
 @every_output
 @both_formats
-def test_corrected_answers_are_taken(
+def test_corrected_answers_are_accepted(
     chat_server: ChatServer, ask: Callable[..., StudyResult], wire: str, output: str
 ) -> None:
     answers = iter([REFUSED["missing link"][0], REFUSED["NaN"][0], GOOD_DESIGN])

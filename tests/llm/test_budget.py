@@ -99,7 +99,7 @@ class Session(LlmSession):
 
 
 @pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (5, 2), (50, 4)])
-def test_after_so_many_calls_it_asks_no_more(chat_server: ChatServer, most: int, proposals: int) -> None:
+def test_max_calls_bounds_the_requests_of_a_run(chat_server: ChatServer, most: int, proposals: int) -> None:
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="m", max_calls=most), seen=seen)
     assert len(chat_server.requests) <= most
@@ -108,7 +108,7 @@ def test_after_so_many_calls_it_asks_no_more(chat_server: ChatServer, most: int,
     assert sum("max_calls" in note for note in notes(seen)) == (proposals < 4)  # said once
 
 
-def test_a_refused_answers_calls_count(chat_server: ChatServer) -> None:
+def test_retries_of_refused_answers_count_as_calls(chat_server: ChatServer) -> None:
     """Three requests for one answer; the budget bounds the requests within one call, too."""
     good = chat_server.answer
     chat_server.answer = lambda request: "no JSON" if "response_format" in request else good(request)
@@ -116,7 +116,7 @@ def test_a_refused_answers_calls_count(chat_server: ChatServer) -> None:
     assert len(chat_server.requests) == 4
 
 
-def test_the_budget_is_the_whole_runs(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_budget_includes_earlier_sessions(chat_server: ChatServer, tmp_path: Path) -> None:
     """Earlier sessions included; a larger one goes on asking."""
     run(llm_proposer(chat_server.url, model="m", max_calls=5), tmp_path / "run", n_total=6)
     again = run(llm_proposer(chat_server.url, model="m", max_calls=6), tmp_path / "run", n_total=12)
@@ -126,12 +126,12 @@ def test_the_budget_is_the_whole_runs(chat_server: ChatServer, tmp_path: Path) -
     assert more.trials[16].source == "llm"
 
 
-def test_a_bound_on_cost_needs_a_price(chat_server: ChatServer) -> None:
+def test_max_cost_needs_a_known_price(chat_server: ChatServer) -> None:
     with pytest.raises(ModelError, match="price of m is unknown, so max_cost cannot hold; use max_calls"):
         run(llm_proposer(chat_server.url, model="m", max_cost=1.0))
 
 
-def test_what_a_run_will_take_is_said_before_it_begins(chat_server: ChatServer) -> None:
+def test_forecast_is_reported_before_the_first_trial(chat_server: ChatServer) -> None:
     seen: list[Progress] = []
     run(llm_proposer(chat_server.url, model="m"), seen=seen)
     assert seen[0].doing == "beginning"
@@ -139,7 +139,7 @@ def test_what_a_run_will_take_is_said_before_it_begins(chat_server: ChatServer) 
     assert seen[0].note.endswith("; on a local server")
 
 
-def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_forecast_includes_a_known_price(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-test-of-a-forecast")
     forecast = LlmProposer("openai-chat:gpt-4o").forecast(PROBLEM, 20)
     assert forecast.startswith("20 proposals: about 41 calls, ")
@@ -150,7 +150,7 @@ def test_a_forecast_has_the_price_where_it_is_known(monkeypatch: pytest.MonkeyPa
     assert unknown.endswith("price unknown")
 
 
-def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatServer) -> None:
+def test_model_on_a_local_server_has_no_vendor_price(chat_server: ChatServer) -> None:
     """Whatever it is called: forecast, summary and bound agree."""
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="openai-chat:gpt-4o"), seen=seen, n_total=3)
@@ -174,7 +174,7 @@ def test_a_model_on_a_server_of_ones_own_has_no_vendors_price(chat_server: ChatS
         ("openai-chat:a-model-of-tomorrow", None, "price unknown"),
     ],
 )
-def test_the_price_is_that_of_the_host(model: str, address: str | None, words: str) -> None:
+def test_price_depends_on_the_host(model: str, address: str | None, words: str) -> None:
     assert chat.describe_cost(ModelOptions(model=model, base_url=address), 10**6, 10**6) == words
     server = server_of(ModelOptions(model=model, base_url=address))
     if server is not None:
@@ -183,7 +183,7 @@ def test_the_price_is_that_of_the_host(model: str, address: str | None, words: s
         assert chat._cost(response, server) == (12.5 if "12.50" in words else None)
 
 
-def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_forecast_of_a_resumed_run_uses_its_past_calls(chat_server: ChatServer, tmp_path: Path) -> None:
     run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=6)
     seen: list[Progress] = []
     run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=12, seen=seen)
@@ -192,7 +192,7 @@ def test_a_forecast_of_a_resumed_run_uses_what_its_calls_took(chat_server: ChatS
 
 
 @pytest.mark.parametrize("wire", ["openai", "anthropic"])
-def test_after_so_many_dollars_it_asks_no_more(
+def test_max_cost_bounds_the_requests_of_a_run(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
 ) -> None:
     """The price is the public one of the tokens that the server counts; every call costs the same here."""
@@ -210,12 +210,12 @@ def test_after_so_many_dollars_it_asks_no_more(
 
 
 @pytest.mark.parametrize("wrong", [{"max_calls": 0}, {"max_calls": -1}, {"max_cost": -1.0}, {"max_cost": float("nan")}])
-def test_a_budget_that_makes_no_sense_is_refused(chat_server: ChatServer, wrong: dict[str, Any]) -> None:
+def test_invalid_budgets_are_refused(chat_server: ChatServer, wrong: dict[str, Any]) -> None:
     with pytest.raises(ValidationError, match=f"{next(iter(wrong))}\n  Input should be"):
         llm_proposer(chat_server.url, model="m", **wrong)
 
 
-def test_a_bound_on_cost_holds_without_a_price_too(chat_server: ChatServer) -> None:
+def test_max_cost_without_a_price_stops_after_the_check(chat_server: ChatServer) -> None:
     """However the run was told to go on."""
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="m", max_cost=1.0), seen=seen, on_model_failure="continue")
@@ -224,7 +224,7 @@ def test_a_bound_on_cost_holds_without_a_price_too(chat_server: ChatServer) -> N
     assert sum("max_cost cannot hold" in note for note in notes(seen)) == 1
 
 
-def test_a_bound_on_cost_holds_for_a_run_whose_calls_had_no_price(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_max_cost_holds_after_calls_without_a_price(chat_server: ChatServer, tmp_path: Path) -> None:
     run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=3)
     chat_server.requests.clear()
     seen: list[Progress] = []
@@ -235,7 +235,9 @@ def test_a_bound_on_cost_holds_for_a_run_whose_calls_had_no_price(chat_server: C
 
 
 @pytest.mark.parametrize("in_flight", [None, 2])
-def test_a_run_whose_budget_is_used_up_goes_on(chat_server: ChatServer, tmp_path: Path, in_flight: int | None) -> None:
+def test_run_continues_without_proposals_after_its_budget(
+    chat_server: ChatServer, tmp_path: Path, in_flight: int | None
+) -> None:
     run(llm_proposer(chat_server.url, model="m", max_calls=3), tmp_path / "run", n_total=3, in_flight=in_flight)
     seen: list[Progress] = []
     proposer = llm_proposer(chat_server.url, model="m", max_calls=3)
@@ -246,7 +248,7 @@ def test_a_run_whose_budget_is_used_up_goes_on(chat_server: ChatServer, tmp_path
 
 
 @pytest.mark.parametrize(("status", "kind", "asked"), [(401, "key", 1), (400, "rejected", 4)])
-def test_a_run_that_has_begun_goes_on_without_its_model(
+def test_started_run_continues_without_its_model(
     chat_server: ChatServer, tmp_path: Path, status: int, kind: str, asked: int
 ) -> None:
     """Said once; where asking again is of no use, nothing more is asked."""
@@ -262,7 +264,7 @@ def test_a_run_that_has_begun_goes_on_without_its_model(
 
 
 @pytest.mark.parametrize("most", [4, 9])
-def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_server: ChatServer, most: int) -> None:
+def test_refused_answers_in_flight_stay_within_the_budget(chat_server: ChatServer, most: int) -> None:
     def answer(request: Request) -> Answer:
         return "no design" if "response_format" in request else designer(request)
 
@@ -273,21 +275,21 @@ def test_refused_answers_of_several_calls_in_flight_stay_within_the_budget(chat_
 
 @pytest.mark.parametrize("budget", [{"max_calls": 10}, {"max_cost": 1.05}])
 @pytest.mark.parametrize("threads", [3, 4, 8])
-def test_questions_beside_each_other_share_one_budget(budget: dict[str, Any], threads: int) -> None:
+def test_concurrent_calls_share_one_budget(budget: dict[str, Any], threads: int) -> None:
     backend = Greedy()
     came = Session(backend, "asking", CallBudget(**budget)).ask_together(threads, lambda: None)
     assert backend.requests == min(10, 3 * threads)
     assert [fault.kind for fault in came if isinstance(fault, ProposalError)] == ["budget"] * max(0, threads - 4)
 
 
-def test_what_was_set_aside_and_not_taken_is_there_for_others() -> None:
+def test_unused_reservations_are_released() -> None:
     backend = Greedy(most=1)
     came = Session(backend, "asking", CallBudget(max_calls=7)).ask_together(9, lambda: None)
     assert backend.requests == 7
     assert came.count("so be it") == 7
 
 
-def test_who_waits_for_the_budget_of_others_is_let_go_at_the_end() -> None:
+def test_cancel_releases_calls_waiting_for_budget() -> None:
     backend = Greedy()
     session = Session(backend, "asking", CallBudget(max_calls=3))
     came = session.ask_together(4, session.cancel)

@@ -26,7 +26,7 @@ def run(server: ChatServer, out: Path | None = None, n_total: int = 6, prompt: s
     return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, seed=0, out=out, verify=False)
 
 
-def test_first_trial_of_each_block_is_the_models(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_first_trial_of_each_block_is_from_the_model(chat_server: ChatServer, tmp_path: Path) -> None:
     result = run(chat_server, tmp_path / "run")
     assert [trial.source for trial in result.trials] == ["random"] * 4 + ["llm", "bbo", "bbo"] * 2
     expected = {name: value for name, value in GOOD_DESIGN.items() if name != "reason"}
@@ -41,7 +41,7 @@ def test_first_trial_of_each_block_is_the_models(chat_server: ChatServer, tmp_pa
     assert (proposer["cost_usd"], proposer["flagged"], proposer["overlap"]) == (None, False, None)
 
 
-def test_the_prompt_holds_problem_feedback_and_instructions(chat_server: ChatServer) -> None:
+def test_prompt_contains_problem_feedback_and_instructions(chat_server: ChatServer) -> None:
     result = run(chat_server, n_total=1)
     reasoning, parameters = chat_server.prompts()[1:3]
     assert "(-0.450, -0.450, -0.450)" in reasoning
@@ -55,7 +55,7 @@ def test_the_prompt_holds_problem_feedback_and_instructions(chat_server: ChatSer
     assert not any("temperature" in request or "seed" in request for request in chat_server.requests)
 
 
-def test_each_ones_share_of_the_objectives_sums_to_the_whole(chat_server: ChatServer) -> None:
+def test_per_target_objectives_sum_to_the_total(chat_server: ChatServer) -> None:
     run(chat_server, n_total=1)
     block = chat_server.prompts()[1].split("\nDesign ")[1]
     lines = dict(line.split(": ", 1) for line in block.splitlines() if ": " in line)
@@ -64,7 +64,7 @@ def test_each_ones_share_of_the_objectives_sums_to_the_whole(chat_server: ChatSe
     assert [sum(row[i] for row in each) for i in (0, 1)] == pytest.approx(total, abs=8 * 0.0006)
 
 
-def test_minus_leaves_out_the_analysis_instructions_alone(chat_server: ChatServer) -> None:
+def test_minus_prompt_omits_only_the_analysis(chat_server: ChatServer) -> None:
     run(chat_server, n_total=1)
     run(chat_server, n_total=1, prompt="minus")
     plus, minus = (prompt for prompt in chat_server.prompts() if "TARGET" in prompt)
@@ -73,7 +73,7 @@ def test_minus_leaves_out_the_analysis_instructions_alone(chat_server: ChatServe
     assert set(minus.splitlines()) <= set(plus.splitlines())
 
 
-def test_a_refused_design_goes_back_in_the_words_of_the_space(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_refused_design_is_returned_with_the_reason(chat_server: ChatServer, tmp_path: Path) -> None:
     refused = {**GOOD_DESIGN, "link_3": 1.4}
 
     def answer(request: Request) -> Answer:
@@ -92,7 +92,7 @@ def test_a_refused_design_goes_back_in_the_words_of_the_space(chat_server: ChatS
     "wrong",
     ["no JSON at all", json.dumps({**GOOD_DESIGN, "joint_1": "Z"}), json.dumps({**GOOD_DESIGN, "origin_x": None}), ""],
 )
-def test_an_answer_that_stays_wrong_becomes_a_black_box_trial(
+def test_repeatedly_refused_answer_becomes_a_black_box_trial(
     chat_server: ChatServer, tmp_path: Path, wrong: str
 ) -> None:
     calls: list[Request] = []
@@ -116,14 +116,14 @@ def test_an_answer_that_stays_wrong_becomes_a_black_box_trial(
     assert failed.fault == "answer"
 
 
-def test_a_response_without_any_choice_becomes_a_black_box_trial(chat_server: ChatServer) -> None:
+def test_response_without_choices_becomes_a_black_box_trial(chat_server: ChatServer) -> None:
     empty = '{"id": "1", "object": "chat.completion", "created": 1, "model": "m", "choices": []}'
     chat_server.answer = lambda request: designer(request) if len(chat_server.requests) <= 3 else (200, empty)
     result = run(chat_server)
     assert (result.trials[7].source, result.trials[7].fault) == ("bbo", "answer")
 
 
-def test_an_answer_in_the_transcript_that_is_no_design_is_asked_again(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_invalid_transcript_answer_is_requested_again(chat_server: ChatServer, tmp_path: Path) -> None:
     whole = run(chat_server, tmp_path / "run", n_total=1)
     for name, lines in (("trials.jsonl", 4), ("transcripts.jsonl", 3)):
         file = tmp_path / "run" / name
@@ -134,7 +134,7 @@ def test_an_answer_in_the_transcript_that_is_no_design_is_asked_again(chat_serve
     assert len(chat_server.requests) == 2  # the check, and the parameters
 
 
-def test_a_server_error_later_does_not_stop_the_run(chat_server: ChatServer) -> None:
+def test_later_server_error_does_not_stop_the_run(chat_server: ChatServer) -> None:
     def answer(request: Request) -> Answer:
         return designer(request) if len(chat_server.requests) <= 3 else (400, '{"error": {"message": "broken"}}')
 
@@ -144,7 +144,7 @@ def test_a_server_error_later_does_not_stop_the_run(chat_server: ChatServer) -> 
     assert result.summary["proposer"]["failures"] == {"rejected": 1}
 
 
-def test_a_model_that_fails_before_the_first_trial_is_an_error(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_model_failure_before_the_first_trial_is_an_error(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = lambda request: (401, '{"error": {"message": "no such key"}}')
     with pytest.raises(ModelError, match=r"test-model: .*no such key"):
         run(chat_server, tmp_path / "run")
@@ -158,7 +158,7 @@ def test_unreachable_server_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None
         optimize(PROBLEM, proposer=proposer, n_total=1)
 
 
-def test_a_server_that_hangs_is_an_error(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hanging_server_is_an_error(chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch) -> None:
     released = threading.Event()
 
     def answer(request: Request) -> Answer:
@@ -172,7 +172,7 @@ def test_a_server_that_hangs_is_an_error(chat_server: ChatServer, monkeypatch: p
     released.set()
 
 
-def test_an_answer_that_was_paid_for_is_not_asked_again(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_paid_answers_are_not_requested_again(chat_server: ChatServer, tmp_path: Path) -> None:
     """Killed between the answer and the trial: the answer in the transcript is used."""
     whole = run(chat_server, tmp_path / "whole")
     run(chat_server, tmp_path / "cut")
@@ -185,7 +185,7 @@ def test_an_answer_that_was_paid_for_is_not_asked_again(chat_server: ChatServer,
 
 
 @pytest.mark.parametrize(("own", "sent"), [("own-planted-secret", "own-planted-secret"), (None, "no-key")])
-def test_what_belongs_to_another_host_is_never_sent_and_no_key_is_written(
+def test_keys_of_other_hosts_are_never_sent_and_keys_never_written(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: str | None, sent: str
 ) -> None:
     for name in ("OPENAI_API_KEY", "OPENAI_ORG_ID", "OPENAI_PROJECT_ID"):
@@ -200,12 +200,12 @@ def test_what_belongs_to_another_host_is_never_sent_and_no_key_is_written(
     assert not any(b"planted-secret" in content for content in written)
 
 
-def test_an_address_with_a_password_is_refused() -> None:
+def test_address_with_a_password_is_refused() -> None:
     with pytest.raises(SettingsError, match="ARMWRIGHT_API_KEY"):
         llm_proposer("http://user:secret@127.0.0.1:9/v1", model="m")
 
 
-def test_a_finished_or_extended_run_keeps_its_account(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_finished_and_extended_runs_keep_their_usage(chat_server: ChatServer, tmp_path: Path) -> None:
     first = run(chat_server, tmp_path / "run", n_total=1)
     assert first.summary["proposer"]["calls"] == 3
     assert run(chat_server, tmp_path / "run", n_total=1).summary == first.summary
@@ -223,7 +223,7 @@ def test_folder_of_an_unreachable_model_accepts_another_proposer(
     assert optimize(PROBLEM, proposer="rules", n_init=2, n_total=1, out=tmp_path / "run").trials[2].source == "rules"
 
 
-def test_an_answer_that_is_no_valid_text_is_kept_all_the_same(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_answer_with_invalid_unicode_is_recorded(chat_server: ChatServer, tmp_path: Path) -> None:
     """A lone surrogate can come in JSON, and cannot be written as UTF-8."""
     chat_server.answer = lambda request: designer(request) if "response_format" in request else "so \ud800 be it"
     result = run(chat_server, tmp_path / "run", n_total=1)
@@ -231,28 +231,28 @@ def test_an_answer_that_is_no_valid_text_is_kept_all_the_same(chat_server: ChatS
     assert Transcript(tmp_path / "run" / "transcripts.jsonl").calls[1].answer == "so ? be it"
 
 
-def test_a_vendors_model_without_its_key_is_refused() -> None:
+def test_hosted_model_without_a_key_is_refused() -> None:
     with pytest.raises(SettingsError, match="OPENAI_API_KEY"):
         LlmProposer("openai-chat:gpt-4o")
 
 
 @pytest.mark.parametrize(("model", "words"), [("gpt-4o", "openai-chat:gpt-4o"), ("opnai:gpt-4o", "Unknown model")])
-def test_a_wrong_model_name_is_refused(model: str, words: str) -> None:
+def test_invalid_model_name_is_refused(model: str, words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         LlmProposer(model)
 
 
-def test_a_model_is_not_asked_as_people_are(chat_server: ChatServer) -> None:
+def test_text_answers_are_for_manual_use_only(chat_server: ChatServer) -> None:
     with pytest.raises(SettingsError, match='answer "text" is for manual answers; a model needs'):
         llm_proposer(chat_server.url, answer="text")
 
 
-def test_a_wrong_prompt_name_is_refused(chat_server: ChatServer) -> None:
+def test_unknown_prompt_name_is_refused(chat_server: ChatServer) -> None:
     with pytest.raises(SettingsError, match='Did you mean "plus"'):
         llm_proposer(chat_server.url, prompt="pluss")
 
 
-def test_feedback_shows_at_most_five_of_each_and_depends_on_the_seed_alone(chat_server: ChatServer) -> None:
+def test_feedback_is_bounded_and_depends_only_on_the_seed(chat_server: ChatServer) -> None:
     proposer = llm_proposer(chat_server.url)
     history = optimize(PROBLEM, proposer="none", n_total=20).history
     prompts: list[str] = []

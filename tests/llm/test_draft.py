@@ -84,7 +84,7 @@ def files(folder: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("wire", "output"), [*((wire, "auto") for wire in wires.WIRES), *(("own server", form) for form in wires.OUTPUTS)]
 )
-def test_a_description_becomes_a_task_and_a_space(
+def test_description_becomes_a_task_and_a_space(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wire: str, output: str
 ) -> None:
     for name, value in wires.environment(chat_server).items():
@@ -108,7 +108,7 @@ def test_a_description_becomes_a_task_and_a_space(
     assert (call.step, json.loads(call.answer), call.origin, call.requests) == ("draft", FULL, "model", 1)
 
 
-def test_files_state_their_origin(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_draft_files_state_their_origin(chat_server: ChatServer, tmp_path: Path) -> None:
     draft = drafted(chat_server, ANSWER, tmp_path / "new folder")
     task, space = (path.read_text() for path in draft.files)
     assert yaml.safe_load(task) == TASK
@@ -126,7 +126,7 @@ def test_files_state_their_origin(chat_server: ChatServer, tmp_path: Path) -> No
     assert draft.command == f"armwright optimize '{place}.yaml' --space '{place}-space.yaml'"
 
 
-def test_without_a_folder_nothing_is_written(chat_server: ChatServer, in_folder: Path) -> None:
+def test_draft_without_a_folder_writes_nothing(chat_server: ChatServer, in_folder: Path) -> None:
     draft = drafted(chat_server, ANSWER)
     assert (files(in_folder), draft.files) == (set(), ())
     assert draft.command == "armwright optimize wall.yaml --space wall-space.yaml"
@@ -135,14 +135,14 @@ def test_without_a_folder_nothing_is_written(chat_server: ChatServer, in_folder:
 @pytest.mark.parametrize(
     "space", [{}, {"space": None}, {"space": {"name": "any", "joints": 4}}], ids=["missing", "null", "default"]
 )
-def test_a_default_space_is_not_written(chat_server: ChatServer, tmp_path: Path, space: dict[str, Any]) -> None:
+def test_default_space_is_not_written(chat_server: ChatServer, tmp_path: Path, space: dict[str, Any]) -> None:
     draft = drafted(chat_server, json.dumps({**PLAIN, **space}), tmp_path)
     assert (draft.space, draft.problem.space) == (None, aw.paper_space())
     assert files(tmp_path) == {"wall.yaml", DRAFTS}
     assert "--space" not in draft.command
 
 
-def test_keys_with_their_default_are_left_out(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_keys_with_default_values_are_omitted(chat_server: ChatServer, tmp_path: Path) -> None:
     """A server in strict mode fills every key."""
     filled = {**aw.Task.model_validate(TASK).model_dump(mode="json"), "workspace": [], "moves": []}
     draft = drafted(chat_server, json.dumps({**FULL, "task": filled}), tmp_path)
@@ -182,7 +182,7 @@ REFUSED_FAST = ("no task", "unknown key", "payloads", "actuators missing", "pric
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in REFUSED_FAST else pytest.mark.slow) for name in REFUSED]
 )
-def test_an_invalid_answer_goes_back_with_the_reason_and_is_never_written(
+def test_invalid_draft_is_returned_with_the_reason_and_not_written(
     chat_server: ChatServer, tmp_path: Path, name: str
 ) -> None:
     wrong, reason = REFUSED[name]
@@ -208,7 +208,7 @@ def test_an_invalid_answer_goes_back_with_the_reason_and_is_never_written(
 @pytest.mark.parametrize(
     "wrong", ["I would rather talk about walls.", ANSWER[: ANSWER.index("payload")], "[" * 20_000, "null", "[]"]
 )
-def test_an_answer_without_the_object_goes_back(chat_server: ChatServer, tmp_path: Path, wrong: str) -> None:
+def test_answer_without_an_object_is_returned(chat_server: ChatServer, tmp_path: Path, wrong: str) -> None:
     draft = drafted(chat_server, [wrong, ANSWER], tmp_path)
     assert (draft.task.name, draft.usage.calls) == ("wall", 2)
 
@@ -226,7 +226,7 @@ def test_invisible_characters_do_not_reach_files_and_terminal(chat_server: ChatS
     assert (tmp_path / DRAFTS).read_text().replace("\n", "").isprintable()
 
 
-def test_line_ends_of_a_description_stay_in_their_comment(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_line_breaks_in_a_description_stay_in_the_comment(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = lambda request: ANSWER
     description = f"paint\nname: evil\n{'-' * 12}\x1b[0m\u2028targets: []"
     options = ModelOptions(model="m", base_url=chat_server.url)
@@ -238,7 +238,7 @@ def test_line_ends_of_a_description_stay_in_their_comment(chat_server: ChatServe
 
 
 @pytest.mark.parametrize(("kind", "name"), [(kind, next(iter(faults))) for kind, faults in FAULTS.items()])
-def test_faults_are_one_line_and_write_no_task(
+def test_model_faults_are_one_line_and_write_no_task(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, name: str
 ) -> None:
     monkeypatch.setattr(client, "RETRY_SECONDS", 0.01)
@@ -253,7 +253,7 @@ def test_faults_are_one_line_and_write_no_task(
     assert (fault.value.final is not None) == (kind in ("key", "quota", "unknown_model"))
 
 
-def test_a_name_that_is_taken_goes_back_to_the_model(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_taken_name_is_returned_to_the_model(chat_server: ChatServer, tmp_path: Path) -> None:
     for taken in ("wall.yaml", "wall-space.yaml"):
         folder = tmp_path / taken
         folder.mkdir()
@@ -268,14 +268,14 @@ def test_a_name_that_is_taken_goes_back_to_the_model(chat_server: ChatServer, tm
         assert aw.load_task(folder / "wall.yaml") == forced.task
 
 
-def test_a_dangling_link_is_a_taken_name(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_dangling_link_counts_as_a_taken_name(chat_server: ChatServer, tmp_path: Path) -> None:
     (tmp_path / "wall.yaml").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(ModelError, match="is taken"):
         drafted(chat_server, ANSWER, tmp_path)
     assert not (tmp_path / "elsewhere").exists()
 
 
-def test_a_file_that_appears_meanwhile_is_kept(
+def test_file_created_during_the_call_is_kept(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.path.lexists", lambda path: False)
@@ -285,14 +285,14 @@ def test_a_file_that_appears_meanwhile_is_kept(
     assert (tmp_path / "wall.yaml").read_text() == "mine"
 
 
-def test_an_impossible_folder_is_reported_before_a_call(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_invalid_folder_is_reported_before_a_call(chat_server: ChatServer, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FailureError, match="cannot write"):
         drafted(chat_server, ANSWER, tmp_path / "file")
     assert chat_server.requests == []
 
 
-def test_a_scripted_answer_is_never_a_models(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_scripted_draft_is_not_attributed_to_a_model(chat_server: ChatServer, tmp_path: Path) -> None:
     draft = drafted(chat_server, ANSWER, tmp_path, origin="scripted")
     assert draft.by == "a scripted stand-in for a model (test-model)"
     assert draft.record()["origin"] == draft.usage.origin == "scripted"
@@ -303,7 +303,7 @@ def test_a_scripted_answer_is_never_a_models(chat_server: ChatServer, tmp_path: 
         drafted(chat_server, ANSWER, tmp_path, origin="robot")
 
 
-def test_calls_are_bounded_in_each_draft(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_calls_of_a_draft_are_bounded(chat_server: ChatServer, tmp_path: Path) -> None:
     for most in (1, 2):
         before = len(chat_server.requests)
         with pytest.raises(ModelError, match=r'unknown key "paylod"'):
@@ -317,7 +317,7 @@ def test_calls_are_bounded_in_each_draft(chat_server: ChatServer, tmp_path: Path
     ]  # fmt: skip
 
 
-def test_costs_are_bounded_by_public_prices(
+def test_cost_of_a_draft_is_bounded_by_public_prices(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in wires.environment(chat_server).items():
@@ -333,7 +333,7 @@ def test_costs_are_bounded_by_public_prices(
     assert 0.0 < draft.usage.cost_usd < 0.01
 
 
-def test_without_a_model_one_error_says_what_to_do(in_folder: Path) -> None:
+def test_draft_without_a_model_says_what_to_do(in_folder: Path) -> None:
     message = refused(2, "draft", DESCRIPTION)
     for way in ("--model openai-chat:gpt-4o", "ARMWRIGHT_MODEL", "config.yaml", "armwright init my-task.yaml"):
         assert way in message
@@ -343,7 +343,7 @@ def test_without_a_model_one_error_says_what_to_do(in_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("description", ["", " \n ", "\x1b[0m"])
-def test_an_empty_description_is_refused(chat_server: ChatServer, description: str) -> None:
+def test_empty_and_overlong_descriptions_are_refused(chat_server: ChatServer, description: str) -> None:
     options = ModelOptions(model="m", base_url=chat_server.url)
     with pytest.raises(SettingsError, match="the description is empty"):
         aw.draft(description, options)
@@ -352,7 +352,7 @@ def test_an_empty_description_is_refused(chat_server: ChatServer, description: s
     assert chat_server.requests == []
 
 
-def test_the_command_line(chat_server: ChatServer, in_folder: Path) -> None:
+def test_draft_command_writes_files_and_json(chat_server: ChatServer, in_folder: Path) -> None:
     chat_server.answer = lambda request: ANSWER
     server = (*model_options(base_url=chat_server.url), "--model", "test-model")
     done = armwright("draft", *DESCRIPTION.split(), *server)  # without quotes, too
@@ -385,7 +385,7 @@ def test_the_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     assert "a scripted stand-in" in forced.stderr
 
 
-def test_what_would_be_sent_is_shown_without_a_model(in_folder: Path) -> None:
+def test_draft_prompt_is_shown_without_a_model(in_folder: Path) -> None:
     done = armwright("draft", DESCRIPTION, "--print-prompt")
     shown = f"{draft_prompt(DESCRIPTION)}\n{json.dumps(draft_schema(), indent=2)}\n"
     assert (done.returncode, done.stderr, done.stdout) == (0, "", shown)
@@ -393,7 +393,7 @@ def test_what_would_be_sent_is_shown_without_a_model(in_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("refused", [0, 1])
-def test_ctrl_c_ends_the_call_and_writes_no_task(chat_server: ChatServer, in_folder: Path, refused: int) -> None:
+def test_ctrl_c_cancels_the_draft_and_writes_no_task(chat_server: ChatServer, in_folder: Path, refused: int) -> None:
     released = threading.Event()
 
     def answer(request: Request) -> Answer:
@@ -412,7 +412,7 @@ def test_ctrl_c_ends_the_call_and_writes_no_task(chat_server: ChatServer, in_fol
     assert files(in_folder) == ({DRAFTS} if refused else set())
 
 
-def test_the_question_covers_all_that_the_files_may_hold() -> None:
+def test_draft_prompt_covers_all_file_keys() -> None:
     prompt, schema = draft_prompt(DESCRIPTION), draft_schema()
     for model in (aw.Task, aw.DesignSpace):
         assert set(schema["$defs"][model.__name__]["properties"]) == set(model.model_fields)

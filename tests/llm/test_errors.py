@@ -105,7 +105,7 @@ def sources(run: StudyResult) -> Sequence[str]:
 
 
 @every_fault
-def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
+def test_fault_before_the_first_trial_is_a_one_line_error(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
     ask: Callable[..., Any],
@@ -129,7 +129,7 @@ def test_before_the_first_trial_a_fault_is_an_error_in_one_line(
 
 
 @every_fault
-def test_later_a_fault_is_a_black_box_trial_and_is_counted(
+def test_later_fault_becomes_a_counted_black_box_trial(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
     ask: Callable[..., Any],
@@ -157,7 +157,7 @@ def test_later_a_fault_is_a_black_box_trial_and_is_counted(
 
 
 @pytest.mark.parametrize(("wire", "fault"), [("openai", ("server", "overloaded")), ("anthropic", ("key", "wrong key"))])
-def test_a_run_may_be_told_to_go_on_without_its_model(
+def test_on_failure_continue_runs_without_the_model(
     chat_server: ChatServer, ask: Callable[..., Any], wire: str, fault: tuple[str, str]
 ) -> None:
     chat_server.answer = lambda request: FAULTS[fault[0]][fault[1]]
@@ -170,7 +170,7 @@ def test_a_run_may_be_told_to_go_on_without_its_model(
 @pytest.mark.parametrize(
     ("wire", "name"), [("own server", "wrong key"), ("openai", "quota gone"), ("anthropic", "unknown model")]
 )
-def test_a_fault_that_asking_does_not_mend_is_told_once_and_ends_the_asking(
+def test_permanent_fault_is_reported_once_and_ends_proposals(
     chat_server: ChatServer, ask: Callable[..., Any], wire: str, name: str
 ) -> None:
     kind = next(kind for kind, faults in FAULTS.items() if name in faults)
@@ -186,7 +186,7 @@ def test_a_fault_that_asking_does_not_mend_is_told_once_and_ends_the_asking(
 
 @pytest.mark.parametrize("sent", [{"retry_after": "0"}, {"retry_after_ms": "5"}], ids=str)
 @both_formats
-def test_a_server_that_wants_a_moment_gets_it(
+def test_short_retry_after_is_respected(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Callable[..., Any], wire: str, sent: dict[str, str]
 ) -> None:
     monkeypatch.setattr(chat, "RETRY_SECONDS", 1000.0)  # the server's word counts, not ours
@@ -200,7 +200,7 @@ def test_a_server_that_wants_a_moment_gets_it(
 @pytest.mark.parametrize(
     ("wire", "retry_after"), [("openai", "100"), ("anthropic", "61"), ("openai", "Fri, 01 Jan 2100 00:00:00 GMT")]
 )
-def test_a_server_that_wants_more_patience_than_the_deadline_has_failed_at_once(
+def test_retry_after_beyond_the_deadline_fails_at_once(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, ask: Callable[..., Any], wire: str, retry_after: str
 ) -> None:
     chat_server.answer = after(3, rate_limit(retry_after=retry_after))
@@ -210,9 +210,7 @@ def test_a_server_that_wants_more_patience_than_the_deadline_has_failed_at_once(
 
 
 @both_formats
-def test_faults_that_may_pass_are_asked_again_twice(
-    chat_server: ChatServer, ask: Callable[..., Any], wire: str
-) -> None:
+def test_transient_faults_are_retried_twice(chat_server: ChatServer, ask: Callable[..., Any], wire: str) -> None:
     chat_server.answer = after(3, FAULTS["server"]["overloaded"], last=5)
     run, _ = ask(wire)
     assert sources(run) == ["llm", "bbo", "bbo"] * 2
@@ -220,9 +218,7 @@ def test_faults_that_may_pass_are_asked_again_twice(
 
 
 @every_wire
-def test_a_server_that_is_gone_and_back_is_asked_again(
-    chat_server: ChatServer, ask: Callable[..., Any], wire: str
-) -> None:
+def test_model_is_used_again_after_an_outage(chat_server: ChatServer, ask: Callable[..., Any], wire: str) -> None:
     def watch(progress: Progress) -> None:
         if (progress.doing, progress.number) == ("proposing", 7):
             chat_server.stop()
@@ -242,7 +238,7 @@ def test_a_server_that_is_gone_and_back_is_asked_again(
         ("anthropic", '{"link_1": 7}', "7"),
     ],
 )
-def test_what_came_back_is_kept(
+def test_raw_answers_of_failed_calls_are_recorded(
     chat_server: ChatServer, ask: Callable[..., Any], tmp_path: Path, wire: str, text: str, kept: str
 ) -> None:
     chat_server.answer = after(4, text)
@@ -254,7 +250,7 @@ def test_what_came_back_is_kept(
 
 
 @every_wire
-def test_an_answer_that_breaks_off_is_no_design(
+def test_truncated_answer_is_refused(
     chat_server: ChatServer, ask: Callable[..., Any], tmp_path: Path, wire: str
 ) -> None:
     chat_server.answer = after(4, said('{"origin_x": 0.1, "ori', "length", "max_tokens"))
@@ -264,7 +260,7 @@ def test_an_answer_that_breaks_off_is_no_design(
 
 
 @pytest.mark.parametrize(("n_total", "flagged"), [(9, True), (10, False)])
-def test_a_run_with_more_than_a_tenth_of_fallbacks_is_flagged(
+def test_run_with_more_than_a_tenth_of_fallbacks_is_flagged(
     chat_server: ChatServer, ask: Callable[..., Any], n_total: int, flagged: bool
 ) -> None:
     chat_server.answer = after(3, FAULTS["rejected"]["rejected"], last=4)
@@ -274,7 +270,7 @@ def test_a_run_with_more_than_a_tenth_of_fallbacks_is_flagged(
 
 
 @pytest.mark.parametrize("key", ["sk-planted-key\n", "sk-planted\nkey-in-two", "sk-planted-ключ"])
-def test_a_key_that_no_header_can_hold_is_named_as_that(
+def test_key_invalid_in_a_header_is_reported(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, key: str
 ) -> None:
     monkeypatch.setenv("ARMWRIGHT_API_KEY", key)
@@ -350,7 +346,7 @@ TYPES = st.sampled_from(["application/json", "text/event-stream", "text/html", "
 # The vendor's client leaves the stream of a broken answer to the garbage collector, which may come at a bad time.
 @pytest.mark.filterwarnings("ignore:.*async_generator:pytest.PytestUnraisableExceptionWarning")
 @both_formats
-def test_whatever_a_server_says_is_an_answer_or_a_fault(
+def test_arbitrary_responses_are_answers_or_faults(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
 ) -> None:
     asked = proposer(wire, chat_server, monkeypatch)

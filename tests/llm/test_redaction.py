@@ -94,7 +94,7 @@ def parrot(server: ChatServer) -> Callable[[Request], Answer]:
 
 
 @pytest.mark.parametrize("wire", WIRES)
-def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
+def test_keys_are_never_shown_or_written(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
     chat_server.answer = parrot(chat_server)
     done = run(chat_server, *STUDY, *model_of(wire, chat_server))
     check_for_keys(done, chat_server, in_folder, done.stdout)
@@ -102,7 +102,7 @@ def test_no_key_is_shown_or_written(chat_server: ChatServer, in_folder: Path, wi
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wire", ["openai", "anthropic"])
-def test_no_key_is_shown_by_libraries_that_log(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
+def test_keys_are_not_logged_by_libraries(chat_server: ChatServer, in_folder: Path, wire: str) -> None:
     chat_server.answer = parrot(chat_server)
     logs = {f"{wire.upper()}_LOG": "debug"}
     done = run_alone(chat_server, *STUDY, "--json", *model_of(wire, chat_server), **logs)
@@ -111,7 +111,7 @@ def test_no_key_is_shown_by_libraries_that_log(chat_server: ChatServer, in_folde
 
 
 @pytest.mark.slow
-def test_no_key_is_on_the_page(chat_server: ChatServer, in_folder: Path) -> None:
+def test_keys_are_not_on_the_page(chat_server: ChatServer, in_folder: Path) -> None:
     chat_server.answer = parrot(chat_server)
     study = [argument for argument in STUDY if argument != "--no-figures"]
     done = run(chat_server, *study, *model_of("own server", chat_server))
@@ -140,7 +140,7 @@ def check_for_keys(
 
 
 @pytest.mark.parametrize("command", [("optimize", "target-1", *SHORT), ("doctor", "--call")], ids=lambda c: c[0])
-def test_no_key_is_shown_where_the_first_call_fails(
+def test_keys_are_hidden_when_the_first_call_fails(
     chat_server: ChatServer, in_folder: Path, command: tuple[str, ...]
 ) -> None:
     chat_server.answer = lambda request: (401, json.dumps({"error": {"message": f"bad: {sent_key(chat_server)}"}}))
@@ -151,7 +151,7 @@ def test_no_key_is_shown_where_the_first_call_fails(
     no_key_in(done.stdout + done.stderr)
 
 
-def test_no_key_is_shown_where_the_first_call_repeats_it(chat_server: ChatServer, in_folder: Path) -> None:
+def test_keys_echoed_by_the_first_call_are_hidden(chat_server: ChatServer, in_folder: Path) -> None:
     chat_server.answer = parrot(chat_server)
     done = run(chat_server, "doctor", "--call", *model_of("anthropic", chat_server))
     assert done.returncode == 0, done.stderr
@@ -160,7 +160,7 @@ def test_no_key_is_shown_where_the_first_call_repeats_it(chat_server: ChatServer
 
 
 @pytest.mark.slow
-def test_no_key_is_on_a_command_line(chat_server: ChatServer, in_folder: Path) -> None:
+def test_keys_are_not_on_a_command_line(chat_server: ChatServer, in_folder: Path) -> None:
     """As every user of the machine sees them: of the study, and of the server of its page."""
     seen: set[str] = set()
 
@@ -199,7 +199,7 @@ KEY = "sk-proj-abcdefghijklmnopqrstuvwxyz0123"
         ("a short word: shortest", "a short word: shortest"),
     ],
 )
-def test_keys_are_blotted_out(monkeypatch: pytest.MonkeyPatch, text: str, shown: str) -> None:
+def test_keys_are_redacted(monkeypatch: pytest.MonkeyPatch, text: str, shown: str) -> None:
     monkeypatch.setenv("MY_KEY", KEY)
     monkeypatch.setenv("SHORT_KEY", "short")
     assert redacted(text) == shown
@@ -215,7 +215,7 @@ def test_keys_are_blotted_out(monkeypatch: pytest.MonkeyPatch, text: str, shown:
         ("MY_SECRET", "remember the universal shoulder"),
     ],
 )
-def test_ordinary_words_are_no_keys(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+def test_ordinary_words_are_not_redacted(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
     monkeypatch.setenv(name, value)
     text = "origin_x: a universal shoulder keeps the position_error small, as trial_10 shows; remember it"
     assert redacted(text) == text
@@ -224,12 +224,12 @@ def test_ordinary_words_are_no_keys(monkeypatch: pytest.MonkeyPatch, name: str, 
 @pytest.mark.parametrize(
     ("name", "value"), [("VLLM_API_KEY", "placeholder"), ("MY_PASSWORD", "s3cretword"), ("MY_SECRET", "a-b-" * 5)]
 )
-def test_what_is_sent_and_what_is_no_word_is_a_key(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+def test_sent_header_values_that_are_not_words_are_keys(monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
     monkeypatch.setenv(name, value)
     assert redacted(f"it is {value}.") == f"it is <{name}>."
 
 
-def test_only_texts_of_an_answer_are_blotted_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_text_values_of_an_answer_are_redacted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MY_API_KEY", "origin_x")
     monkeypatch.setenv("A_TOKEN", "12345678901234567890")
     content = {"origin_x": 12345678901234567890, "why": ["origin_x", None, True, {"origin_x": "is origin_x"}]}
@@ -240,7 +240,7 @@ def test_only_texts_of_an_answer_are_blotted_out(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("wire", ["own server", "openai"])
-def test_a_key_that_is_a_name_of_the_answer_breaks_nothing(
+def test_key_equal_to_a_parameter_name_keeps_the_answer_valid(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
 ) -> None:
     """Neither as a parameter's name, nor as a value: that is a text that the design space refuses."""
@@ -251,6 +251,6 @@ def test_a_key_that_is_a_name_of_the_answer_breaks_nothing(
     assert (run.trials[2].source, run.trials[2].fault) == ("llm", None)
 
 
-def test_a_key_with_line_breaks_is_blotted_out_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_key_with_line_breaks_is_redacted_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MY_TOKEN", "first-piece\nsecond-piece\n")
     assert redacted("b'first-piece\\nsecond-piece\\n'") == "b'<MY_TOKEN>\\n<MY_TOKEN>\\n'"

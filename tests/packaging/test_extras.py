@@ -27,7 +27,7 @@ def plain(name: str) -> str:
     return re.sub("[-_.]+", "-", re.split(r"[\[<>=!~ ]", name)[0]).lower()
 
 
-def test_extras_are_those_of_the_project() -> None:
+def test_extras_match_pyproject() -> None:
     stated = {extra: requirements for extra, requirements in STATED.items() if extra != "all"}
     assert set(EXTRAS) == set(stated)
     assert STATED["all"] == [f"armwright[{','.join(sorted(stated))}]"]
@@ -44,7 +44,7 @@ def holders() -> Mapping[str, list[str]]:
 
 
 @pytest.mark.parametrize("extra", [pytest.param(one, marks=NEEDS_GP if one == "gp" else ()) for one in EXTRAS])
-def test_packages_of_an_extra_are_in_its_distributions(extra: str) -> None:
+def test_packages_of_an_extra_belong_to_its_distributions(extra: str) -> None:
     installed = EXTRAS[extra].keys() - missing_packages(extra)
     assert installed
     for package in installed:
@@ -65,7 +65,7 @@ ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
 
 
 @pytest.mark.parametrize("asked", ASKED)
-def test_a_missing_package_is_named_with_its_command(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_package_names_its_install_command(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
     extra, package, ask = ASKED[asked]
     monkeypatch.setitem(sys.modules, package, None)
     for module in ("armwright.llm.client", "armwright.llm.errors"):
@@ -81,7 +81,7 @@ def test_a_missing_package_is_named_with_its_command(asked: str, monkeypatch: py
     assert fault.value.exit_code == 2
 
 
-def test_another_version_is_named_as_one() -> None:
+def test_incompatible_version_is_reported() -> None:
     with pytest.raises(MissingExtraError) as fault, requires_extra("live", "the page"):
         from json import no_such_name  # type: ignore[attr-defined] # noqa: F401
     words = str(fault.value)

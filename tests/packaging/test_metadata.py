@@ -13,13 +13,13 @@ PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["
 CITATION: dict[str, Any] = yaml.safe_load((ROOT / "CITATION.cff").read_text())
 
 
-def test_one_version_and_one_licence() -> None:
+def test_version_and_licence_agree_everywhere() -> None:
     versions = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert PROJECT["version"] == CITATION["version"] == versions[0]
     assert PROJECT["license"] == CITATION["license"] == "MIT"
 
 
-def test_the_paper_is_cited_as_in_the_method() -> None:
+def test_paper_is_cited_as_in_the_method() -> None:
     (paper,) = CITATION["references"]
     method = " ".join((ROOT / "docs" / "method.md").read_text().replace("\n>", "\n").split())
     authors = ", ".join(f"{author['given-names'][0]}. {author['family-names']}" for author in paper["authors"])
@@ -28,7 +28,7 @@ def test_the_paper_is_cited_as_in_the_method() -> None:
 
 
 @pytest.mark.parametrize("document", ["CONTRIBUTING.md", "README.md"])
-def test_the_files_that_are_linked_are_there(document: str) -> None:
+def test_linked_files_exist(document: str) -> None:
     links = re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / document).read_text())
     assert links
     assert not [link for link in links if not (ROOT / link).exists()]

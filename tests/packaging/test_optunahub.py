@@ -27,7 +27,7 @@ def module() -> ModuleType:
     return optunahub.load_local_module(NAME, registry_root=str(REGISTRY))
 
 
-def test_optunahub_loads_it(module: ModuleType) -> None:
+def test_optunahub_loads_the_package(module: ModuleType) -> None:
     """What it offers is armwright's own, so that there is one code."""
     assert {name: getattr(module, name) for name in module.__all__} == {n: getattr(aw, n) for n in module.__all__}
     study = optuna.create_study()
@@ -36,7 +36,7 @@ def test_optunahub_loads_it(module: ModuleType) -> None:
     assert [trial.number for trial in study.trials if "proposal" in trial.user_attrs] == [4, 9]
 
 
-def test_the_model_is_asked_through_it(module: ModuleType, chat_server: ChatServer) -> None:
+def test_package_calls_the_model(module: ModuleType, chat_server: ChatServer) -> None:
     chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.5}, "reason": "a half"}'
     proposer = module.StudyLlmProposer(
         module.ModelOptions(model="m", base_url=chat_server.url, answer="one-step", origin="scripted"), "a parabola"
@@ -51,7 +51,7 @@ def test_the_model_is_asked_through_it(module: ModuleType, chat_server: ChatServ
     assert study.trials[4].user_attrs["source"] == "scripted"
 
 
-def test_what_the_registry_asks_of_a_package() -> None:
+def test_package_meets_the_registry_requirements() -> None:
     """The keys that its header_confirm.py looks for, all in strings; the files and sections of its template."""
     _, header, text = README.split("---\n", 2)
     noted: dict[str, Any] = yaml.safe_load(header)
@@ -69,7 +69,7 @@ def test_what_the_registry_asks_of_a_package() -> None:
     assert (FOLDER / "requirements.txt").read_text() == "armwright[llm]\n"
 
 
-def test_the_readme_names_what_there_is(module: ModuleType) -> None:
+def test_readme_names_the_public_api(module: ModuleType) -> None:
     for name in module.__all__:
         assert f"`{name}" in README
     (callback,) = re.findall(r"`ProposalCallback\((.*)\)`", README)
@@ -77,7 +77,7 @@ def test_the_readme_names_what_there_is(module: ModuleType) -> None:
     assert set(given) < {*aw.ProposalCallback.__init__.__code__.co_varnames}
 
 
-def test_the_example_of_the_readme_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_readme_example_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
     def from_here(package: str) -> ModuleType:
@@ -89,13 +89,13 @@ def test_the_example_of_the_readme_runs(monkeypatch: pytest.MonkeyPatch, capsys:
 
 
 @pytest.mark.slow
-def test_the_example_runs() -> None:
+def test_example_script_runs() -> None:
     command = [sys.executable, "-W", "error", FOLDER / "example.py", "--n-trials", "30"]
     said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
     assert said.startswith("6 proposals by rules, faults: none\n")
 
 
-def test_without_armwright_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_armwright_names_its_install_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "armwright", None)
     with pytest.raises(ModuleNotFoundError, match=r'armwright is missing: pip install "armwright\[llm\]"'):
         optunahub.load_local_module(NAME, registry_root=str(REGISTRY))

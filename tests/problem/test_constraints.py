@@ -80,7 +80,7 @@ def lines(folder: Path) -> list[dict[str, Any]]:
 
 
 @given(st.sampled_from(sorted(QUANTITIES)), st.sampled_from(["<=", ">="]), st.floats(-1e6, 1e6))
-def test_a_sentence_says_its_bound(name: str, relation: str, bound: float) -> None:
+def test_constraint_text_is_parsed(name: str, relation: str, bound: float) -> None:
     (constraint,) = read_constraints([f" {name}{relation} {bound!r} "])
     assert (constraint.quantity.name, constraint.relation, constraint.bound) == (name, relation, bound)
     assert read_constraints([constraint.description])[0].bound == pytest.approx(bound, rel=1e-11)
@@ -104,13 +104,13 @@ def test_a_sentence_says_its_bound(name: str, relation: str, bound: float) -> No
         (["mass <= 3", "mass >= 4"], 'no design satisfies both "mass >= 4" and "mass <= 3"'),
     ],
 )
-def test_what_is_no_constraint_is_refused_in_one_line(sentences: list[str], words: str) -> None:
+def test_invalid_constraints_are_refused_in_one_line(sentences: list[str], words: str) -> None:
     with pytest.raises(TaskError, match=words.replace("(", r"\(") if "import" in words else words) as refusal:
         Problem(task(*sentences))
     assert "\n" not in str(refusal.value)
 
 
-def test_the_template_shows_constraints_that_are_some(tmp_path: Path) -> None:
+def test_constraints_in_the_task_template_are_valid(tmp_path: Path) -> None:
     shown = "# constraints:\n#   - worst_error <= 0.01\n#   - mass <= 3\n"
     text = task_template(tmp_path / "mine.yaml")
     assert shown in text
@@ -120,7 +120,7 @@ def test_the_template_shows_constraints_that_are_some(tmp_path: Path) -> None:
     assert [constraint.description for constraint in found] == ["worst_error <= 0.01", "mass <= 3"]
 
 
-def test_values_are_how_far_a_bound_is_broken() -> None:
+def test_violations_are_relative_distances_from_the_bound() -> None:
     """Against plain formulas of the physics; of a bound of 0, in the quantity's own unit."""
     problem = Problem(task("worst_error <= 0.4", "length >= 0.5", "unreached_targets <= 0", "peak_torque <= 0.06"))
     designs = SPACE.sample(50, 3)
@@ -142,7 +142,7 @@ def test_values_are_how_far_a_bound_is_broken() -> None:
     assert measured == pytest.approx(lengths, rel=1e-6)
 
 
-def test_rows_and_designs_have_the_same_constraints_and_the_worst_copy_counts() -> None:
+def test_violations_of_matrix_and_designs_agree_and_take_the_worst_copy() -> None:
     problem = Problem(task(*BOUNDS), tolerance=1e-3)
     exact = Problem(task(*BOUNDS))
     designs = SPACE.sample(20, 5)
@@ -153,7 +153,7 @@ def test_rows_and_designs_have_the_same_constraints_and_the_worst_copy_counts() 
     assert np.array_equal(exact.evaluate(designs).violations, exact.evaluate_matrix(rows).violations)
 
 
-def test_a_number_that_is_not_finite_is_no_constraint() -> None:
+def test_nonfinite_constraint_value_is_refused() -> None:
     problem = Problem(task("mass <= 3"))
     lost = replace(problem.constraints[0].quantity, each=lambda evaluation: np.full(len(evaluation), np.nan))  # type: ignore[type-var]
     object.__setattr__(problem, "constraints", (Constraint(lost, "<=", 3.0),))
@@ -162,7 +162,7 @@ def test_a_number_that_is_not_finite_is_no_constraint() -> None:
 
 
 @given(VALUES, st.data())
-def test_ranked_values_dominate_as_pymoo_says_of_constraints(values: np.ndarray, data: st.DataObject) -> None:
+def test_constrained_dominance_agrees_with_pymoo(values: np.ndarray, data: st.DataObject) -> None:
     broken = data.draw(arrays(float, (len(values), 2), elements=st.integers(-2, 2).map(lambda i: i / 3)))
     ranks, total = penalised_objectives(values, broken), total_violation(broken)
     for a, b in product(range(len(values)), repeat=2):
@@ -173,7 +173,9 @@ def test_ranked_values_dominate_as_pymoo_says_of_constraints(values: np.ndarray,
 
 
 @given(VALUES, st.data())
-def test_the_front_is_optunas_and_the_hypervolume_moocores(values: np.ndarray, data: st.DataObject) -> None:
+def test_constrained_front_agrees_with_optuna_and_hypervolume_with_moocore(
+    values: np.ndarray, data: st.DataObject
+) -> None:
     broken = data.draw(arrays(float, (len(values), 3), elements=st.integers(-3, 1).map(float)))
     history = told(values, broken)
     names = [constraint.description for constraint in history.problem.constraints]
@@ -189,7 +191,7 @@ def test_the_front_is_optunas_and_the_hypervolume_moocores(values: np.ndarray, d
 
 
 @given(VALUES, st.data())
-def test_a_looser_bound_never_takes_hypervolume_away(values: np.ndarray, data: st.DataObject) -> None:
+def test_hypervolume_grows_with_a_looser_bound(values: np.ndarray, data: st.DataObject) -> None:
     broken = data.draw(arrays(float, (len(values), 1), elements=st.floats(-1.0, 1.0)))
     before = -1.0
     for loosened in (0.0, 0.1, 0.5, 2.0):
@@ -199,7 +201,7 @@ def test_a_looser_bound_never_takes_hypervolume_away(values: np.ndarray, data: s
     assert before == hypervolume(values, (10.0, 10.0))
 
 
-def test_a_looser_bound_of_a_task_never_takes_hypervolume_away() -> None:
+def test_hypervolume_grows_with_a_looser_task_bound() -> None:
     """The same with the bounds of a task, on the same real designs."""
     designs = SPACE.sample(400, 0)
     volumes = []
@@ -211,7 +213,7 @@ def test_a_looser_bound_of_a_task_never_takes_hypervolume_away() -> None:
     assert volumes[0] < volumes[-1] == hypervolume(Problem(task()).evaluate(designs).values, (5.0, 5.0))
 
 
-def test_nothing_of_a_task_without_constraints_tells_of_any(tmp_path: Path) -> None:
+def test_unconstrained_task_records_no_violations(tmp_path: Path) -> None:
     run = optimize(Problem(task()), proposer="none", n_total=3, out=tmp_path / "run")
     assert all("violations" not in line for line in lines(tmp_path / "run"))
     assert "feasibility" not in run.summary
@@ -220,7 +222,7 @@ def test_nothing_of_a_task_without_constraints_tells_of_any(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
-def test_a_bound_that_everything_keeps_changes_no_trial(sampler: str) -> None:
+def test_inactive_constraint_changes_no_trial(sampler: str) -> None:
     free, bound = (
         optimize(Problem(task(*words)), proposer="none", sampler=sampler, n_total=16, seed=2)
         for words in ((), ("length <= 100",))
@@ -241,7 +243,7 @@ def test_black_boxes_prefer_feasible_designs(sampler: str) -> None:
     assert shares[0] > 1.2 * shares[1]
 
 
-def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
+def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
     run = optimize(problem, proposer="rules", n_total=40, seed=1, out=tmp_path / "run")
     broken = problem.evaluate([trial.design for trial in run.trials]).violations
@@ -282,7 +284,7 @@ def test_a_run_counts_feasible_designs_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
-def test_a_killed_run_goes_on_as_if_it_had_not_been(tmp_path: Path, sampler: str) -> None:
+def test_killed_constrained_run_resumes_identically(tmp_path: Path, sampler: str) -> None:
     """Of what a kill leaves: whole lines, and a part of one."""
     how: dict[str, Any] = {"proposer": "rules", "sampler": sampler, "n_total": 24, "seed": 3}
     problem = Problem(task(*BOUNDS))
@@ -298,7 +300,7 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(tmp_path: Path, sampler: str
         assert lines(folder) == lines(tmp_path / "whole")
 
 
-def test_the_study_of_a_run_carries_its_constraints(tmp_path: Path) -> None:
+def test_optuna_study_of_a_run_has_its_constraints(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
     run = optimize(problem, proposer="none", n_total=30, seed=1, out=tmp_path / "run")
     names = [constraint.description for constraint in problem.constraints]
@@ -310,13 +312,13 @@ def test_the_study_of_a_run_carries_its_constraints(tmp_path: Path) -> None:
     assert sorted(t.number for t in box.study.best_trials) == sorted(member.number for member in run.front)
 
 
-def test_other_constraints_are_another_run(tmp_path: Path) -> None:
+def test_changed_constraints_are_refused(tmp_path: Path) -> None:
     optimize(Problem(task(*BOUNDS)), proposer="none", n_total=2, out=tmp_path / "run")
     with pytest.raises(RunConflictError, match=r"constraints: .*worst_error <= 0.4"):
         optimize(Problem(task("worst_error <= 0.3")), proposer="none", n_total=2, out=tmp_path / "run")
 
 
-def test_a_line_without_its_constraints_is_damaged(tmp_path: Path) -> None:
+def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
     optimize(Problem(task(*BOUNDS)), proposer="none", n_total=2, out=tmp_path / "run")
     file = tmp_path / "run" / "trials.jsonl"
     first = json.loads(file.read_text().splitlines()[0])
@@ -326,7 +328,7 @@ def test_a_line_without_its_constraints_is_damaged(tmp_path: Path) -> None:
         read_run(tmp_path / "run")
 
 
-def test_a_replay_has_the_same_constraints_to_the_bit(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_replay_has_identical_violations(chat_server: ChatServer, tmp_path: Path) -> None:
     def answer(request: Request) -> Answer:
         if "response_format" not in request:
             return designer(request)
@@ -365,7 +367,7 @@ def test_run_without_a_feasible_design_draws_the_nearest(tmp_path: Path) -> None
     assert {file.name for file in write_figures(tmp_path / "run")} >= {"front.png", f"arm-{nearest:04d}.png"}
 
 
-def test_the_reference_point_comes_from_feasible_designs_where_these_have_a_front() -> None:
+def test_reference_point_comes_from_feasible_designs() -> None:
     values = np.array([[1.0, 9.0], [9.0, 1.0], [4.0, 6.0], [6.0, 4.0]])
     broken = np.array([[1.0], [1.0], [0.0], [-1.0]])
     assert found_reference_point(values, broken) == pytest.approx((6.6, 6.6))
@@ -377,7 +379,7 @@ def test_the_reference_point_comes_from_feasible_designs_where_these_have_a_fron
     assert run.history.reference_point == run.history.found_reference_point()
 
 
-def test_a_study_of_ones_own_says_how_far_its_trials_break_constraints() -> None:
+def test_custom_study_states_its_violations() -> None:
     problem = Problem(task(*BOUNDS))
     designs = SPACE.sample(6, 0)
     outcomes = problem.evaluate(designs)
@@ -394,7 +396,7 @@ def test_a_study_of_ones_own_says_how_far_its_trials_break_constraints() -> None
 
 
 @pytest.mark.slow
-def test_a_search_for_the_front_keeps_the_bounds_and_goes_on_to_the_bit(tmp_path: Path) -> None:
+def test_front_search_keeps_constraints_and_resumes_identically(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
     whole = find_front(problem, budget=12_000, stop_at_stall=False, out=tmp_path / "whole")
     assert np.all(whole.history.feasible)
@@ -410,7 +412,7 @@ def test_a_search_for_the_front_keeps_the_bounds_and_goes_on_to_the_bit(tmp_path
     assert parts.summary["search"]["infeasible"] == whole.summary["search"]["infeasible"]
 
 
-def test_a_search_without_a_feasible_design_ends_with_the_nearest() -> None:
+def test_front_search_without_a_feasible_design_keeps_the_nearest() -> None:
     run = find_front(Problem(task(*IMPOSSIBLE)), budget=3_000)
     assert run.front == []
     assert run.summary["hypervolume"]["final"] == 0.0
@@ -420,7 +422,7 @@ def test_a_search_without_a_feasible_design_ends_with_the_nearest() -> None:
 
 
 @pytest.mark.slow
-def test_pymoos_constrained_nsga2_finds_no_front_that_ours_misses_by_much() -> None:
+def test_front_search_matches_constrained_nsga2_of_pymoo() -> None:
     """On average over three seeds; over five, 40,000 evaluations came to 18.66 (theirs: 18.39)."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
@@ -452,13 +454,13 @@ def test_pymoos_constrained_nsga2_finds_no_front_that_ours_misses_by_much() -> N
     assert np.mean(ours) >= 0.98 * np.mean(theirs)
 
 
-def test_feedback_of_infeasible_designs_begins_with_the_nearest() -> None:
+def test_feedback_of_infeasible_designs_starts_with_the_nearest() -> None:
     history = fixed_history(FixedProblem(task("mass <= 0.0001")))
     assert history.front == []
     assert history.nearest(3) == np.argsort(history.violations[:, 0], kind="stable")[:3].tolist()
 
 
-def test_optuna_itself_calls_feasible_what_is_not_above_0() -> None:
+def test_optuna_treats_violations_up_to_zero_as_feasible() -> None:
     study = optuna.create_study(directions=["minimize"] * 2)
     values, broken = np.array([[1.0, 2.0], [2.0, 1.0], [0.5, 0.5]]), np.array([[0.0], [-1.0], [1e-12]])
     for row, by in zip(values, broken[:, 0], strict=True):

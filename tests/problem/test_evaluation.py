@@ -18,7 +18,7 @@ from tests.support.arms import general_arms, paper_arms
 TARGETS = np.array([[0.4, 0.1, 0.3], [-0.2, 0.5, 0.1], [0.0, 0.0, 3.0]])
 
 
-def test_shapes() -> None:
+def test_evaluation_arrays_have_documented_shapes() -> None:
     result = evaluate(paper_arms(5, 4, 31), TARGETS)
     assert len(result) == 5
     assert result.targets.shape == (3, 3)
@@ -53,7 +53,7 @@ def test_fixed_joints_have_columns_of_zeros() -> None:
     )
 
 
-def test_limits_are_kept_exactly() -> None:
+def test_joint_limits_hold_exactly() -> None:
     """To the last bit of a float64 reader: 2.4 rad is 2.4 rad."""
     arms = general_arms(500, 4, 33)
     q = evaluate(arms, TARGETS).q
@@ -63,13 +63,13 @@ def test_limits_are_kept_exactly() -> None:
     assert np.abs(evaluate(paper_arms(500, 4, 33), TARGETS).q).max() <= 2.4
 
 
-def test_evaluating_changes_no_input() -> None:
+def test_evaluation_does_not_change_its_input() -> None:
     targets = TARGETS.copy()
     evaluate(paper_arms(3, 4, 35), targets)
     assert np.array_equal(targets, TARGETS)
 
 
-def test_objectives_are_the_sums_of_the_method() -> None:
+def test_objectives_match_the_formulas_of_the_method() -> None:
     """E_pos = Σ |p - target| [m], E_torque = 40 Σ |τ|; `each` are their shares per target."""
     problem = Problem(load_task("target-1"))
     designs = problem.space.sample(20, 36)
@@ -84,12 +84,12 @@ def test_objectives_are_the_sums_of_the_method() -> None:
 
 
 @pytest.mark.parametrize("targets", [np.zeros((0, 3)), np.zeros((2, 2)), np.zeros(3), np.array([[0.0, np.nan, 1.0]])])
-def test_targets_that_cannot_be(targets: np.ndarray) -> None:
+def test_invalid_targets_are_refused(targets: np.ndarray) -> None:
     with pytest.raises(TaskError, match=r"finite numbers of shape \(T, 3\)"):
         evaluate(paper_arms(1, 4, 37), targets)
 
 
-def test_no_arms() -> None:
+def test_evaluation_of_no_arms_is_empty() -> None:
     with pytest.raises(ArmError, match="expected at least one arm"):
         evaluate([], TARGETS)
 
@@ -103,7 +103,7 @@ def test_no_arms() -> None:
     ],
 )
 @pytest.mark.parametrize("joints", [1, 4, 8])
-def test_designs_as_rows_give_the_same_bits(joints: int, mass: dict[str, Any]) -> None:
+def test_matrix_evaluation_equals_design_evaluation(joints: int, mass: dict[str, Any]) -> None:
     space = DesignSpace.model_validate({"joints": joints, "mass": mass, "joint_types": ("Y", "R")})
     problem = Problem(load_task("target-2"), space)
     designs = space.sample(200, seed=joints)

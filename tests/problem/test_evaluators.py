@@ -33,7 +33,7 @@ def raising(fault: BaseException) -> aw.Evaluator:
     return aw.evaluator("energy [J]")(measure)
 
 
-def test_objectives_are_those_that_the_function_names() -> None:
+def test_evaluator_defines_the_objectives() -> None:
     problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
     assert [(o.name, o.unit, o.label, o.description) for o in problem.objectives] == [
         ("reach", "m", "Reach", "How far it reaches."),
@@ -45,7 +45,7 @@ def test_objectives_are_those_that_the_function_names() -> None:
     assert problem.evaluate([designs[1]])[0] == problem.evaluate(designs)[1]
 
 
-def test_beside_our_objectives_and_constraints() -> None:
+def test_evaluator_combines_with_builtin_objectives_and_constraints() -> None:
     task = aw.Task(name="near", targets=((0.3, 0.0, 0.2),), constraints=("length <= 0.5",))
     reach, _ = measured.objectives
     problem = aw.Problem(task, SPACE, objectives=(POSITION_ERROR, reach), evaluator=measured)
@@ -70,19 +70,19 @@ def test_beside_our_objectives_and_constraints() -> None:
         (lambda arm, task: 1 / 0, r"failed: ZeroDivisionError: division by zero \(test_evaluators.py, line \d+\)"),
     ],
 )
-def test_what_a_function_gives_is_checked(made: Callable[[aw.Arm, aw.Task], float], words: str) -> None:
+def test_evaluator_results_are_validated(made: Callable[[aw.Arm, aw.Task], float], words: str) -> None:
     with pytest.raises(EvaluatorError, match=words):
         aw.evaluator("energy [J]")(made)(ARM, TASK)
 
 
-def test_the_end_of_the_process_is_a_failure_too() -> None:
+def test_system_exit_in_an_evaluator_is_a_failure() -> None:
     with pytest.raises(EvaluatorError, match="failed: SystemExit: 3"):
         raising(SystemExit(3))(ARM, TASK)
     with pytest.raises(KeyboardInterrupt):
         raising(KeyboardInterrupt())(ARM, TASK)
 
 
-def test_the_working_folder_is_that_of_before(in_folder: Path) -> None:
+def test_working_folder_is_restored_after_an_evaluation(in_folder: Path) -> None:
     """Where a solver goes elsewhere, the folder of a run is still found by its name."""
 
     @aw.evaluator("reach [m]", "joints_used", worst=(9.0, 9.0))
@@ -98,11 +98,11 @@ def test_the_working_folder_is_that_of_before(in_folder: Path) -> None:
     assert Path.cwd() == in_folder
 
 
-def test_one_number_needs_no_tuple() -> None:
+def test_evaluator_of_one_objective_may_return_a_number() -> None:
     assert aw.evaluator("energy [J]")(lambda arm, task: np.float32(0.5))(ARM, TASK) == (0.5,)
 
 
-def test_a_function_that_fails_counts_the_worst_where_that_is_stated() -> None:
+def test_failed_evaluation_counts_as_the_stated_worst() -> None:
     design = SPACE.sample(1, 0)[0]
     careful = aw.evaluator("energy [J]", worst=[50])(raising(OSError("no licence")).measure)
     outcome = aw.Problem(WHOLE, SPACE, evaluator=careful).evaluate([design])[0]
@@ -128,12 +128,12 @@ def test_a_function_that_fails_counts_the_worst_where_that_is_stated() -> None:
         ),
     ],
 )
-def test_what_is_asked_is_checked(make: Callable[[], object], words: str) -> None:
+def test_evaluator_settings_are_validated(make: Callable[[], object], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         make()
 
 
-def test_a_search_for_the_whole_front_needs_our_kernels(tmp_path: Path) -> None:
+def test_front_search_refuses_custom_evaluators(tmp_path: Path) -> None:
     problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
     with pytest.raises(SettingsError, match="only in `armwright optimize`"):
         aw.find_front(problem, budget=100, out=tmp_path / "front")
@@ -159,7 +159,7 @@ def file(in_folder: Path) -> Path:
     return in_folder / "sim.py"
 
 
-def test_a_file_is_loaded_with_what_lies_beside_it(file: Path) -> None:
+def test_evaluator_file_can_import_its_neighbours(file: Path) -> None:
     loaded = aw.load_evaluator(f"{file}:simulate")
     assert loaded.name == "sim.py:simulate"
     assert len(loaded.version) == 12
@@ -179,7 +179,7 @@ def test_a_file_is_loaded_with_what_lies_beside_it(file: Path) -> None:
         ("exits.py:f", r"cannot load exits.py: SystemExit: 3 \(exits.py, line 1\)"),
     ],
 )
-def test_what_cannot_be_loaded_is_said_in_one_line(file: Path, place: str, words: str) -> None:
+def test_unloadable_evaluator_is_one_line(file: Path, place: str, words: str) -> None:
     (file.parent / "broken.py").write_text("x = 1\ndef f(:\n")
     (file.parent / "raises.py").write_text("raise RuntimeError('at once')\n")
     (file.parent / "exits.py").write_text("raise SystemExit(3)\n")
@@ -189,7 +189,7 @@ def test_what_cannot_be_loaded_is_said_in_one_line(file: Path, place: str, words
 
 
 @pytest.mark.slow
-def test_a_run_is_resumed_with_its_evaluator_alone(file: Path) -> None:
+def test_run_is_resumed_with_its_own_evaluator(file: Path) -> None:
     """The file may be mended; that is noted. The run folder names it, and never loads it."""
     task = WHOLE
 

@@ -54,13 +54,13 @@ def three(task: Task) -> Problem:
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})
 
 
-def test_refinement_within_a_study_of_one_objective() -> None:
+def test_single_objective_study_is_refined() -> None:
     run = optimize(one(OPEN), proposer="none", n_init=3, n_total=8, refine_every=3)
     assert any(trial.refines is not None for trial in run.trials)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
-def test_an_objective_that_is_no_finite_number_is_refused(tmp_path: Path, number: float) -> None:
+def test_nonfinite_objective_is_refused(tmp_path: Path, number: float) -> None:
     broken = (POSITION_ERROR, replace(SPREAD, each=lambda e: np.full(e.position_error.shape, number)))
     with pytest.raises(SettingsError, match="objective spread of a design is"):
         optimize(Problem(OPEN, objectives=broken), proposer="none", n_total=2, out=tmp_path / "run")
@@ -83,7 +83,7 @@ def short(problem: Problem, n_total: int, out: Path | None = None) -> StudyResul
         pytest.param(three(OPEN), marks=pytest.mark.slow),
     ],
 )
-def test_a_run_completes_resumes_and_counts_right(tmp_path: Path, problem: Problem) -> None:
+def test_runs_of_one_and_three_objectives_complete_and_resume(tmp_path: Path, problem: Problem) -> None:
     short(problem, 10, tmp_path / "run")
     run = short(problem, 30, tmp_path / "run")
     assert [trial.values for trial in run.trials] == [trial.values for trial in short(problem, 30).trials]
@@ -110,7 +110,7 @@ def test_a_run_completes_resumes_and_counts_right(tmp_path: Path, problem: Probl
 
 @pytest.mark.slow
 @pytest.mark.parametrize("problem", [one(OPEN), three(OPEN)])
-def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, problem: Problem) -> None:
+def test_run_folder_is_readable_without_custom_objectives(tmp_path: Path, problem: Problem) -> None:
     run = short(problem, 12, tmp_path / "run")
     config, history = read_run(tmp_path / "run")
     names = [objective.name for objective in problem.objectives]
@@ -132,14 +132,14 @@ def test_its_folder_is_read_and_drawn_without_its_formulas(tmp_path: Path, probl
     assert (tmp_path / "run" / "trials.csv").read_text().splitlines()[0].endswith(",".join(names))
 
 
-def test_other_objectives_are_another_run(tmp_path: Path) -> None:
+def test_changed_objectives_are_refused(tmp_path: Path) -> None:
     short(three(OPEN), 3, tmp_path / "run")
     with pytest.raises(RunConflictError, match="objectives: "):
         short(Problem(OPEN), 3, tmp_path / "run")
 
 
 @pytest.mark.parametrize(("objectives", "point"), [(ONE, (5.0, 5.0)), (THREE, (5.0, 5.0)), (PAPER_OBJECTIVES, (5.0,))])
-def test_a_reference_point_for_other_objectives_is_refused(
+def test_reference_point_for_other_objectives_is_refused(
     objectives: tuple[Objective, ...], point: tuple[float, ...]
 ) -> None:
     n = len(objectives)
@@ -150,7 +150,7 @@ def test_a_reference_point_for_other_objectives_is_refused(
 LOADED = Task(name="loaded", targets=((0.3, 0.0, 0.2), (0.2, 0.2, 0.3), (0.2, -0.2, 0.4)), payload=(0.5, 0.2, 0.0))
 
 
-def test_the_named_objectives_are_what_they_say() -> None:
+def test_named_objectives_match_their_formulas() -> None:
     names = [
         "position_error",
         "torque",
@@ -191,7 +191,7 @@ def test_the_named_objectives_are_what_they_say() -> None:
         (list(OBJECTIVES)[:6], "1 to 5 different ones"),
     ],
 )
-def test_names_that_cannot_be_are_refused(names: list[str], words: str) -> None:
+def test_invalid_objective_names_are_refused(names: list[str], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         named_objectives(names)
 
@@ -217,7 +217,7 @@ def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path
         ("unreached_targets", "mass", "length", "rms_torque", "torque"),
     ],
 )
-def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: tuple[str, ...]) -> None:
+def test_task_objectives_reach_run_prompt_figures_and_page(tmp_path: Path, names: tuple[str, ...]) -> None:
     """From the task file to the folder, the prompt, the figures, the page and the search for the whole front."""
     task = LOADED.model_copy(update={"objectives": names})
     file = tmp_path / "task.yaml"
@@ -246,7 +246,7 @@ def test_objectives_of_the_task_through_the_whole_house(tmp_path: Path, names: t
     assert page.packed()
 
 
-def test_other_objectives_by_option_leave_the_task_s_reference_point(tmp_path: Path) -> None:
+def test_objectives_option_drops_a_foreign_reference_point(tmp_path: Path) -> None:
     for names in ("position_error,mass", "position_error, torque"):
         out = str(tmp_path / names[-4:])
         options = ["--objectives", names, "--n-init", "4", "--n-total", "4", "--no-figures", "--out", out]
@@ -259,7 +259,7 @@ def test_other_objectives_by_option_leave_the_task_s_reference_point(tmp_path: P
 
 
 @pytest.mark.parametrize("dof", [1, 3, 4, 6, 8])
-def test_torques_with_a_payload_are_pinocchio_s(dof: int) -> None:
+def test_torques_with_a_payload_agree_with_pinocchio(dof: int) -> None:
     """A payload is a point mass at the tip: in the URDF a massive link without length, fixed there."""
     targets, payload = np.random.default_rng(dof).uniform(-0.8, 0.8, (3, 3)), np.array([0.0, 0.7, 2.5])
     arms = general_arms(20, dof, 3)
@@ -276,7 +276,7 @@ def test_torques_with_a_payload_are_pinocchio_s(dof: int) -> None:
             assert ours == pytest.approx(torque, abs=1e-5 * load)
 
 
-def test_a_payload_changes_torques_and_nothing_else() -> None:
+def test_payload_changes_only_torques() -> None:
     designs = paper_space().sample(50, 2)
     bare, loaded = (Problem(LOADED.model_copy(update={"payload": kg})).physics(designs) for kg in (0.0, 1.0))
     assert np.array_equal(bare.q, loaded.q)
@@ -287,6 +287,6 @@ def test_a_payload_changes_torques_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("payload", [-1.0, (1.0, 2.0), 2e4, float("nan")])
-def test_a_payload_that_cannot_be_is_refused(payload: object) -> None:
+def test_invalid_payload_is_refused(payload: object) -> None:
     with pytest.raises(ValueError, match="payload"):
         Task.model_validate({"name": "x", "targets": [[0.1, 0.2, 0.3]], "payload": payload})

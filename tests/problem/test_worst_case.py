@@ -32,7 +32,7 @@ def alone() -> list[Task]:
     return [task.model_copy(update={"constraints": ROBUST.constraints}) for task in tasks]
 
 
-def test_the_worst_of_all_cases_counts() -> None:
+def test_objectives_are_the_worst_over_all_cases() -> None:
     problem = Problem(ROBUST, objectives=named_objectives(NAMES))
     rows = problem.space.matrix(problem.space.sample(60, 1))
     each = [Problem(task, objectives=named_objectives(NAMES)).evaluate_matrix(rows) for task in alone()]
@@ -47,7 +47,7 @@ def test_the_worst_of_all_cases_counts() -> None:
     assert np.all(np.abs(np.median(exact / values[:5]) - 1.0) < 0.05)  # float64 takes other ways at times
 
 
-def test_it_goes_with_a_workshop_s_tolerance() -> None:
+def test_worst_case_combines_with_build_tolerance() -> None:
     problem = Problem(ROBUST, tolerance=1e-3)
     designs = problem.space.sample(5, 2)
     both, one, other = (
@@ -56,7 +56,7 @@ def test_it_goes_with_a_workshop_s_tolerance() -> None:
     assert np.all(both >= np.maximum(one, other))
 
 
-def test_a_run_keeps_it(tmp_path: Path) -> None:
+def test_run_records_its_worst_case_settings(tmp_path: Path) -> None:
     file = tmp_path / "robust.yaml"
     file.write_text(
         yaml.safe_dump({"name": "robust", "targets": [[0.4, 0.1, 0.3]], "payload": 0.2, "target_noise": 0.01})
@@ -68,7 +68,7 @@ def test_a_run_keeps_it(tmp_path: Path) -> None:
     assert run.summary["n_trials"] == 20
 
 
-def test_the_model_is_told() -> None:
+def test_prompt_states_the_worst_case_settings() -> None:
     from armwright.llm.prompt import load_prompt
     from tests.support.fixed_problem import FixedProblem, fixed_history
 
@@ -83,7 +83,7 @@ def test_the_model_is_told() -> None:
 @pytest.mark.parametrize(
     "given", [{"target_noise": -0.1}, {"target_noise": 5.0}, {"payload_factors": [-1.0]}, {"target_noise": ".nan"}]
 )
-def test_cases_that_cannot_be_are_refused(given: dict[str, object], tmp_path: Path) -> None:
+def test_invalid_cases_are_refused(given: dict[str, object], tmp_path: Path) -> None:
     file = tmp_path / "bad.yaml"
     file.write_text(yaml.safe_dump({"name": "bad", "targets": [[0.4, 0.1, 0.3]], **given}))
     with pytest.raises(TaskError, match=str(next(iter(given)))):

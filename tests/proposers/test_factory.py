@@ -30,7 +30,7 @@ from armwright.proposers.factory import choose_proposer
         ("wait", True),
     ],
 )
-def test_an_option_without_effect_is_refused(tmp_path: Path, name: str, option: str, value: Any) -> None:
+def test_option_without_effect_is_refused(tmp_path: Path, name: str, option: str, value: Any) -> None:
     """Also if it states the default."""
     chosen, options = name.replace("x", str(tmp_path / "x")), ModelOptions(**{option: value})
     if name == "manual:x" and option in ("prompt", "memory", "proposals", "wait"):

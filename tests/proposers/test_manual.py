@@ -49,7 +49,7 @@ def pending(folder: Path, out: Path, **how: str) -> AnswerPendingError:
     return waits.value
 
 
-def test_the_command_line_takes_one_answer_after_the_other(in_folder: Path) -> None:
+def test_command_line_accepts_answers_one_by_one(in_folder: Path) -> None:
     command = (
         *("optimize", "target-1", "--proposer", "manual:ask", *model_options(wait=False)),
         *("--n-init", "4", "--n-step", "3", "--n-total", "6", "--no-figures", "--out", "run"),
@@ -118,7 +118,7 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Iterator[Answering]:
         thread.join()
 
 
-def test_waiting_for_answers_comes_to_the_same_as_going_on_with_them(tmp_path: Path, answering: Answering) -> None:
+def test_waiting_and_resuming_give_the_same_run(tmp_path: Path, answering: Answering) -> None:
     answering({"004-prompt.md": ("004-answer.md", LINES), "007-prompt.md": ("007-answer.txt", JSON)})
     waited = run(ManualProposer(tmp_path / "a"), tmp_path / "waited")
 
@@ -136,7 +136,7 @@ def test_waiting_for_answers_comes_to_the_same_as_going_on_with_them(tmp_path: P
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-def test_a_refused_answer_is_asked_for_again_while_waiting(tmp_path: Path, answering: Answering) -> None:
+def test_refused_manual_answer_is_requested_again(tmp_path: Path, answering: Answering) -> None:
     folder = tmp_path / "ask"
     answering({"004-prompt.md": ("004-answer.md", "I do not know."), "004-refused.md": ("004-answer.md", LINES)})
     result = run(ManualProposer(folder), None, n_total=1)
@@ -145,7 +145,7 @@ def test_a_refused_answer_is_asked_for_again_while_waiting(tmp_path: Path, answe
     assert "no design found" in (folder / "004-refused.md").read_text(encoding="utf-8")
 
 
-def test_each_refused_answer_is_kept(tmp_path: Path) -> None:
+def test_refused_manual_answers_are_recorded(tmp_path: Path) -> None:
     pending(tmp_path / "ask", tmp_path / "run")
     for n in (1, 2):
         (tmp_path / "ask" / "004-answer.md").write_text(f"{n}", encoding="utf-8")
@@ -157,14 +157,14 @@ def test_each_refused_answer_is_kept(tmp_path: Path) -> None:
     assert pending(tmp_path / "ask", tmp_path / "run").question.name == "007-prompt.md"
 
 
-def test_an_empty_answer_is_no_answer_yet(tmp_path: Path) -> None:
+def test_empty_answer_file_is_pending(tmp_path: Path) -> None:
     pending(tmp_path / "ask", tmp_path / "run")
     (tmp_path / "ask" / "004-answer.md").touch()
     assert pending(tmp_path / "ask", tmp_path / "run").refusal == ""
     assert (tmp_path / "ask" / "004-answer.md").exists()
 
 
-def test_several_designs_and_what_is_expected_of_them(tmp_path: Path) -> None:
+def test_manual_answer_may_hold_several_designs_and_expectations(tmp_path: Path) -> None:
     waits = pending(tmp_path / "ask", tmp_path / "run", memory="own")
     assert "EXPECTED: (E_pos, E_torque) that you expect of it" in waits.question.read_text(encoding="utf-8")
     waits.answer.write_text(LINES + "EXPECTED: (1.25, 3.5)\n", encoding="utf-8")
@@ -174,7 +174,7 @@ def test_several_designs_and_what_is_expected_of_them(tmp_path: Path) -> None:
     assert "REASON: a shoulder in the middle" in told
 
 
-def test_only_files_that_wait_are_announced(tmp_path: Path) -> None:
+def test_only_pending_files_are_announced(tmp_path: Path) -> None:
     """Neither questions that lie answered, nor trials for which a design lies ready."""
     proposer = ManualProposer(tmp_path / "ask", PromptOptions(proposals=2), wait=False)
     notes: list[str] = []
@@ -186,12 +186,12 @@ def test_only_files_that_wait_are_announced(tmp_path: Path) -> None:
     assert [note for note in notes if note] == [f"{asked} waits for your answer in {answer}" for asked, answer in files]
 
 
-def test_people_are_not_asked_while_trials_go_on(tmp_path: Path) -> None:
+def test_manual_proposer_refuses_overlap(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="in_flight does not go with the proposer manual"):
         run(ManualProposer(tmp_path / "ask"), None, in_flight=1)
 
 
-def test_a_folder_with_what_is_left_of_another_run_is_refused(tmp_path: Path) -> None:
+def test_folder_with_files_of_another_run_is_refused(tmp_path: Path) -> None:
     pending(tmp_path / "ask", tmp_path / "run")
     with pytest.raises(FailureError, match=r"004-prompt\.md is a question of another run"):
         run(ManualProposer(tmp_path / "ask", PromptOptions(prompt="minus"), wait=False), tmp_path / "other")
@@ -202,13 +202,13 @@ def test_a_folder_with_what_is_left_of_another_run_is_refused(tmp_path: Path) ->
     assert not (tmp_path / "ask" / "007-prompt.md").exists()
 
 
-def test_a_folder_that_cannot_be_one(tmp_path: Path) -> None:
+def test_invalid_answer_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(SettingsError, match="file is a file; manual needs a folder"):
         ManualProposer(tmp_path / "file", wait=False)
 
 
-def test_answers_are_kept_as_peoples(tmp_path: Path) -> None:
+def test_manual_answers_are_attributed_to_people(tmp_path: Path) -> None:
     pending(tmp_path / "ask", tmp_path / "run").answer.write_text(LINES, encoding="utf-8")
     pending(tmp_path / "ask", tmp_path / "run")
     (call,) = Transcript(tmp_path / "run" / "transcripts.jsonl").calls

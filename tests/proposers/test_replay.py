@@ -55,7 +55,7 @@ def lines(folder: Path) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("asking", [{}, {"memory": "own", "prompt": "minus"}, {"answer": "one-step"}])
-def test_a_replay_equals_its_record_to_the_bit(varied: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
+def test_replay_equals_its_recording(varied: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
     first = recorded(varied, tmp_path / "first", asking)
     varied.requests.clear()
     again = optimize(
@@ -79,13 +79,13 @@ def test_a_replay_equals_its_record_to_the_bit(varied: ChatServer, tmp_path: Pat
     assert third.summary["proposer"]["calls"] == proposer["calls"]
 
 
-def test_an_overlapped_run_is_replayed_with_its_arrivals(varied: ChatServer, tmp_path: Path) -> None:
+def test_overlapped_run_is_replayed_with_its_arrivals(varied: ChatServer, tmp_path: Path) -> None:
     recorded(varied, tmp_path / "first", {"memory": "own"}, in_flight=2)
     optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), out=tmp_path / "again", **SETTINGS)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
 
-def test_late_answers_with_several_designs_are_replayed_when_they_came(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_late_answers_are_replayed_when_they_arrived(chat_server: ChatServer, tmp_path: Path) -> None:
     """The first two calls are answered only when five black-box trials have gone by."""
     late = threading.Event()
     designs = iter(PROBLEM.space.sample(50, 3))
@@ -120,7 +120,7 @@ def test_late_answers_with_several_designs_are_replayed_when_they_came(chat_serv
     assert not chat_server.requests
 
 
-def test_failures_are_replayed_too(varied: ChatServer, tmp_path: Path) -> None:
+def test_failures_are_replayed(varied: ChatServer, tmp_path: Path) -> None:
     good = varied.answer
     varied.answer = lambda request: good(request) if len(varied.requests) not in (4, 5) else (400, "{}")
     run = recorded(varied, tmp_path / "first")
@@ -130,7 +130,7 @@ def test_failures_are_replayed_too(varied: ChatServer, tmp_path: Path) -> None:
     assert again.summary["proposer"]["failures"] == run.summary["proposer"]["failures"]
 
 
-def test_a_spent_budget_is_replayed_too(varied: ChatServer, tmp_path: Path) -> None:
+def test_exhausted_budget_is_replayed(varied: ChatServer, tmp_path: Path) -> None:
     recorded(varied, tmp_path / "first", {"max_calls": 5})
     optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), out=tmp_path / "again", **SETTINGS)
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
@@ -159,7 +159,7 @@ def interrupted_at(stop: int) -> Callable[[Progress], None]:
 
 
 @pytest.mark.parametrize("stop", [4, 6])
-def test_a_replay_that_was_stopped_goes_on(in_pairs: ChatServer, tmp_path: Path, stop: int) -> None:
+def test_interrupted_replay_resumes(in_pairs: ChatServer, tmp_path: Path, stop: int) -> None:
     """Within a call that gave two designs, too: no recorded call is played twice."""
     first = recorded(in_pairs, tmp_path / "first", {"proposals": 2})
     for watch in (interrupted_at(stop), None):
@@ -172,7 +172,7 @@ def test_a_replay_that_was_stopped_goes_on(in_pairs: ChatServer, tmp_path: Path,
     assert len(played) == first.summary["proposer"]["calls"] - 1  # the check
 
 
-def test_beyond_the_end_of_its_record_proposals_are_missing(varied: ChatServer, tmp_path: Path) -> None:
+def test_proposals_beyond_the_recording_are_missing(varied: ChatServer, tmp_path: Path) -> None:
     """Counted, told once, and the run does not pass for the model's."""
     recorded(varied, tmp_path / "first")
     notes: list[str] = []
@@ -193,7 +193,7 @@ def test_beyond_the_end_of_its_record_proposals_are_missing(varied: ChatServer, 
 
 
 @pytest.mark.parametrize("in_flight", [None, 2])
-def test_what_a_record_that_was_cut_short_still_owes_is_missing(
+def test_proposals_of_a_truncated_recording_are_missing(
     varied: ChatServer, tmp_path: Path, in_flight: int | None
 ) -> None:
     with pytest.raises(KeyboardInterrupt):
@@ -215,7 +215,7 @@ def test_what_a_record_that_was_cut_short_still_owes_is_missing(
         pytest.param({"proposals": 2}, marks=pytest.mark.slow),
     ],
 )
-def test_a_transcript_alone_is_enough(in_pairs: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
+def test_transcript_alone_can_be_replayed(in_pairs: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
     """The form of the answer and the number of designs are seen in its calls."""
     if "proposals" not in asking:
         in_pairs.answer = designer
@@ -226,7 +226,7 @@ def test_a_transcript_alone_is_enough(in_pairs: ChatServer, tmp_path: Path, aski
     assert lines(tmp_path / "again") == lines(tmp_path / "first")
 
 
-def test_what_a_transcript_cannot_say_is_taken_from_the_wishes(varied: ChatServer, tmp_path: Path) -> None:
+def test_replay_takes_settings_missing_in_the_transcript_from_options(varied: ChatServer, tmp_path: Path) -> None:
     mine = tmp_path / "mine.md"
     mine.write_text('{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}')
     recorded(varied, tmp_path / "first", {"prompt": str(mine), "memory": "own"})
@@ -262,7 +262,7 @@ def test_options_that_contradict_the_record_are_refused(chat_server: ChatServer,
         assert isinstance(choose(**option), ReplayProposer)
 
 
-def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatServer, tmp_path: Path) -> None:
+def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer, tmp_path: Path) -> None:
     recorded(varied, tmp_path / "first")
     file = tmp_path / "first" / "transcripts.jsonl"
     file.write_text(file.read_text().replace("You are an expert", "You are a layman", 1))
@@ -275,7 +275,7 @@ def test_a_prompt_that_differs_is_reported_and_strictly_an_error(varied: ChatSer
         optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first", strict=True), **SETTINGS)
 
 
-def test_a_record_of_other_settings_is_said(varied: ChatServer, tmp_path: Path) -> None:
+def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path: Path) -> None:
     """Proposals that were recorded for other trials are missing, each in words."""
     recorded(varied, tmp_path / "first")
     alone = tmp_path / "alone.jsonl"
@@ -288,7 +288,7 @@ def test_a_record_of_other_settings_is_said(varied: ChatServer, tmp_path: Path) 
     assert run.summary["proposer"]["flagged"]
 
 
-def test_what_cannot_be_replayed_is_refused(tmp_path: Path) -> None:
+def test_invalid_recordings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ReplayError, match="there is no"):
         ReplayProposer(tmp_path)
     (tmp_path / "transcripts.jsonl").write_text("")
@@ -300,7 +300,7 @@ def test_what_cannot_be_replayed_is_refused(tmp_path: Path) -> None:
         choose_proposer("rules", ModelOptions(replay_strict=True))
 
 
-def test_a_record_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
+def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
     """Not even its last line that a crash cut short."""
     recorded(varied, tmp_path / "first")
     file = tmp_path / "first" / "transcripts.jsonl"

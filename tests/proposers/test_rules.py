@@ -76,7 +76,7 @@ tasks = st.builds(
 
 @given(space=spaces, task=tasks, n=st.integers(0, 6))
 @settings(max_examples=8)
-def test_proposals_lie_in_any_space_and_repeat(space: DesignSpace, task: Task, n: int) -> None:
+def test_proposals_lie_in_any_space_and_are_reproducible(space: DesignSpace, task: Task, n: int) -> None:
     proposals(history_of(Problem(task, space), n), len(OPENING) + 4)
 
 
@@ -91,7 +91,7 @@ def test_proposals_lie_in_any_space_and_repeat(space: DesignSpace, task: Task, n
     ],
     ids=["one", "coincident", "far", "line", "plane"],
 )
-def test_no_task_is_too_odd(targets: list[tuple[float, float, float]]) -> None:
+def test_unusual_tasks_get_distinct_proposals(targets: list[tuple[float, float, float]]) -> None:
     made = proposals(history_of(Problem(task(*targets)), 3), len(OPENING) + 6)
     assert len({p.design for p in made}) == len(made)
 
@@ -108,7 +108,7 @@ def test_every_rule_proposes_within_the_space(rule: str) -> None:
     assert set(RULES) == set(EXPECTED)
 
 
-def test_a_run_repeats_no_design_and_repeats_itself() -> None:
+def test_run_has_distinct_designs_and_is_reproducible() -> None:
     settings: dict[str, Any] = {"proposer": RulesProposer(), "n_init": 3, "n_step": 1, "n_total": 40, "seed": 4}
     run = optimize(Problem(load_task("target-2")), **settings)
     again = optimize(Problem(load_task("target-2")), **settings)
@@ -117,20 +117,20 @@ def test_a_run_repeats_no_design_and_repeats_itself() -> None:
     assert {t.source for t in run.trials[3:]} == {"rules"}
 
 
-def test_nothing_within_the_reference_box_is_no_obstacle() -> None:
+def test_rules_propose_with_no_design_inside_the_reference_box() -> None:
     problem = Problem(task((0.3, 0.0, 0.3), (0.0, 0.3, 0.3), reference_point=(1e-6, 1e-6)))
     made = proposals(history_of(problem, 2), 2 * len(OPENING))
     assert len({p.design for p in made}) == len(made)
 
 
-def test_before_there_is_a_reference_point_structures_are_proposed() -> None:
+def test_structures_are_proposed_before_the_reference_point_is_known() -> None:
     problem = Problem(task((0.3, 0.0, 0.3), reference_point=None))
     history = History(problem, history_of(problem, 4).trials, n_init=100)
     assert all(p.id.endswith("-open") for p in proposals(history, 2 * len(OPENING)))
 
 
 @pytest.mark.parametrize("structure", OPENING, ids=lambda s: s.name)
-def test_a_moved_task_moves_the_arm(structure: Any) -> None:
+def test_translated_task_translates_the_arm(structure: Any) -> None:
     wide = paper_space().model_copy(update=dict.fromkeys(("origin_x", "origin_y", "origin_z"), (-5.0, 5.0)))
     at, moved = random_task(1001), np.array([0.5, -0.7, 0.2])
     there = task(*(tuple(p) for p in (at.target_positions + moved).tolist()))
@@ -141,7 +141,7 @@ def test_a_moved_task_moves_the_arm(structure: Any) -> None:
 
 
 @pytest.mark.parametrize("structure", OPENING, ids=lambda s: s.name)
-def test_x_and_y_exchanged_exchange_the_axes(structure: Any) -> None:
+def test_swapped_x_and_y_swap_the_axes(structure: Any) -> None:
     at = random_task(1002)
     a = fitted(structure, Problem(at), 5.0)
     b = fitted(structure, Problem(task(*((y, x, z) for x, y, z in at.targets))), 5.0)
@@ -150,7 +150,7 @@ def test_x_and_y_exchanged_exchange_the_axes(structure: Any) -> None:
     np.testing.assert_allclose(b.links, a.links)
 
 
-def test_the_shoulder_misses_less_than_places_beside_it() -> None:
+def test_shoulder_position_is_locally_optimal() -> None:
     targets = random_task(1003).target_positions
 
     def missed(place: np.ndarray) -> float:
@@ -163,7 +163,7 @@ def test_the_shoulder_misses_less_than_places_beside_it() -> None:
 
 
 @pytest.mark.parametrize("mass", [MassPerMetre(), MassPerLink(kind="per_link", kg=0.002)])
-def test_the_affordable_length_spends_the_budget(mass: Any) -> None:
+def test_affordable_length_spends_the_torque_budget(mass: Any) -> None:
     space = DesignSpace(mass=mass)
     length = affordable_length(space, 8, 5.0, 100.0)
     assert 8 * stretched_torque(space, length) == pytest.approx(5.0)
@@ -178,7 +178,7 @@ def test_structures_fit_any_number_of_joints(n: int) -> None:
     assert len(adapted_joints(OPENING[0].joints, paper_space(n))) == n
 
 
-def test_the_first_proposal_beats_the_median_random_design() -> None:
+def test_first_proposal_beats_the_median_random_design() -> None:
     problem = Problem(load_task("target-1"))
     first = RulesProposer().propose(history_of(problem, 10), 0, 10).design
     random = [hypervolume(row[None], (5.0, 5.0)) for row in problem.evaluate(problem.space.sample(500, 1)).values]

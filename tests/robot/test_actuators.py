@@ -49,7 +49,7 @@ def pinocchio_model(arm: Arm) -> tuple[pinocchio.Model, pinocchio.Data]:
     return model, model.createData()
 
 
-def test_the_arrays_are_those_of_the_arms_to_the_bit() -> None:
+def test_stacked_designs_and_arms_have_equal_actuators() -> None:
     designs = SPACE.sample(200, 1)
     one, other = stack_designs(SPACE, SPACE.matrix(designs)), stack_arms([SPACE.arm(design) for design in designs])
     for name in (*FLOATS, "motion", "base_mass"):
@@ -60,7 +60,7 @@ def test_the_arrays_are_those_of_the_arms_to_the_bit() -> None:
     assert np.array_equal(part.actuation.effort, one.actuation.effort[3:9])
 
 
-def test_gravity_and_dynamics_are_pinocchio_s_and_mujoco_s() -> None:
+def test_actuator_masses_agree_with_pinocchio_and_mujoco() -> None:
     rng = np.random.default_rng(0)
     problem = Problem(TASK.model_copy(update={"payload": 0.0}), SPACE)
     designs = SPACE.sample(20, 3)
@@ -82,7 +82,7 @@ def test_gravity_and_dynamics_are_pinocchio_s_and_mujoco_s() -> None:
         assert state.qfrc_inverse == pytest.approx(expected, abs=1e-8)
 
 
-def test_the_first_actuator_stands_with_the_base() -> None:
+def test_first_actuator_rests_on_the_base() -> None:
     design = SPACE.sample(1, 0)[0]
     swapped = [SPACE.design({**design.params, "motor_1": name}) for name in ("big", "mid", "small")]
     objectives = named_objectives(["peak_torque", "mass", "price"])
@@ -92,7 +92,7 @@ def test_the_first_actuator_stands_with_the_base() -> None:
     assert np.diff(values[:, 2]).tolist() == [-150.0, -200.0]
 
 
-def test_torque_use_is_the_worst_share_of_the_allowed_torque() -> None:
+def test_torque_utilisation_is_the_worst_share_of_allowed_torque() -> None:
     problem = Problem(TASK, SPACE, objectives=named_objectives(["torque_utilisation"]))
     designs = SPACE.sample(30, 5)
     torques = np.abs(problem.physics(designs).joint_torques)
@@ -102,7 +102,7 @@ def test_torque_use_is_the_worst_share_of_the_allowed_torque() -> None:
         assert use == pytest.approx(max(shares))
 
 
-def test_a_single_actuator_is_no_parameter() -> None:
+def test_single_actuator_is_not_a_parameter() -> None:
     single = DesignSpace.model_validate({"actuators": [MID]})
     assert len(single.parameters) == 11
     design = single.sample(1, 0)[0]
@@ -121,13 +121,13 @@ def test_a_single_actuator_is_no_parameter() -> None:
         ({"actuators": [MID], "safety_factor": 0.0}, "safety_factor"),
     ],
 )
-def test_what_cannot_be_built_is_refused(tmp_path: Path, space: dict, words: str) -> None:
+def test_unbuildable_actuator_settings_are_refused(tmp_path: Path, space: dict, words: str) -> None:
     (tmp_path / "space.yaml").write_text(yaml.safe_dump(space))
     with pytest.raises(SpaceError, match=words):
         load_space(tmp_path / "space.yaml")
 
 
-def test_objectives_that_need_actuators_say_so() -> None:
+def test_objectives_report_missing_actuators() -> None:
     for name in ("torque_utilisation", "price"):
         problem = Problem(TASK, objectives=named_objectives([name]))
         with pytest.raises(SettingsError, match=f"objective {name} needs actuators"):
@@ -138,12 +138,12 @@ def test_objectives_that_need_actuators_say_so() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"mass": -0.1}, {"effort": 0.0}, {"price": -1.0}, {"speed": float("inf")}])
-def test_an_actuator_that_cannot_be_is_refused(wrong: dict[str, float]) -> None:
+def test_invalid_actuator_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ArmError, match="an actuator needs"):
         Actuator(**{"name": "x", "mass": 0.1, "effort": 1.0, **wrong})
 
 
-def test_the_catalogue_names_a_source_for_each() -> None:
+def test_catalogue_names_a_source_for_each_actuator() -> None:
     records = catalogue()
     assert len(records) >= 14
     for name, record in records.items():
@@ -155,7 +155,7 @@ def test_the_catalogue_names_a_source_for_each() -> None:
     assert records["XM430-W350"].mass == 0.082
 
 
-def test_actuators_through_the_whole_house(tmp_path: Path) -> None:
+def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
     """Space file, run, rules, prompt, folder, page, URDF limits, build sheet, command."""
     task = TASK.model_copy(update={"objectives": ("worst_error", "torque_utilisation", "price")})
     run = optimize(Problem(task, SPACE), proposer="rules", n_init=6, n_step=3, n_total=18, out=tmp_path / "run")
@@ -186,7 +186,7 @@ def test_actuators_through_the_whole_house(tmp_path: Path) -> None:
     assert "XM430-W350" in listed
 
 
-def test_a_record_is_the_same_after_a_round_trip() -> None:
+def test_actuator_record_round_trips() -> None:
     again = DesignSpace.model_validate(json.loads(SPACE.model_dump_json()))
     assert again == SPACE
     assert ActuatorRecord.model_validate(BIG).actuator("rated", 2.0).effort == 2.0
@@ -212,7 +212,7 @@ def open_manipulator_x() -> Arm:
 
 
 @pytest.mark.parametrize(("payload", "holds"), [(0.0, True), (0.5, True), (1.0, False)])
-def test_open_manipulator_x_carries_what_its_maker_says_and_not_twice_that(payload: float, holds: bool) -> None:
+def test_open_manipulator_x_carries_its_rated_payload_but_not_twice(payload: float, holds: bool) -> None:
     """0.5 kg at a reach of 0.38 m, by the stall torque of its XM430-W350 at 12 V: the maker's specification."""
     reached = (0.012 + 0.378, 0.0, 0.017 + 0.0595)  # the shoulder's height, 2 mm short of the stretched arm
     evaluation = evaluate([open_manipulator_x()], [reached], payload=payload)

@@ -24,7 +24,7 @@ LINK = uniform_link((0.0, 0.3, 0.4), 0.2, 0.015)
         ("revolute", "w", -1.0, 1.0, '"w" is not one of x, y, z'),
     ],
 )
-def test_joints_that_cannot_be(kind: str, axis: str, lower: float, upper: float, words: str) -> None:
+def test_invalid_joints_are_refused(kind: str, axis: str, lower: float, upper: float, words: str) -> None:
     """An unknown kind in particular: it is never taken for a fixed joint."""
     with pytest.raises(ArmError, match=words):
         Joint(kind, axis, lower, upper)
@@ -40,14 +40,14 @@ def test_joints_that_cannot_be(kind: str, axis: str, lower: float, upper: float,
         ((0.0, 0.0, 0.1), 0.1, (0.0, -math.inf, 0.0), 0.01, "finite"),
     ],
 )
-def test_links_that_cannot_be(
+def test_invalid_links_are_refused(
     offset: tuple[float, ...], mass: float, com: tuple[float, ...], radius: float, words: str
 ) -> None:
     with pytest.raises(ArmError, match=words):
         Link(offset, mass, com, radius)
 
 
-def test_arms_that_cannot_be() -> None:
+def test_invalid_arms_are_refused() -> None:
     for joints, links in (((), ()), ((TURN,), ()), ((TURN,), (LINK, LINK)), ((TURN, TURN), (LINK,))):
         with pytest.raises(ArmError, match=f"{len(joints)} joints, {len(links)} links"):
             Arm((0.0, 0.0, 0.0), joints, links)
@@ -55,29 +55,29 @@ def test_arms_that_cannot_be() -> None:
         Arm((0.0, math.nan, 0.0), (TURN,), (LINK,))
 
 
-def test_a_mistake_in_an_arm_is_the_users_to_repair() -> None:
+def test_arm_errors_are_user_errors() -> None:
     assert issubclass(ArmError, UsageError)
     assert ArmError.exit_code == 2
 
 
-def test_uniform_link() -> None:
+def test_uniform_link_has_its_mass_at_half_length() -> None:
     """Its centre of mass lies half way; its length is the distance from joint to joint."""
     assert LINK.com == (0.0, 0.15, 0.2)
     assert LINK.length == pytest.approx(0.5)
     assert uniform_link((0.0, 0.0, 0.0), 0.1, 0.01).length == 0.0
 
 
-def test_reach() -> None:
+def test_reach_is_the_stretched_length_and_longest_stroke() -> None:
     """All links in one line, and the longest stroke, whichever way it goes; turning adds nothing."""
     slide = Joint("prismatic", "z", -0.3, 0.1)
     assert Arm((5.0, 5.0, 5.0), (TURN, Joint("fixed", "x"), slide), (LINK,) * 3).reach == pytest.approx(1.8)
 
 
-def test_a_fixed_joint_needs_no_limits() -> None:
+def test_fixed_joint_needs_no_limits() -> None:
     assert (Joint("fixed", "x").lower, Joint("fixed", "x").upper) == (0.0, 0.0)
 
 
-def test_arms_are_values() -> None:
+def test_arms_are_hashable_values() -> None:
     """Equal by content, usable as keys, and never changed."""
     one, other = (Arm((0.0, 0.0, 0.0), (TURN,), (LINK,)) for _ in range(2))
     assert one == other

@@ -99,7 +99,7 @@ def test_names_limits_and_masses() -> None:
         assert np.allclose(model.body_mass, [0.0, 0.0, *stated], rtol=1e-9, atol=1e-11)  # nor has the base any
 
 
-def test_the_tip_is_where_the_arm_has_it() -> None:
+def test_mjcf_tip_matches_the_arm() -> None:
     """And each link's frame at its joint."""
     for arm in ARMS:
         simulated = Simulated(arm)
@@ -112,7 +112,7 @@ def test_the_tip_is_where_the_arm_has_it() -> None:
             assert np.abs(simulated.data.xpos[2:] - places[:-1]).max() < 1e-9
 
 
-def test_gravity_torque_is_that_of_the_urdf() -> None:
+def test_mjcf_gravity_torque_matches_the_urdf() -> None:
     """What qfrc_bias is at rest; both files have the same ten digits."""
     for arm in ARMS:
         simulated = Simulated(arm)
@@ -123,7 +123,7 @@ def test_gravity_torque_is_that_of_the_urdf() -> None:
             assert np.abs(simulated.data.qfrc_bias - torque).max() < 1e-12 * load(arm)
 
 
-def test_gravity_torque_is_that_of_the_reference() -> None:
+def test_mjcf_gravity_torque_matches_the_reference() -> None:
     for arm in TURNING:
         simulated, chain = Simulated(arm), reference.chains([arm])
         for q in postures(arm):
@@ -132,7 +132,7 @@ def test_gravity_torque_is_that_of_the_reference() -> None:
             assert np.abs(simulated.data.qfrc_bias - torque).max() < 1e-9 * load(arm)
 
 
-def test_motion_is_that_of_the_urdf() -> None:
+def test_mjcf_motion_matches_the_urdf() -> None:
     """Any torques on joints that move anyhow: Pinocchio's inverse dynamics of MuJoCo's accelerations gives them back.
 
     So inertias, centres of mass and motors are the URDF's, each motor on its own joint.
@@ -166,7 +166,7 @@ def test_gravity_torques_hold_the_posture() -> None:
     assert np.mean(falls) > 0.8  # not one whose only joint slides or turns level
 
 
-def test_what_is_drawn_touches_nothing() -> None:
+def test_mjcf_geometry_has_no_contacts() -> None:
     """Folded onto itself, an arm is held as any other; a cylinder for each link and a ball for each joint are seen."""
     joints = tuple(Joint("revolute", "y", -3.2, 3.2) for _ in range(4))
     arm = Arm((0.0, 0.0, 0.5), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4)
@@ -206,7 +206,7 @@ def test_joints_have_the_colours_of_the_urdf() -> None:
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0, 0.2), (0.0, 0.0, 0.0), (1e-15, 0.0, 0.0)])
 @pytest.mark.parametrize("mass", [0.0, 1e-13])
-def test_an_arm_without_mass_compiles(offset: tuple[float, float, float], mass: float) -> None:
+def test_massless_arm_compiles(offset: tuple[float, float, float], mass: float) -> None:
     link = Link(offset, mass, (0.0, 0.0, 0.1), 0.015)
     for kind in ("revolute", "prismatic"):
         simulated = Simulated(Arm((0.0, 0.0, 0.0), (Joint(kind, "y", -1.0, 1.0),) * 2, (link, link)))
@@ -217,7 +217,7 @@ def test_an_arm_without_mass_compiles(offset: tuple[float, float, float], mass: 
         assert np.all(np.isfinite(simulated.data.qpos))
 
 
-def test_an_arm_that_does_not_move_compiles() -> None:
+def test_immobile_arm_compiles() -> None:
     simulated = Simulated(Arm((0.0, 0.0, 1.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.1, 0.2), 1.0, 0.02),)))
     simulated.put(np.zeros(0))
     assert (simulated.model.nq, simulated.model.nu) == (0, 0)
@@ -238,7 +238,7 @@ def test_names_are_escaped(name: str) -> None:
     assert bytes(Simulated(MIXED, name).model.names).split(b"\0")[0].decode() == name
 
 
-def test_same_arm_same_text() -> None:
+def test_export_is_deterministic() -> None:
     """Nothing but the arm and its name is in it."""
     assert to_mjcf(MIXED) == to_mjcf(MIXED)
     assert to_mjcf(MIXED).startswith('<?xml version="1.0"?>\n<mujoco model="arm">')

@@ -18,7 +18,7 @@ def text_of(element: ElementTree.Element) -> str:
 
 
 @pytest.mark.parametrize("arm", ARMS)
-def test_without_its_tags_it_is_the_urdf(arm: Arm) -> None:
+def test_ros2_control_without_its_tags_is_the_urdf(arm: Arm) -> None:
     robot, urdf = ElementTree.fromstring(to_ros2_control(arm, "x")), ElementTree.fromstring(to_urdf(arm, "x"))
     (system,) = robot.findall("ros2_control")
     robot.remove(system)
@@ -27,14 +27,14 @@ def test_without_its_tags_it_is_the_urdf(arm: Arm) -> None:
 
 
 @pytest.mark.parametrize("arm", ARMS)
-def test_parsers_of_urdf_take_it(arm: Arm) -> None:
+def test_urdf_parsers_accept_ros2_control(arm: Arm) -> None:
     text = to_ros2_control(arm)
     assert Peer(text).model.nq == mujoco.MjModel.from_xml_string(text).nq == len(moving(arm))
     assert yourdfpy.URDF.load(io.BytesIO(text.encode())).validate()
 
 
 @pytest.mark.parametrize("arm", ARMS)
-def test_interfaces_are_those_of_the_joints_that_move_within_the_limits_of_the_urdf(arm: Arm) -> None:
+def test_interfaces_match_moving_joints_and_urdf_limits(arm: Arm) -> None:
     """As ros2_control reads them: command_interface and state_interface with param min, max and initial_value."""
     robot = ElementTree.fromstring(to_ros2_control(arm))
     (system,) = robot.findall("ros2_control")
@@ -61,12 +61,12 @@ def test_interfaces_are_those_of_the_joints_that_move_within_the_limits_of_the_u
         assert stated["lower"] <= float(start.text or "") <= stated["upper"]
 
 
-def test_the_plugin_can_be_another_and_is_escaped() -> None:
+def test_plugin_is_configurable_and_escaped() -> None:
     for plugin in ("gz_ros2_control/GazeboSimSystem", "<&>"):
         robot = ElementTree.fromstring(to_ros2_control(MIXED, plugin=plugin))
         assert robot.findtext("ros2_control/hardware/plugin") == plugin
 
 
-def test_an_arm_that_does_not_move_has_no_interfaces() -> None:
+def test_immobile_arm_has_no_interfaces() -> None:
     arm = Arm((0.0, 0.0, 1.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.1, 0.2), 1.0, 0.02),))
     assert ElementTree.fromstring(to_ros2_control(arm)).findall("ros2_control/joint") == []

@@ -65,7 +65,7 @@ def test_names_axes_limits_and_masses(arm: Arm) -> None:
 
 
 @EVERY_ARM
-def test_joints_and_tip_are_where_the_arm_has_them(arm: Arm) -> None:
+def test_sdf_joints_and_tip_match_the_arm(arm: Arm) -> None:
     loaded, peer = Loaded(arm), peer_of(arm)
     for q in postures(arm):
         loaded.put(q)
@@ -76,7 +76,7 @@ def test_joints_and_tip_are_where_the_arm_has_them(arm: Arm) -> None:
 
 
 @EVERY_ARM
-def test_gravity_and_inertia_are_those_of_the_urdf(arm: Arm) -> None:
+def test_sdf_gravity_and_inertia_match_the_urdf(arm: Arm) -> None:
     loaded, peer = Loaded(arm), peer_of(arm)
     for q in postures(arm):
         loaded.put(q)
@@ -87,7 +87,7 @@ def test_gravity_and_inertia_are_those_of_the_urdf(arm: Arm) -> None:
         assert np.abs(difference).max(initial=0.0) < 1e-9 * load(arm) * max(1.0, arm.reach)
 
 
-def test_collisions_and_sights_are_stated() -> None:
+def test_sdf_states_collisions_and_visuals() -> None:
     """A cylinder for each link that has a length, from its joint to the next; a ball for each joint."""
     model = ElementTree.fromstring(to_sdf(MIXED)).find("model")
     assert model is not None
@@ -98,7 +98,7 @@ def test_collisions_and_sights_are_stated() -> None:
     assert len(set(names)) == len(names)
 
 
-def test_links_on_the_edge_load() -> None:
+def test_degenerate_links_load() -> None:
     """Without mass, without length or with next to nothing of either; none has no mass or no inertia in the file."""
     rng = np.random.default_rng(44)
     edge = [(0.0, 0.02, 0.0), (1e-13, 0.02, 0.1), (1.0, 1e-9, 0.1), (1.0, 0.02, 1e-15)]
@@ -116,7 +116,7 @@ def test_links_on_the_edge_load() -> None:
             assert float(inertial.findtext("mass", "")) >= 1e-12
 
 
-def test_an_arm_that_does_not_move_loads() -> None:
+def test_immobile_arm_loads() -> None:
     loaded = Loaded(Arm((0.0, 0.0, 1.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.1, 0.2), 1.0, 0.02),)))
     assert loaded.plant.num_positions() == 0
     assert np.allclose(loaded.pose("tip")[:3, 3], [0.0, 0.1, 1.2])
@@ -129,11 +129,11 @@ def test_names_are_escaped(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["", " ", "world", "a::b", "__model__"])
-def test_names_that_sdformat_keeps_are_refused(name: str) -> None:
+def test_names_reserved_by_sdformat_are_refused(name: str) -> None:
     with pytest.raises(ArmError, match=f'name = "{name}"'):
         to_sdf(MIXED, name)
 
 
-def test_same_arm_same_text() -> None:
+def test_export_is_deterministic() -> None:
     assert to_sdf(MIXED) == to_sdf(MIXED)
     assert to_sdf(MIXED).startswith('<?xml version="1.0"?>\n<sdf version="1.9">')

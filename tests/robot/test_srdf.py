@@ -72,7 +72,7 @@ def short_arms(n: int, seed: int) -> list[Arm]:
 PROVEN_OF = [*paper_arms(5, 4, 51), *odd_arms(5, 4, 52), *short_arms(30, 53), MIXED]
 
 
-def test_what_is_proven_is_so() -> None:
+def test_disabled_collision_pairs_agree_with_coal() -> None:
     """In 50 postures each, and at the limits: pairs said to meet never or always do as said, and there are both."""
     reasons: Counter[str] = Counter()
     for arm in PROVEN_OF:
@@ -90,7 +90,7 @@ def test_what_is_proven_is_so() -> None:
     assert reasons["Always"] > 10
 
 
-def test_what_is_clear_is_proven() -> None:
+def test_clear_collision_pairs_are_disabled() -> None:
     """Of pairs with two joints between, in 500 postures: where 5 mm of air are left beyond both radii, it is proven.
 
     Beyond the radii, as what is proven is proven of cylinders with round ends.
@@ -109,7 +109,7 @@ def test_what_is_clear_is_proven() -> None:
     assert clear > 2
 
 
-def test_neighbours_and_what_is_joined_rigidly_are_adjacent() -> None:
+def test_neighbouring_and_rigidly_joined_links_are_adjacent() -> None:
     """Through a link without length, too, and through fixed joints; nothing is said of links that are not solid."""
     turning, fixed = Joint("revolute", "y", -3.1, 3.1), Joint("fixed", "x")
     long, none = uniform_link((0.0, 0.0, 0.3), 1.0, 0.02), Link((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0), 0.02)
@@ -119,14 +119,14 @@ def test_neighbours_and_what_is_joined_rigidly_are_adjacent() -> None:
     assert settled == {(0, 2): "Adjacent", (2, 3): "Adjacent", (2, 4): "Adjacent", (3, 4): "Adjacent"}
 
 
-def test_of_what_folds_onto_itself_nothing_is_said() -> None:
+def test_links_that_fold_onto_each_other_are_not_disabled() -> None:
     joints = tuple(Joint("revolute", "y", -3.1, 3.1) for _ in range(4))
     arm = Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4)
     assert set(disabled_collision_pairs(arm).values()) == {"Adjacent"}
     assert len(disabled_collision_pairs(arm)) == 3
 
 
-def test_links_that_turn_about_their_own_line_never_meet_beyond_a_neighbour() -> None:
+def test_coaxial_links_never_collide_beyond_a_neighbour() -> None:
     """Only yaw, over any range: the line stays a line."""
     joints = tuple(Joint("revolute", "z", -6.0, 6.0) for _ in range(4))
     settled = disabled_collision_pairs(Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4))
@@ -134,7 +134,7 @@ def test_links_that_turn_about_their_own_line_never_meet_beyond_a_neighbour() ->
 
 
 @pytest.mark.parametrize("arm", ARMS)
-def test_pinocchio_takes_the_pairs_and_the_home(arm: Arm) -> None:
+def test_pinocchio_loads_pairs_and_home_posture(arm: Arm) -> None:
     geometry, text = Geometry(arm), to_srdf(arm)
     before = geometry.pairs()
     pinocchio.removeCollisionPairsFromXML(geometry.model, geometry.geometry, text)
@@ -145,7 +145,7 @@ def test_pinocchio_takes_the_pairs_and_the_home(arm: Arm) -> None:
         assert home == pytest.approx([min(max(0.0, j.lower), j.upper) for _, j in moving(arm)])
 
 
-def test_the_group_is_the_chain_from_base_to_tip() -> None:
+def test_srdf_group_is_the_chain_from_base_to_tip() -> None:
     """By the names of the URDF, which has no other leaf; group_state names joints that move, alone."""
     srdf, urdf = ElementTree.fromstring(to_srdf(MIXED, "mixed")), ElementTree.fromstring(to_urdf(MIXED, "mixed"))
     assert srdf.get("name") == urdf.get("name")
@@ -167,7 +167,7 @@ numbers = st.lists(st.floats(-1.0, 1.0).map(lambda value: round(value, 3)), min_
 
 
 @given(numbers)
-def test_distance_of_segments_is_the_bounded_least_squares(values: list[float]) -> None:
+def test_segment_distance_agrees_with_bounded_least_squares(values: list[float]) -> None:
     """Also of parallel ones, of points, and of ones that cross."""
     a, b, c, d = np.array(values).reshape(4, 3)
     found = segment_distance(a[None], b[None], c[None], d[None])[0]
@@ -180,5 +180,5 @@ def test_names_are_escaped(name: str) -> None:
     assert ElementTree.fromstring(to_srdf(ARMS[0], name)).get("name") == name
 
 
-def test_same_arm_same_text() -> None:
+def test_export_is_deterministic() -> None:
     assert to_srdf(MIXED) == to_srdf(MIXED)

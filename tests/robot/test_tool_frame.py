@@ -48,7 +48,7 @@ EVERY_FORMAT = pytest.mark.parametrize("tip", FORMATS.values(), ids=FORMATS)
 
 
 @EVERY_FORMAT
-def test_the_tip_points_as_the_tool_at_zero(tip: Callable[[Arm, Array], Array]) -> None:
+def test_tip_has_the_tool_orientation_at_zero(tip: Callable[[Arm, Array], Array]) -> None:
     """All 24 turns of a cube, straight up and down included, and any other."""
     signed = [
         (s * np.eye(3)[i], t * np.eye(3)[j])
@@ -66,14 +66,14 @@ def test_the_tip_points_as_the_tool_at_zero(tip: Callable[[Arm, Array], Array]) 
 
 @EVERY_FORMAT
 @pytest.mark.parametrize("arm", ARMS)
-def test_the_tip_is_where_the_arm_has_it_and_turns_with_it(arm: Arm, tip: Callable[[Arm, Array], Array]) -> None:
+def test_exported_tip_pose_matches_the_arm(arm: Arm, tip: Callable[[Arm, Array], Array]) -> None:
     for q in postures(arm, 3):
         pose = tip(arm, q)
         assert np.abs(pose[:3, 3] - joint_positions(arm, full(arm, q))[-1]).max() < 1e-9
         assert np.abs(pose - peer_of(arm).tip(q)).max() < 1e-9
 
 
-def test_a_sliding_joint_has_the_force_of_its_actuator() -> None:
+def test_sliding_joint_has_the_force_of_its_actuator() -> None:
     """Effort over travel and speed times travel: 1.5 N m at 0.02 m/rad are 75 N; 4 rad/s are 0.08 m/s."""
     arm = ARMS[-1]
     model = peer_of(arm).model

@@ -86,7 +86,7 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_what_is_exported_is_read_back(file: Path, seed: int) -> None:
+def test_exported_urdf_is_read_back(file: Path, seed: int) -> None:
     arm = any_arm(seed, ("revolute", "prismatic"))
     file.write_text(to_urdf(arm))
     read = read_urdf(file)
@@ -97,7 +97,7 @@ def test_what_is_exported_is_read_back(file: Path, seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_frames_may_stand_as_they_like(file: Path, seed: int) -> None:
+def test_link_frames_may_have_any_orientation(file: Path, seed: int) -> None:
     """The same arm, whichever way its links' frames are turned and its axes point."""
     arm = any_arm(seed, ("revolute", "prismatic"))
     file.write_text(with_frames_anyhow(arm, seed))
@@ -114,7 +114,7 @@ def test_fixed_joints_are_merged(file: Path, seed: int) -> None:
         assert np.allclose(ours, theirs, atol=1e-10)
 
 
-def test_zero_is_moved_where_axes_are_askew(file: Path) -> None:
+def test_skew_axes_move_the_zero_posture(file: Path) -> None:
     """Joints at right angles, each off its zero: other angles mean the same postures."""
     moved = 0
     for seed in range(12):
@@ -130,7 +130,7 @@ def test_zero_is_moved_where_axes_are_askew(file: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_robots_for_sale(name: str) -> None:
+def test_commercial_robots_agree_with_pinocchio(name: str) -> None:
     """Merged bodies, fingers held at 0, axes of either sign, moved zeros: as Pinocchio sees the whole file."""
     path = robot(name)
     joints, error = ROBOTS[name]
@@ -153,7 +153,7 @@ def test_robots_for_sale(name: str) -> None:
         assert joint.effort == (pytest.approx(effort) if 0.0 < effort < np.inf else None)
 
 
-def test_the_tip_and_what_is_said_of_it() -> None:
+def test_tip_is_chosen_and_reported() -> None:
     panda = robot("panda")
     assert read_urdf(panda).tip == "panda_hand_tcp"
     assert 'the tip is the link "panda_hand_tcp" (--tip names another)' in read_urdf(panda).notes
@@ -180,7 +180,7 @@ def one_joint(joint: str = 'type="revolute"', inside: str = '<limit lower="-1" u
     )
 
 
-def test_limits(file: Path) -> None:
+def test_urdf_limits_are_converted(file: Path) -> None:
     """Without 0 between them, against the axis, and as far as the kernels go."""
     file.write_text(one_joint(inside='<axis xyz="0 -2 0"/><limit lower="0.5" upper="1.5" effort="3"/>'))
     (joint,) = read_urdf(file).arm.joints
@@ -192,7 +192,7 @@ def test_limits(file: Path) -> None:
     assert any("turns from -20 to 7 rad" in note for note in read.notes)
 
 
-def test_axes_are_snapped_only_so_far(file: Path) -> None:
+def test_axes_are_snapped_within_tolerance(file: Path) -> None:
     for off, fits in ((0.9 * SNAP, True), (1.1 * SNAP, False)):
         file.write_text(one_joint(inside=f'<axis xyz="{np.sin(off)} 0 {np.cos(off)}"/><limit lower="-1" upper="1"/>'))
         if fits:
@@ -241,7 +241,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("number", range(len(REFUSED)))
-def test_broken_and_hostile_files_are_refused_in_one_line(file: Path, number: int) -> None:
+def test_damaged_and_hostile_files_are_refused_in_one_line(file: Path, number: int) -> None:
     text, words = list(REFUSED.items())[number]
     file.write_text(text)
     with pytest.raises(ArmError, match=words) as refusal:
@@ -251,7 +251,7 @@ def test_broken_and_hostile_files_are_refused_in_one_line(file: Path, number: in
     assert len(str(refusal.value)) < 500 + len(str(file))
 
 
-def test_files_that_are_too_large_or_none(file: Path) -> None:
+def test_missing_and_oversized_files_are_refused(file: Path) -> None:
     file.write_bytes(b" " * (LARGEST_FILE + 1))
     with pytest.raises(ArmError, match="at most 4 MiB"):
         read_urdf(file)
@@ -261,7 +261,7 @@ def test_files_that_are_too_large_or_none(file: Path) -> None:
         read_urdf(file.parent / "none.urdf")
 
 
-def test_a_chain_of_ten_thousand_links(file: Path) -> None:
+def test_chain_of_ten_thousand_links_is_read(file: Path) -> None:
     """Nothing recurses."""
     n = 10_000
     links = "".join(f'<link name="{i}"/>' for i in range(n + 1))

@@ -42,7 +42,7 @@ def cylinder_inertia(link: Link) -> np.ndarray:
 
 
 @EVERY_ARM
-def test_pinocchio_sees_the_arm(arm: Arm) -> None:
+def test_urdf_in_pinocchio_matches_the_arm(arm: Arm) -> None:
     """Masses (with all that is fixed to a joint), limits and axes; no root joint is needed."""
     model = pinocchio.buildModelFromXML(to_urdf(arm))
     assert list(model.names)[1:] == [f"joint_{number}" for number, _ in moving(arm)]
@@ -56,7 +56,7 @@ def test_pinocchio_sees_the_arm(arm: Arm) -> None:
 
 
 @EVERY_ARM
-def test_mujoco_sees_the_arm(arm: Arm) -> None:
+def test_urdf_in_mujoco_matches_the_arm(arm: Arm) -> None:
     """base and tip are bodies of their own; mass, centre and inertia of each link, limits and axes."""
     model = mujoco.MjModel.from_xml_string(to_urdf(arm))
     bodies = [model.body(i).name for i in range(model.nbody)]
@@ -80,7 +80,7 @@ def test_mujoco_sees_the_arm(arm: Arm) -> None:
 
 
 @EVERY_ARM
-def test_yourdfpy_sees_the_arm(arm: Arm) -> None:
+def test_urdf_in_yourdfpy_matches_the_arm(arm: Arm) -> None:
     """Every inertia is that of a solid cylinder about its centre of mass, and one that a body can have."""
     urdf = yourdfpy.URDF.load(io.BytesIO(to_urdf(arm).encode()))
     assert urdf.validate()
@@ -105,7 +105,7 @@ def test_yourdfpy_sees_the_arm(arm: Arm) -> None:
 
 @EVERY_ARM
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_scikit_robot_sees_the_arm(arm: Arm) -> None:
+def test_urdf_in_scikit_robot_matches_the_arm(arm: Arm) -> None:
     """Masses, limits and axes; and the tip stands at the straight arm's."""
     from skrobot.model import RobotModel
 
@@ -130,7 +130,7 @@ def test_links_without_length_load_in_mujoco() -> None:
         assert mujoco.MjModel.from_xml_string(to_urdf(Arm((0.0, 0.0, 0.0), (joint,), (link,)))).nv == 1
 
 
-def test_an_arm_without_mass_has_none_anywhere() -> None:
+def test_massless_arm_has_no_mass_in_any_parser() -> None:
     """Where no inertia is stated, MuJoCo would take water's density and scikit-robot 1 g a link."""
     links = (Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.015), Link((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.015))
     arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -1.0, 1.0),) * 2, links)
@@ -146,7 +146,7 @@ def test_names_are_escaped(name: str) -> None:
     assert mujoco.MjModel.from_xml_string(text).nv == 4
 
 
-def test_same_arm_same_text() -> None:
+def test_export_is_deterministic() -> None:
     """Written to a run folder and compared: no time, no order of a dictionary in it."""
     assert to_urdf(ARMS[0]) == to_urdf(ARMS[0])
     assert to_urdf(ARMS[0]).startswith('<?xml version="1.0"?>\n<robot name="arm">')

@@ -36,12 +36,12 @@ def assert_same(urdf: str, arm: Arm, prefix: str = "") -> None:
 
 @EVERY_ARM
 @pytest.mark.parametrize("mass_per_metre", [0.0, 0.7])
-def test_by_default_it_is_the_urdf(arm: Arm, mass_per_metre: float) -> None:
+def test_xacro_defaults_to_the_urdf(arm: Arm, mass_per_metre: float) -> None:
     assert_same(processed(to_xacro(arm, mass_per_metre=mass_per_metre)), arm)
 
 
 @EVERY_ARM
-def test_yourdfpy_and_mujoco_see_the_same_as_of_the_urdf(arm: Arm) -> None:
+def test_xacro_and_urdf_agree_in_yourdfpy_and_mujoco(arm: Arm) -> None:
     text = processed(to_xacro(arm))
     seen, ours = (yourdfpy.URDF.load(io.BytesIO(urdf.encode())).robot for urdf in (text, to_urdf(arm)))
     assert [link.name for link in seen.links] == [link.name for link in ours.links]
@@ -68,7 +68,7 @@ def test_yourdfpy_and_mujoco_see_the_same_as_of_the_urdf(arm: Arm) -> None:
 
 
 @EVERY_ARM
-def test_arguments_change_the_arm_as_they_say(arm: Arm) -> None:
+def test_xacro_arguments_change_the_arm(arm: Arm) -> None:
     """Any length, radius, mass, mass at the end and base, against the arm built by hand with them."""
     rng = np.random.default_rng(45)
     slope = 0.3
@@ -95,13 +95,13 @@ MASSES = (
 )
 
 
-def test_all_mass_models_are_tried() -> None:
+def test_xacro_cases_cover_all_mass_models() -> None:
     models = get_args(get_args(MassModel)[0])
     assert {get_args(model.model_fields["kind"].annotation)[0] for model in models} == {m["kind"] for m in MASSES}
 
 
 @pytest.mark.parametrize("mass", MASSES, ids=lambda mass: mass["kind"])
-def test_a_changed_length_is_that_of_the_space(mass: dict[str, object]) -> None:
+def test_xacro_length_matches_the_design_space(mass: dict[str, object]) -> None:
     """A design's xacro with the lengths and the base of another is the arm that the space builds of that other."""
     space = DesignSpace.model_validate({"mass": mass, "actuators": ["XM430-W350"], "joints": 5})
     one, other = space.sample(2, 46)
@@ -113,7 +113,7 @@ def test_a_changed_length_is_that_of_the_space(mass: dict[str, object]) -> None:
     assert_same(processed(text, **arguments), space.arm(other))
 
 
-def test_a_mass_that_is_all_in_the_length_leaves_nothing_beside_it() -> None:
+def test_mass_proportional_to_length_leaves_no_remainder() -> None:
     """Else rounding would make a link of its own of 1e-18 kg."""
     for length in np.random.default_rng(47).uniform(0.01, 1.0, 200).tolist():
         arm = Arm((0.0, 0.0, 0.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.0, length), 0.7 * length, 0.02),))
@@ -123,7 +123,7 @@ def test_a_mass_that_is_all_in_the_length_leaves_nothing_beside_it() -> None:
         assert argument.get("default") == "0.0"
 
 
-def test_a_prefix_stands_before_all_names_but_the_world() -> None:
+def test_prefix_applies_to_all_names_except_world() -> None:
     text = processed(to_xacro(MIXED), prefix="left_")
     assert_same(text, MIXED, "left_")
     robot = ElementTree.fromstring(text)
@@ -131,7 +131,7 @@ def test_a_prefix_stands_before_all_names_but_the_world() -> None:
     assert [name for name in names if not name.startswith("left_")] == ["world"]
 
 
-def test_a_link_may_lose_its_length_and_gain_one() -> None:
+def test_link_length_may_become_zero_or_positive() -> None:
     text = processed(to_xacro(MIXED), link_1_length=0, link_3_length=0.2)
     first = replace(MIXED.links[0], offset=(0.0, 0.0, 0.0), com=(0.0, 0.0, 0.0))
     third = replace(MIXED.links[2], offset=(0.0, 0.0, 0.2))
@@ -167,5 +167,5 @@ def test_names_are_escaped_and_never_evaluated(name: str) -> None:
     assert Peer(text).model.name == name
 
 
-def test_same_arm_same_text() -> None:
+def test_export_is_deterministic() -> None:
     assert to_xacro(MIXED) == to_xacro(MIXED)

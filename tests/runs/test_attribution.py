@@ -32,7 +32,7 @@ def history(trials: list[tuple[str, tuple[int, int]]], problem: Problem = BOUNDE
 
 
 @given(TRIALS)
-def test_what_the_sources_brought_adds_up_to_the_run(trials: list[tuple[str, tuple[int, int]]]) -> None:
+def test_attribution_adds_up_to_the_run(trials: list[tuple[str, tuple[int, int]]]) -> None:
     past = history(trials)
     attribution = attribution_by_source(past)
     assert list(attribution) == list(dict.fromkeys(trial.source for trial in past))
@@ -44,7 +44,7 @@ def test_what_the_sources_brought_adds_up_to_the_run(trials: list[tuple[str, tup
 
 
 @given(TRIALS)
-def test_the_curves_add_up_at_every_iteration_and_end_at_the_credit(trials: list[tuple[str, tuple[int, int]]]) -> None:
+def test_attribution_curves_add_up_and_end_at_the_totals(trials: list[tuple[str, tuple[int, int]]]) -> None:
     past = history(trials)
     attribution, gained, members = attribution_by_source(past), gained_by_source(past), front_by_source(past)
     assert gained is not None
@@ -59,7 +59,7 @@ def test_the_curves_add_up_at_every_iteration_and_end_at_the_credit(trials: list
         assert np.sum(list(members.values()), axis=0)[1:].tolist() == sizes
 
 
-def test_a_trial_gains_what_it_adds_when_it_enters() -> None:
+def test_trial_gains_the_hypervolume_it_adds_on_entry() -> None:
     """(1, 1) adds nothing more to (1, 0) once that is there; before it, it would have."""
     past = history([("", (16, 16)), ("", (20, 0)), ("", (8, 8)), ("rules", (4, 4)), ("bbo", (4, 0)), ("rules", (4, 4))])
     gains = hypervolume_gains(past)
@@ -69,7 +69,7 @@ def test_a_trial_gains_what_it_adds_when_it_enters() -> None:
     assert attribution_by_source(past)["rules"].front == 0
 
 
-def test_without_a_reference_point_there_is_no_hypervolume_to_share() -> None:
+def test_attribution_without_a_reference_point_has_no_hypervolume() -> None:
     past = history([("", (4, 4)), ("", (8, 0))], OPEN)
     assert hypervolume_gains(past) is None
     assert gained_by_source(past) is None
@@ -77,6 +77,6 @@ def test_without_a_reference_point_there_is_no_hypervolume_to_share() -> None:
     assert front_by_source(past)["random"].tolist() == [2]
 
 
-def test_no_trials_no_credit() -> None:
+def test_attribution_without_trials_is_empty() -> None:
     assert attribution_by_source(history([])) == {}
     assert front_by_source(history([], OPEN)) == {}

@@ -113,7 +113,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
 # Pause and stop.
 
 
-def test_a_paused_study_adds_no_trial_until_it_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paused_study_adds_no_trial_until_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "run"
     looks: list[tuple[int, str, int]] = []
     notes: list[str] = []
@@ -138,7 +138,7 @@ def test_a_paused_study_adds_no_trial_until_it_goes_on(tmp_path: Path, monkeypat
     assert lines(out) == lines(tmp_path / "undisturbed")
 
 
-def test_a_watcher_elsewhere_sees_the_pause_and_ends_it(tmp_path: Path) -> None:
+def test_another_thread_can_resume_a_paused_study(tmp_path: Path) -> None:
     out = tmp_path / "run"
     watcher = threading.Thread(
         target=lambda: (wait_until(lambda: status(out).doing == "paused"), resume_study(out)), daemon=True
@@ -163,7 +163,7 @@ def test_ctrl_c_ends_a_paused_study(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize(("proposer", "number"), [("rules", 0), ("none", 3), ("rules", 4), ("rules", 11)])
-def test_a_stopped_study_goes_on_as_if_it_had_not_been(tmp_path: Path, proposer: str, number: int) -> None:
+def test_stopped_study_resumes_identically(tmp_path: Path, proposer: str, number: int) -> None:
     out = tmp_path / "run"
     with pytest.raises(StoppedError, match=r"stopped as asked; every finished trial is in .*run/, and the same com"):
         run(out, proposer, watch=after(number, lambda: stop_study(out)))
@@ -175,12 +175,12 @@ def test_a_stopped_study_goes_on_as_if_it_had_not_been(tmp_path: Path, proposer:
     assert lines(out) == lines(tmp_path / "whole")
 
 
-def test_a_stop_after_the_last_trial_has_nothing_to_stop(tmp_path: Path) -> None:
+def test_stop_after_the_last_trial_has_no_effect(tmp_path: Path) -> None:
     result = run(tmp_path / "run", watch=after(12, lambda: stop_study(tmp_path / "run")))
     assert len(result.trials) == 13
 
 
-def test_a_paused_study_can_be_stopped(tmp_path: Path) -> None:
+def test_paused_study_can_be_stopped(tmp_path: Path) -> None:
     out = tmp_path / "run"
 
     def watch(progress: Progress) -> None:
@@ -193,7 +193,7 @@ def test_a_paused_study_can_be_stopped(tmp_path: Path) -> None:
     assert len(lines(out)) == 7
 
 
-def test_a_stop_ends_the_questions_under_way(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_stop_cancels_calls_in_flight(chat_server: ChatServer, tmp_path: Path) -> None:
     out, held = tmp_path / "run", threading.Event()
 
     def answer(request: Request) -> Answer:
@@ -209,7 +209,7 @@ def test_a_stop_ends_the_questions_under_way(chat_server: ChatServer, tmp_path: 
     assert len(run(out, asks(chat_server), in_flight=1).trials) == 13
 
 
-def test_what_was_asked_of_an_earlier_session_is_past_but_its_hints(tmp_path: Path) -> None:
+def test_only_hints_survive_an_earlier_session(tmp_path: Path) -> None:
     """Also where that session came to no trial."""
     out = tmp_path / "run"
     out.mkdir()
@@ -221,7 +221,7 @@ def test_what_was_asked_of_an_earlier_session_is_past_but_its_hints(tmp_path: Pa
     assert read_control(out) == Control(hints=(hint,))
 
 
-def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in_folder: Path) -> None:
+def test_stopped_command_exits_as_after_ctrl_c(chat_server: ChatServer, in_folder: Path) -> None:
     out = in_folder / "run"
 
     def answer(request: Request) -> Answer:
@@ -252,7 +252,7 @@ def test_a_command_that_is_stopped_ends_as_by_ctrl_c(chat_server: ChatServer, in
     assert "resumed at trial 11 of 16" in done.stdout
 
 
-def test_a_cell_that_is_stopped_has_failed_in_words(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_stopped_cell_reports_its_failure(chat_server: ChatServer, tmp_path: Path) -> None:
     method: dict[str, Any] = {"label": "LLM", "proposer": "llm", "n_step": 3}
     method["model_options"] = {"model": "m", "base_url": chat_server.url}
     plan = ExperimentPlan.model_validate(
@@ -300,13 +300,13 @@ def hostile() -> Mapping[str, bytes]:
 
 
 @pytest.mark.parametrize("name", hostile())
-def test_a_file_that_is_damaged_or_foreign_asks_for_nothing(tmp_path: Path, name: str) -> None:
+def test_damaged_control_file_is_ignored(tmp_path: Path, name: str) -> None:
     (tmp_path / CONTROL).write_bytes(hostile()[name])
     assert read_control(tmp_path) == Control()
     assert add_hint(tmp_path, "and it can be written anew") == Hint(1, "and it can be written anew")
 
 
-def test_a_study_goes_on_beside_a_damaged_file(tmp_path: Path) -> None:
+def test_study_continues_beside_a_damaged_control_file(tmp_path: Path) -> None:
     out = tmp_path / "run"
     contents = list(hostile().values())
 
@@ -321,7 +321,7 @@ def test_a_study_goes_on_beside_a_damaged_file(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes in folders here")
 @pytest.mark.parametrize("make", [os.mkdir, getattr(os, "mkfifo", None), lambda path: os.symlink(path, path)])
-def test_what_is_no_file_asks_for_nothing(tmp_path: Path, make: Callable[[Path], None]) -> None:
+def test_control_path_that_is_not_a_file_is_ignored(tmp_path: Path, make: Callable[[Path], None]) -> None:
     make(tmp_path / CONTROL)
     assert read_control(tmp_path) == Control()
     make(tmp_path / STATUS)
@@ -345,7 +345,7 @@ def test_watchers_do_not_overwrite_each_other(tmp_path: Path) -> None:
     assert len({hint.text for hint in there.hints}) == 40
 
 
-def test_hints_that_cannot_be_taken_are_refused_in_words(tmp_path: Path) -> None:
+def test_invalid_hints_are_refused_with_a_reason(tmp_path: Path) -> None:
     for text, length in (("", "0"), (" \n\t", "0"), ("x" * (MAX_HINT_LENGTH + 1), "2,001")):
         with pytest.raises(SettingsError, match=f"expected a hint of 1 to 2,000 characters, got {length}"):
             add_hint(tmp_path, text)
@@ -407,14 +407,14 @@ class Faulty(Proposer):
         return Proposal(history.problem.space.sample(1, seed)[0], f"faulty-{number:04d}")
 
 
-def test_the_last_fault_is_said_until_a_question_is_answered(tmp_path: Path) -> None:
+def test_status_shows_the_last_fault_until_the_next_answer(tmp_path: Path) -> None:
     faults: list[str] = []
     run(tmp_path / "run", Faulty(), watch=lambda progress: faults.append(status(tmp_path / "run").fault))
     assert faults == [""] * 5 + [r"it did not answer \udcff"] * 4 + [""] * (len(faults) - 9)
     assert len(faults) == 16  # 13 trials, 3 questions
 
 
-def test_a_study_that_breaks_says_why(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_status_of_a_failed_study_names_the_error(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = lambda request: (401, '{"error": {"message": "no such key"}}')
     with pytest.raises(ModelError, match="no such key"):
         run(tmp_path / "run", asks(chat_server))
@@ -425,14 +425,14 @@ def test_a_study_that_breaks_says_why(chat_server: ChatServer, tmp_path: Path) -
     assert "no such key" in status(tmp_path / "run").fault
 
 
-def test_a_status_that_cannot_be_written_is_no_matter(tmp_path: Path) -> None:
+def test_unwritable_status_does_not_stop_the_study(tmp_path: Path) -> None:
     out = tmp_path / "run"
     (out / STATUS).mkdir(parents=True)
     assert len(run(out).trials) == 13
     assert (out / STATUS).is_dir()
 
 
-def test_a_run_without_a_folder_has_no_channel(in_folder: Path) -> None:
+def test_run_without_a_folder_has_no_control(in_folder: Path) -> None:
     stop_study(in_folder)
     assert len(run(None).trials) == 13
     assert {path.name for path in in_folder.iterdir()} <= set(control.CHANNEL_FILES)
@@ -451,7 +451,7 @@ def prompts_with_hints(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("asking", [{}, {"answer": "one-step", "memory": "own"}, {"prompt": "minus"}])
-def test_a_hint_goes_into_the_next_prompt_once(chat_server: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
+def test_hint_enters_the_next_prompt_once(chat_server: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
     """Whether the run is interrupted or not; in the transcript no other call has a word of hints."""
     out = tmp_path / "run"
 
@@ -475,9 +475,7 @@ def test_a_hint_goes_into_the_next_prompt_once(chat_server: ChatServer, tmp_path
     assert sum(NOTE in prompt for prompt in chat_server.prompts()) == 1
 
 
-def test_several_hints_stand_in_a_list_and_later_ones_wait_for_the_next_prompt(
-    chat_server: ChatServer, tmp_path: Path
-) -> None:
+def test_several_hints_form_a_list_and_later_ones_wait(chat_server: ChatServer, tmp_path: Path) -> None:
     out = tmp_path / "run"
 
     def watch(progress: Progress) -> None:
@@ -494,7 +492,7 @@ def test_several_hints_stand_in_a_list_and_later_ones_wait_for_the_next_prompt(
     }  # fmt: skip
 
 
-def test_a_hint_that_came_to_no_model_goes_with_the_next_question(
+def test_hint_lost_with_a_failed_call_enters_the_next_prompt(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One that the model refused does not: else it would be refused for ever."""
@@ -514,7 +512,7 @@ def test_a_hint_that_came_to_no_model_goes_with_the_next_question(
     assert [call.fault for call in calls(out)] == [None, "server", "rejected", None]
 
 
-def test_a_hint_of_a_question_that_was_interrupted_is_asked_again(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_hint_of_an_interrupted_call_is_sent_again(chat_server: ChatServer, tmp_path: Path) -> None:
     """With the same words; and once it was answered, the second call of the same proposal has no hint."""
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
@@ -533,7 +531,7 @@ def test_a_hint_of_a_question_that_was_interrupted_is_asked_again(chat_server: C
     assert hints_of(calls(out), "llm-0004") == (Hint(1, "first"),)
 
 
-def test_questions_that_are_asked_together_share_no_hint(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_concurrent_calls_share_no_hint(chat_server: ChatServer, tmp_path: Path) -> None:
     out = tmp_path / "run"
     out.mkdir()
     add_hint(out, "first")
@@ -550,7 +548,7 @@ def test_questions_that_are_asked_together_share_no_hint(chat_server: ChatServer
     assert len(used_hints(calls(out))) == 1
 
 
-def test_another_hint_of_the_same_number_is_another_hint(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_reused_hint_number_is_a_new_hint(chat_server: ChatServer, tmp_path: Path) -> None:
     """Numbers begin anew where control.json was deleted."""
     out = tmp_path / "run"
 
@@ -562,7 +560,7 @@ def test_another_hint_of_the_same_number_is_another_hint(chat_server: ChatServer
     assert used_hints(calls(out)) == {Hint(1, "first"): "llm-0004", Hint(1, "second"): "llm-0007"}
 
 
-def test_what_is_shown_is_what_is_sent(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_previewed_hints_are_those_sent(chat_server: ChatServer, tmp_path: Path) -> None:
     out = tmp_path / "run"
     run(out, asks(chat_server), n_total=3)
     plain = preview_after(out).prompt
@@ -579,7 +577,7 @@ def test_what_is_shown_is_what_is_sent(chat_server: ChatServer, tmp_path: Path) 
 PAPER = FixedProblem(load_task("target-1"))
 
 
-def test_a_prompt_without_hints_is_as_it_was() -> None:
+def test_prompt_without_hints_is_unchanged() -> None:
     history = fixed_history(PAPER)
     for name in ("plus", "minus"):
         prompt = load_prompt(name)
@@ -587,7 +585,7 @@ def test_a_prompt_without_hints_is_as_it_was() -> None:
             assert prompt.render(history, 3, hints=hints) == prompt.render(history, 3)
 
 
-def test_a_hint_stays_in_its_line() -> None:
+def test_hint_stays_on_one_line() -> None:
     hint = "first\n\n# Your turn\nORIGIN: (9, 9, 9)\x1b[2J {{ 1 + 1 }} {% endblock %} " + "x" * 1900
     told = load_prompt("plus").render(fixed_history(PAPER), 3, hints=[hint, "second"]).splitlines()
     (line,) = [line for line in told if line.startswith("- first")]
@@ -597,14 +595,14 @@ def test_a_hint_stays_in_its_line() -> None:
 
 
 @pytest.mark.parametrize("template", ["Be brief.", "{{ targets }}", "{% set told = hints %}Be brief."])
-def test_a_template_that_makes_nothing_of_hints_has_them_at_its_end(template: str) -> None:
+def test_template_without_hints_gets_them_appended(template: str) -> None:
     own, history = Prompt("own", template), fixed_history(PAPER)
     plain = own.render(history, 3)
     assert own.render(history, 3, hints=["first"]) == f"{plain}\n{NOTE}first\n"
     assert own.render(history, 3, hints=["first", "second"]) == f"{plain}\n{NOTES}- first\n- second\n"
 
 
-def test_a_template_that_extends_ours_has_them_where_ours_has() -> None:
+def test_extended_template_places_hints_as_the_builtin_one() -> None:
     history = fixed_history(PAPER)
     for own in (
         Prompt("own", '{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}'),
@@ -617,12 +615,12 @@ def test_a_template_that_extends_ours_has_them_where_ours_has() -> None:
     assert emptied.render(history, 3, hints=["first"]).endswith(f"\n\n{NOTE}first\n")
 
 
-def test_a_template_may_put_them_as_it_likes() -> None:
+def test_template_may_place_hints_itself() -> None:
     own = Prompt("own", "{% for hint in hints %}!{{ hint | upper }}{% endfor %} Go.")
     assert own.render(fixed_history(PAPER), 3, hints=["first", "second"]) == "!FIRST!SECOND Go.\n"
 
 
-def test_a_run_with_a_template_that_knows_no_hints(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_run_with_a_template_without_hints_sends_them(chat_server: ChatServer, tmp_path: Path) -> None:
     out, own = tmp_path / "run", tmp_path / "own.md"
     own.write_text("{{ targets }} End with ORIGIN, JOINTS and LINKS.")
     run(out, asks(chat_server, prompt=str(own)), watch=after(5, lambda: add_hint(out, "first")))
@@ -630,7 +628,7 @@ def test_a_run_with_a_template_that_knows_no_hints(chat_server: ChatServer, tmp_
     assert ends == ["", f"\n{NOTE}first\n", ""]
 
 
-def test_a_run_with_hints_is_replayed_to_the_letter(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: Path) -> None:
     """The replay's own control.json adds nothing; and a replay can be replayed."""
 
     def answer(request: Request) -> Answer:
@@ -653,7 +651,7 @@ def test_a_run_with_hints_is_replayed_to_the_letter(chat_server: ChatServer, tmp
     assert not chat_server.requests
 
 
-def test_people_who_answer_by_files_get_no_hints(tmp_path: Path) -> None:
+def test_manual_proposer_gets_no_hints(tmp_path: Path) -> None:
     """Their question has to stay the same until it is answered."""
     out, folder = tmp_path / "run", tmp_path / "ask"
     for _ in range(2):

@@ -51,7 +51,7 @@ def exported(run: Path, kind: str, *options: str) -> str:
 @pytest.mark.parametrize(
     "as_urdf", [lambda run: exported(run, "ros2_control"), lambda run: processed(exported(run, "xacro"))]
 )
-def test_what_becomes_a_urdf_is_the_design(run: Path, history: History, as_urdf: Callable[[Path], str]) -> None:
+def test_exports_that_become_urdf_match_the_design(run: Path, history: History, as_urdf: Callable[[Path], str]) -> None:
     arm, peer = history.member(3).arm, Peer(as_urdf(run))
     assert peer.model.name == f"{HOSTILE}-3"
     for q in postures(arm):
@@ -59,7 +59,7 @@ def test_what_becomes_a_urdf_is_the_design(run: Path, history: History, as_urdf:
         assert np.abs(peer.gravity(q) - peer_of(arm).gravity(q)).max() < 1e-9 * load(arm)
 
 
-def test_the_xacro_of_a_design_grows_as_its_space_says(run: Path, history: History) -> None:
+def test_exported_xacro_follows_the_mass_model(run: Path, history: History) -> None:
     design, space = history.member(3).design, history.problem.space
     longer = space.design({**design.params, "link_2": 0.3})
     peer = Peer(processed(exported(run, "xacro"), link_2_length=0.3))
@@ -70,7 +70,7 @@ def test_the_xacro_of_a_design_grows_as_its_space_says(run: Path, history: Histo
         assert np.abs(peer.gravity(q) - peer_of(space.arm(longer)).gravity(q)).max() < 1e-9 * load(space.arm(longer))
 
 
-def test_the_sdf_is_the_design(run: Path, history: History) -> None:
+def test_exported_sdf_matches_the_design(run: Path, history: History) -> None:
     plant = MultibodyPlant(0.0)
     (model,) = Parser(plant).AddModelsFromString(exported(run, "sdf"), "sdf")
     plant.Finalize()
@@ -80,7 +80,7 @@ def test_the_sdf_is_the_design(run: Path, history: History) -> None:
         assert plant.GetJointActuatorByName(f"joint_{number}").effort_limit() == pytest.approx(joint.actuator.effort)
 
 
-def test_the_srdf_belongs_to_the_urdf(run: Path) -> None:
+def test_exported_srdf_matches_the_urdf(run: Path) -> None:
     urdf, srdf = exported(run, "urdf"), exported(run, "srdf")
     assert ElementTree.fromstring(urdf).get("name") == ElementTree.fromstring(srdf).get("name")
     model = pinocchio.buildModelFromXML(urdf)
@@ -88,7 +88,7 @@ def test_the_srdf_belongs_to_the_urdf(run: Path) -> None:
     assert np.array_equal(model.referenceConfigurations["home"], np.zeros(4))
 
 
-def test_every_format_is_told_and_written(run: Path, tmp_path: Path) -> None:
+def test_every_export_format_is_listed_and_written(run: Path, tmp_path: Path) -> None:
     told = CliRunner().invoke(app, ["export", "--help"], env={"COLUMNS": "300"}).output
     for kind in FORMATS:
         assert kind in told

@@ -41,7 +41,7 @@ def assert_same(one: History, other: History) -> None:
 
 
 @given(trials, st.lists(st.integers(0, 20), max_size=6), st.integers(0, 20), st.data())
-def test_a_history_that_grew_is_the_history_of_all_its_trials(
+def test_grown_history_equals_a_new_history(
     rows: list[tuple[object, tuple[int, int], float, str]], steps: list[int], found_at: int, data: st.DataObject
 ) -> None:
     """Whatever was asked of it on the way; the reference point may be found on the way, too."""
@@ -62,7 +62,7 @@ def test_a_history_that_grew_is_the_history_of_all_its_trials(
         assert_same(one, History(PROBLEM, tuple(one.trials), 2, one.frozen_reference_point))
 
 
-def test_only_new_trials_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_grown_history_evaluates_only_new_trials(monkeypatch: pytest.MonkeyPatch) -> None:
     added: list[object] = []
     built: list[int] = []
     add, member = FrontTracker.add, History.member

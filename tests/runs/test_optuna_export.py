@@ -138,7 +138,7 @@ def verdicts_of(folder: Path, history: History) -> dict[int, str]:
     return {member.number: "robust" if member.number in robust else "sensitive" for member in history.front}
 
 
-def test_the_runs_show_what_can_differ_between_trials(run: Path) -> None:
+def test_exported_runs_cover_all_trial_fields(run: Path) -> None:
     """Or the comparison above would pass over parameters, attributes and notes that no trial has."""
     with opened(run / STUDY_DB) as study:
         assert len({len(trial.params) for trial in study.trials}) > 1
@@ -188,7 +188,7 @@ def test_optuna_computes_the_same_hypervolume(plain: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("which", ["run", "plain"])
-def test_optuna_draws_an_exported_study(which: str, request: pytest.FixtureRequest) -> None:
+def test_optuna_plots_an_exported_study(which: str, request: pytest.FixtureRequest) -> None:
     matplotlib.use("agg")
     folder = request.getfixturevalue(which)
     _, history = read_run(folder)
@@ -214,7 +214,7 @@ def test_optuna_draws_an_exported_study(which: str, request: pytest.FixtureReque
         plt.close("all")
 
 
-def test_the_dashboards_own_reader_finds_the_front_in_the_note(run: Path) -> None:
+def test_dashboard_note_lists_the_front(run: Path) -> None:
     _, history = read_run(run)
     assert history.front
     with opened(run / STUDY_DB) as study:
@@ -223,7 +223,7 @@ def test_the_dashboards_own_reader_finds_the_front_in_the_note(run: Path) -> Non
         assert f"| {member.number} | {member.design.joints} |" in note
 
 
-def test_each_design_of_the_front_has_its_urdf_as_an_artifact(run: Path, tmp_path: Path) -> None:
+def test_front_designs_have_urdf_artifacts(run: Path, tmp_path: Path) -> None:
     _, history = read_run(run)
     store = FileSystemArtifactStore(run / ARTIFACTS)
     front = {member.number for member in history.front}
@@ -240,7 +240,7 @@ def test_each_design_of_the_front_has_its_urdf_as_an_artifact(run: Path, tmp_pat
     assert len(list((run / ARTIFACTS).iterdir())) == len(front)
 
 
-def test_a_search_continues_in_the_exported_study(plain: Path, tmp_path: Path) -> None:
+def test_exported_study_can_be_continued(plain: Path, tmp_path: Path) -> None:
     """And an export never replaces what it added."""
     database, problem = tmp_path / STUDY_DB, Problem(load_task("target-1"))
     export_study(plain, database)
@@ -300,7 +300,7 @@ def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_search_for_the_whole_front_is_exported(tmp_path: Path) -> None:
+def test_front_search_is_exported(tmp_path: Path) -> None:
     found = find_front(Problem(load_task("target-1")), budget=1000, out=tmp_path / "front")
     with opened(export_study(tmp_path / "front").database) as study:
         assert sorted(trial.values for trial in study.best_trials) == sorted(list(m.values) for m in found.front)
@@ -309,7 +309,7 @@ def test_a_search_for_the_whole_front_is_exported(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
-def test_a_folder_whose_name_is_no_text_is_exported(plain: Path, tmp_path: Path) -> None:
+def test_folder_with_an_undecodable_name_is_exported(plain: Path, tmp_path: Path) -> None:
     folder = tmp_path / os.fsdecode(b"run-\xff")
     folder.mkdir()
     for name in ("config.yaml", "trials.jsonl", "summary.json"):
@@ -318,7 +318,7 @@ def test_a_folder_whose_name_is_no_text_is_exported(plain: Path, tmp_path: Path)
         assert study.study_name == "run-?"
 
 
-def test_a_failed_export_leaves_no_database(plain: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_export_leaves_no_database(plain: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(study: optuna.Study, trials: Any) -> None:
         next(trials)
         raise StorageInternalError("database or disk is full")
@@ -331,7 +331,7 @@ def test_a_failed_export_leaves_no_database(plain: Path, tmp_path: Path, monkeyp
     export_study(plain, tmp_path / STUDY_DB)
 
 
-def test_refusals_of_an_export(plain: Path, tmp_path: Path) -> None:
+def test_invalid_exports_are_refused(plain: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(RunFolderError, match="cannot write"):
         export_study(plain, tmp_path / "file" / "study.db")

@@ -29,7 +29,7 @@ def history(designs: list[tuple[str, Design]], problem: Problem = TARGET_2, n_in
 
 
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=8))
-def test_multiples_of_a_step_are_round_however_they_were_computed(steps: list[int]) -> None:
+def test_multiples_of_a_step_count_as_round(steps: list[int]) -> None:
     assert are_round([n * 0.05 for n in steps], 0.05)
     assert are_round([sum([0.05] * n) for n in steps], 0.01)
     assert are_round([n / 20 + 9e-10 for n in steps], 0.05)
@@ -38,7 +38,7 @@ def test_multiples_of_a_step_are_round_however_they_were_computed(steps: list[in
     assert are_round([*(n / 20 for n in steps), 0.11], 0.01)
 
 
-def test_the_proposers_habits_stand_beside_the_black_boxs() -> None:
+def test_proposer_bias_is_compared_with_the_black_box() -> None:
     past = history(
         [
             ("random", design(links=(0.1, 0.1, 0.1, 0.1))),
@@ -62,7 +62,7 @@ def test_the_proposers_habits_stand_beside_the_black_boxs() -> None:
     assert (found.proposer.near_repeats, found.black_box.near_repeats) == (0.25, 0.5)
 
 
-def test_where_the_targets_have_no_symmetry_no_base_can_be_on_it() -> None:
+def test_asymmetric_targets_have_no_bases_on_symmetry_planes() -> None:
     found = proposer_bias(history([("rules", design())], WITHOUT_SYMMETRY), "rules")
     assert found.symmetry_planes == 0
     assert found.proposer is not None
@@ -70,7 +70,7 @@ def test_where_the_targets_have_no_symmetry_no_base_can_be_on_it() -> None:
     assert found.black_box is None
 
 
-def test_uniform_designs_have_no_habits() -> None:
+def test_uniform_designs_have_no_bias() -> None:
     drawn = TARGET_2.space.sample(300, 0)
     found = proposer_bias(history([("bbo", d) for d in drawn]), "rules")
     assert found.proposer is None
@@ -81,7 +81,7 @@ def test_uniform_designs_have_no_habits() -> None:
 
 
 @given(st.integers(0, 6), st.floats(-3e-3, 3e-3))
-def test_near_repeats_are_within_a_millimetre_in_every_number(place: int, moved: float) -> None:
+def test_near_repeats_differ_by_at_most_a_millimetre(place: int, moved: float) -> None:
     numbers = np.array([0.11, 0.12, 0.13, 0.1, 0.15, 0.2, 0.25])
     numbers[place] += moved
     other = design(tuple(numbers[:3].tolist()), links=tuple(numbers[3:].tolist()))
@@ -91,12 +91,12 @@ def test_near_repeats_are_within_a_millimetre_in_every_number(place: int, moved:
         assert near.tolist() == [False, abs(moved) < 1e-3]
 
 
-def test_other_joints_are_no_repeat() -> None:
+def test_designs_with_other_joints_are_not_repeats() -> None:
     exact, near = repeated(history([("bbo", design()), ("rules", design(joints="YPPP")), ("rules", design())]))
     assert exact.tolist() == near.tolist() == [False, False, True]
 
 
-def test_whether_the_share_of_the_front_grows() -> None:
+def test_front_share_growth_is_detected() -> None:
     """Every trial here is on the front as long as none is better in both."""
     values = [(5.0, 1.0), (4.0, 2.0), (3.0, 3.0), (2.0, 4.0), (1.0, 5.0)]
 

@@ -44,7 +44,7 @@ def folder(run: StudyResult) -> Path:
     return run.folder
 
 
-def test_the_files_of_a_run(run: StudyResult) -> None:
+def test_run_folder_has_the_documented_files(run: StudyResult) -> None:
     names = {path.name for path in folder(run).iterdir()} - {".lock"}
     results = {"trials.csv", "front.csv", "summary.json", "designs"}
     assert names == {"config.yaml", "trials.jsonl", "status.json", *results}
@@ -61,7 +61,7 @@ def test_trials_are_one_json_line_each(run: StudyResult) -> None:
         assert set(line["seconds"]) == {"total", "sampling", "evaluation", "proposing"}
 
 
-def test_config_repeats_the_run(run: StudyResult) -> None:
+def test_config_reproduces_the_run(run: StudyResult) -> None:
     config = yaml.safe_load((folder(run) / "config.yaml").read_text())
     assert config["task"]["targets"][0] == [-0.45, -0.45, -0.45]
     assert config["method"] == {
@@ -81,7 +81,7 @@ def test_config_repeats_the_run(run: StudyResult) -> None:
     assert list(history) == list(run.trials)
 
 
-def test_summary(run: StudyResult) -> None:
+def test_summary_has_the_documented_keys(run: StudyResult) -> None:
     summary = json.loads((folder(run) / "summary.json").read_text())
     assert summary == read_summary(folder(run)) == run.summary
     assert list(summary) == [
@@ -117,13 +117,13 @@ def test_summary(run: StudyResult) -> None:
     assert summary["proposer_bias"]["proposer"]["designs"] == 2
 
 
-def test_without_a_proposer_there_is_nothing_to_diagnose() -> None:
+def test_run_without_a_proposer_has_no_proposer_bias() -> None:
     summary = optimize(PROBLEM, proposer="none", n_init=2, n_total=2).summary
     assert summary["proposer_bias"] is None
     assert list(summary["attribution"]) == ["random", "bbo"]
 
 
-def test_designs_of_the_front(run: StudyResult) -> None:
+def test_front_designs_are_written_with_their_values(run: StudyResult) -> None:
     written = sorted(path.name for path in (folder(run) / "designs").iterdir())
     assert written == sorted(f"{member.number:04d}" for member in run.front)
     assert run.front
@@ -142,7 +142,7 @@ def test_designs_of_the_front(run: StudyResult) -> None:
         assert (place / "arm.urdf").read_text() == to_urdf(member.arm, name=f"target-1-{member.number}")
 
 
-def test_tables(run: StudyResult) -> None:
+def test_csv_tables_match_the_run(run: StudyResult) -> None:
     with open(folder(run) / "trials.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 13
@@ -160,7 +160,7 @@ def test_designs_that_left_the_front_are_removed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", [1, 20, 100])
-def test_a_cut_last_line_is_dropped_and_the_trial_made_again(run: StudyResult, tmp_path: Path, cut: int) -> None:
+def test_truncated_last_trial_is_repeated(run: StudyResult, tmp_path: Path, cut: int) -> None:
     trials = folder(run) / "trials.jsonl"
     whole = trials.read_bytes()
     trials.write_bytes(whole[:-cut])
@@ -170,7 +170,7 @@ def test_a_cut_last_line_is_dropped_and_the_trial_made_again(run: StudyResult, t
     assert len(trials.read_bytes().splitlines()) == 13
 
 
-def test_everything_but_config_and_trials_can_be_deleted(run: StudyResult, tmp_path: Path) -> None:
+def test_derived_files_are_rewritten(run: StudyResult, tmp_path: Path) -> None:
     summary = (folder(run) / "summary.json").read_bytes()
     for name in ("summary.json", "trials.csv", "front.csv"):
         (folder(run) / name).unlink()
@@ -196,7 +196,7 @@ def test_everything_but_config_and_trials_can_be_deleted(run: StudyResult, tmp_p
         (lambda lines: [re.sub(rb'"seconds": .*', b'"seconds": 3}', lines[0]), *lines[1:]], "seconds"),
     ],
 )
-def test_damaged_trials_are_named_by_line_and_left_alone(
+def test_damaged_trials_are_reported_by_line_and_kept(
     run: StudyResult, tmp_path: Path, damage: object, words: str
 ) -> None:
     trials = folder(run) / "trials.jsonl"
@@ -209,27 +209,27 @@ def test_damaged_trials_are_named_by_line_and_left_alone(
     assert trials.read_bytes() == content
 
 
-def test_a_damaged_config_is_named(run: StudyResult, tmp_path: Path) -> None:
+def test_damaged_config_is_reported(run: StudyResult, tmp_path: Path) -> None:
     (folder(run) / "config.yaml").write_text("task: [")
     with pytest.raises(RunFolderError, match=r"config.yaml is not valid YAML"):
         short(tmp_path / "run")
 
 
-def test_results_without_their_trials_are_not_taken_over(run: StudyResult, tmp_path: Path) -> None:
+def test_results_without_trials_are_not_overwritten(run: StudyResult, tmp_path: Path) -> None:
     (folder(run) / "trials.jsonl").unlink()
     with pytest.raises(RunConflictError, match=r"holds results of a run .* but no trial in trials.jsonl"):
         short(tmp_path / "run")
     assert (folder(run) / "summary.json").exists()
 
 
-def test_trials_without_their_config_are_not_taken_over(run: StudyResult, tmp_path: Path) -> None:
+def test_trials_without_a_config_are_not_overwritten(run: StudyResult, tmp_path: Path) -> None:
     (folder(run) / "config.yaml").unlink()
     with pytest.raises(RunFolderError, match=r"cannot read config.yaml"):
         short(tmp_path / "run")
 
 
 @pytest.mark.parametrize("name", ["figures/mine.png", "notes.txt", "config.yaml", "designs/0001/arm.urdf"])
-def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, name: str) -> None:
+def test_folder_with_foreign_files_is_not_touched(tmp_path: Path, name: str) -> None:
     (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
     (tmp_path / name).write_text("mine: 1\n")
     with pytest.raises(ArmwrightError, match=r"holds no run|unknown key"):
@@ -237,7 +237,7 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, name: str) -> N
     assert (tmp_path / name).read_text() == "mine: 1\n"
 
 
-def test_a_folder_that_is_no_run_folder(tmp_path: Path) -> None:
+def test_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="not a run folder"):
         read_run(tmp_path)
     (tmp_path / "file").write_text("")
@@ -245,7 +245,7 @@ def test_a_folder_that_is_no_run_folder(tmp_path: Path) -> None:
         short(tmp_path / "file")
 
 
-def test_a_full_disk_is_one_line_and_what_was_written_is_safe(tmp_path: Path) -> None:
+def test_full_disk_is_reported_and_written_trials_are_kept(tmp_path: Path) -> None:
     """A limit on the size of files stands in for the full disk: the write that crosses it is cut short."""
     whole = short(tmp_path / "whole")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)

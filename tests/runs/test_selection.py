@@ -37,7 +37,7 @@ def history(run: Path) -> History:
     return read_run(run)[1]
 
 
-def test_what_is_picked_meets_the_conditions_and_is_the_best(history: History) -> None:
+def test_picked_designs_meet_the_conditions_and_are_sorted(history: History) -> None:
     conditions = [Condition("position_error", "<=", 2.0), Condition("length", "<", 0.6)]
     picked = pick(history, conditions, by="torque")
     told = [numbers_of(history, member) for member in history.front]
@@ -46,12 +46,12 @@ def test_what_is_picked_meets_the_conditions_and_is_the_best(history: History) -
     assert [member.values[1] for member in picked] == sorted(numbers["torque"] for numbers in meeting)
 
 
-def test_without_wishes_it_is_the_knee(history: History) -> None:
+def test_default_pick_is_the_knee(history: History) -> None:
     assert pick(history)[0].number == knee_index(history.values, (5.0, 5.0))
     assert len(pick(history)) == len(history.front)
 
 
-def test_weights_are_shares_of_the_reference_point(history: History) -> None:
+def test_weights_are_relative_to_the_reference_point(history: History) -> None:
     values = np.array([member.values for member in history.front])
     for weights in ((1.0, 0.0), (0.0, 2.0), (3.0, 1.0)):
         best = history.front[int(np.argmin(values @ (np.array(weights) / 5.0)))]
@@ -66,7 +66,7 @@ def test_pick_can_be_restricted_to_robust_designs(run: Path) -> None:
     assert sorted(member.number for member in picked) == sorted(robust)
 
 
-def test_why_nothing_is_left(history: History) -> None:
+def test_empty_selection_names_the_reason(history: History) -> None:
     least = min(member.values[0] for member in history.front)
     with pytest.raises(FailureError, match=f"position_error <= 1e-06; the nearest has {least:.4g}"):
         pick(history, [Condition("torque", "<", 100.0), Condition("position_error", "<=", 1e-6)])
@@ -86,19 +86,19 @@ def test_why_nothing_is_left(history: History) -> None:
     st.sampled_from(["<=", ">=", "<", ">"]),
     st.floats(allow_nan=False, allow_infinity=False),
 )
-def test_a_condition_is_read_as_it_is_written(name: str, relation: str, bound: float) -> None:
+def test_written_conditions_are_read_back(name: str, relation: str, bound: float) -> None:
     assert read_condition(f"{name} {relation}{bound!r}") == Condition(name, relation, bound)
 
 
 @given(st.text(max_size=40))
-def test_no_words_break_the_reading(words: str) -> None:
+def test_arbitrary_conditions_are_read_or_refused(words: str) -> None:
     for read in (read_condition, read_weights):
         with suppress(SettingsError):
             read(words)
 
 
 @pytest.mark.parametrize("words", ["", "torque", "torque<", "torque<=x", "__import__('os')<1", "a<1<2", "torque==1"])
-def test_what_is_no_condition_is_refused(words: str) -> None:
+def test_invalid_conditions_are_refused(words: str) -> None:
     with pytest.raises(SettingsError, match="expected a name, one of"):
         read_condition(words)
 
@@ -109,7 +109,7 @@ def invoke(*arguments: str | Path) -> str:
     return result.output
 
 
-def test_the_commands(run: Path, history: History, tmp_path: Path) -> None:
+def test_pick_and_export_commands_agree(run: Path, history: History, tmp_path: Path) -> None:
     told = json.loads(invoke("pick", run, "--where", "position_error<=1.5", "--by", "torque", "-n", "2", "--json"))
     assert len(told) == 2
     number = told[0]["number"]
@@ -122,7 +122,7 @@ def test_the_commands(run: Path, history: History, tmp_path: Path) -> None:
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "deep" / "arm.xml")).njnt == 4
 
 
-def test_the_build_sheet_says_what_the_joints_hold(run: Path, history: History) -> None:
+def test_build_sheet_lists_joint_torques_and_ranges(run: Path, history: History) -> None:
     number = history.front[0].number
     arm, evaluation = history.member(number).arm, history.evaluation([number])
     rows = list(csv.DictReader(io.StringIO(invoke("export", run, "--design", number, "--format", "sheet-csv"))))
@@ -139,7 +139,7 @@ def test_the_build_sheet_says_what_the_joints_hold(run: Path, history: History) 
     assert f"{1e3 * evaluation.position_error.max():.2f} mm at most" in sheet
 
 
-def test_mistakes_are_named(run: Path) -> None:
+def test_mistakes_are_reported(run: Path) -> None:
     for arguments, words in (
         (["export", str(run), "--design", "999"], "has the designs 0 to 49"),
         (["export", str(run), "--format", "urfd"], 'Did you mean "urdf"'),

@@ -44,13 +44,13 @@ def designs() -> list[Design]:
     return PROBLEM.space.sample(60, seed=4)
 
 
-def test_exact_values_are_the_references(designs: list[Design]) -> None:
+def test_exact_values_agree_with_the_reference(designs: list[Design]) -> None:
     found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
     agree(found.exact, values_of(PROBLEM, designs))
 
 
 @pytest.mark.slow
-def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None:
+def test_perturbed_values_are_the_worst_over_copies(designs: list[Design]) -> None:
     rows = PROBLEM.space.matrix(designs)
     copies = list(perturbed(PROBLEM.space, rows))
     assert len(copies) == 2 * 7
@@ -64,7 +64,7 @@ def test_moved_values_are_the_worst_of_the_copies(designs: list[Design]) -> None
 
 
 @pytest.mark.slow
-def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
+def test_restarted_values_are_the_worst_of_twenty(designs: list[Design]) -> None:
     found = verify(PROBLEM, designs, PROBLEM.evaluate(designs).values, BOX)
     shape = STARTS, len(PROBLEM.task.targets), PROBLEM.space.joints
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
@@ -72,7 +72,7 @@ def test_other_starts_are_the_worst_of_twenty(designs: list[Design]) -> None:
     agree(found.started, worst)
 
 
-def test_what_is_robust_follows_from_the_worst_cases(designs: list[Design]) -> None:
+def test_robustness_follows_from_the_worst_cases(designs: list[Design]) -> None:
     values = PROBLEM.evaluate(designs).values
     found = verify(PROBLEM, designs, values, BOX)
     allowed = values + np.maximum(0.05 * values, 0.005 * np.array(BOX))
@@ -119,7 +119,7 @@ def test_verify_run_marks_the_front(tmp_path: Path) -> None:
     assert other.summary["verification"] == record
 
 
-def test_a_history_without_a_box_is_not_verified() -> None:
+def test_history_without_a_reference_point_is_not_verified() -> None:
     from armwright.runs.verification import verify_front
 
     problem = Problem(Task(name="open", targets=((0.3, 0.0, 0.3),)))

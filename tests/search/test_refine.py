@@ -30,7 +30,7 @@ def paraboloids(rows: Array) -> Array:
     return np.column_stack([((rows - centre) ** 2 * weights).sum(axis=1) for centre in (0.5, 0.6)])
 
 
-def test_finds_the_front_of_bowls() -> None:
+def test_refinement_finds_the_front_of_paraboloids() -> None:
     """Each start comes to within 1e-4 of a point where the two gradients oppose each other."""
     rows = np.random.default_rng(0).uniform(-1.0, 3.0, (7, 5))
     refined = refine(BOX, paraboloids, rows, paraboloids(rows), (1.0, 1.0), 6000, 0)
@@ -41,7 +41,7 @@ def test_finds_the_front_of_bowls() -> None:
 
 
 @pytest.mark.parametrize("budget", [0, POPULATION, 400])
-def test_never_worse_and_counted(budget: int) -> None:
+def test_refinement_is_never_worse_and_counted(budget: int) -> None:
     designs = PROBLEM.space.sample(20, seed=1)
     rows = PROBLEM.space.matrix(designs)
     values = PROBLEM.evaluate(designs).values
@@ -62,7 +62,7 @@ def test_never_worse_and_counted(budget: int) -> None:
         assert after.joints == before.joints
 
 
-def test_same_seed_same_result_and_categories_stay() -> None:
+def test_refinement_is_deterministic_and_keeps_categories() -> None:
     parameters = (*BOX[:2], CategoricalParameter("kind", ("a", "b")))
     rows = np.array([[0.0, 0.0, 1.0], [2.0, 2.0, 0.0]])
     runs = [refine(parameters, lambda r: paraboloids(r[:, :2]), rows, paraboloids(rows[:, :2]), (1, 1), 240, 5)] * 2
@@ -72,7 +72,7 @@ def test_same_seed_same_result_and_categories_stay() -> None:
     assert np.array_equal(runs[0].matrix[:, 2], rows[:, 2])
 
 
-def test_a_space_without_real_parameters_is_left_alone() -> None:
+def test_space_without_real_parameters_is_not_refined() -> None:
     rows = np.array([[0.0], [1.0]])
     parameters = (CategoricalParameter("kind", ("a", "b")),)
     refined = refine(parameters, lambda r: r, rows, rows, (1.0,), 100, 0)

@@ -40,7 +40,7 @@ def test_paper_space_has_2d_plus_3_parameters(joints: int) -> None:
     assert len(paper_space(joints).parameters) == 2 * joints + 3
 
 
-def test_a_design_builds_the_arm_of_its_values() -> None:
+def test_design_builds_the_arm_of_its_values() -> None:
     space = paper_space()
     design = space.clipped((0.1, -0.2, 0.3), "YPRP", (0.1, 0.2, 0.05, 0.3))
     arm = space.arm(design)
@@ -167,7 +167,7 @@ def test_order_of_parameter_values_is_irrelevant() -> None:
     assert paper_space().arm(turned) == paper_space().arm(Design(GOOD))
 
 
-def test_a_design_of_another_space_builds_no_arm() -> None:
+def test_design_of_another_space_is_refused() -> None:
     with pytest.raises(DesignError, match="joint_5"):
         paper_space().arm(paper_space(5).sample(1, 0)[0])
     with pytest.raises(SpaceError, match="from 1 to 8"):

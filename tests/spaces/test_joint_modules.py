@@ -111,7 +111,7 @@ def test_postures_and_torques_agree_with_pinocchio_and_mujoco() -> None:
         assert np.allclose(state.site("tip").xpos, solved.reached[i, 0], atol=1e-9)
 
 
-def test_a_slide_ends_at_its_target_and_starts_within_its_limits() -> None:
+def test_slide_reaches_its_target_and_starts_within_limits() -> None:
     space = DesignSpace.model_validate(
         {"joints": 3, "joint_types": ["X", "T", "S"], "stroke": 0.5, "link": [0.05, 0.05]}
     )

@@ -90,9 +90,7 @@ def numbers(run: Path) -> list[int]:
     ],
     ids=["tpe and refinements", "nsga2", "many quantities"],
 )
-def test_one_design_at_a_time_makes_the_run_of_this_process(
-    tmp_path: Path, shell: ShellCluster, settings: dict[str, Any]
-) -> None:
+def test_one_worker_gives_the_in_process_run(tmp_path: Path, shell: ShellCluster, settings: dict[str, Any]) -> None:
     """To the bit, apart from seconds."""
     asked = {**SHORT, **settings}
     problem = asked.pop("problem")
@@ -117,7 +115,7 @@ for out, workers in (("here", None), ("there", aw.Workers(1))):
 
 
 @pytest.mark.slow
-def test_a_script_without_a_main_guard_uses_a_local_worker(in_folder: Path) -> None:
+def test_script_without_a_main_guard_uses_a_local_worker(in_folder: Path) -> None:
     """Its evaluator goes to the worker by value; the script itself is not run again there."""
     (in_folder / "script.py").write_text(SCRIPT)
     done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True)
@@ -126,7 +124,7 @@ def test_a_script_without_a_main_guard_uses_a_local_worker(in_folder: Path) -> N
     assert numbers(in_folder / "there") == list(range(N_TRIALS))
 
 
-def test_workers_need_no_evaluator_file_and_each_design_is_evaluated_once(
+def test_evaluator_is_shipped_to_workers_and_designs_evaluated_once(
     tmp_path: Path, shell: ShellCluster, bench: Bench
 ) -> None:
     shell.only(2)
@@ -145,7 +143,7 @@ def test_workers_need_no_evaluator_file_and_each_design_is_evaluated_once(
         assert trial.values == (sum(trial.design.links), 1.0 + trial.design.origin[2])
 
 
-def test_a_stop_lets_designs_in_flight_finish(tmp_path: Path, shell: ShellCluster, bench: Bench) -> None:
+def test_stop_lets_designs_in_flight_finish(tmp_path: Path, shell: ShellCluster, bench: Bench) -> None:
     shell.only(2)
     out = tmp_path / "run"
 
@@ -164,9 +162,7 @@ def test_a_stop_lets_designs_in_flight_finish(tmp_path: Path, shell: ShellCluste
 # --- what is killed ---------------------------------------------------------------------------------------------------
 
 
-def test_the_design_of_a_killed_shell_worker_is_evaluated_by_the_other(
-    tmp_path: Path, shell: ShellCluster, bench: Bench
-) -> None:
+def test_design_of_a_killed_shell_worker_is_reevaluated(tmp_path: Path, shell: ShellCluster, bench: Bench) -> None:
     victim, other = shell.only(2)
     bench.ask("hold")
     notes: list[str] = []
@@ -191,7 +187,7 @@ def test_the_design_of_a_killed_shell_worker_is_evaluated_by_the_other(
 
 
 @pytest.mark.slow
-def test_local_workers_are_killed_then_the_search_then_ctrl_c(tmp_path: Path, bench: Bench) -> None:
+def test_killed_local_workers_and_search_are_resumed(tmp_path: Path, bench: Bench) -> None:
     """The same command goes on each time, and leaves no process behind."""
     out = tmp_path / "run"
     command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", "--workers", "2", *ASKED, "--out", out)
@@ -235,7 +231,7 @@ def test_local_workers_are_killed_then_the_search_then_ctrl_c(tmp_path: Path, be
 
 
 @pytest.mark.slow
-def test_three_workers_lost_over_a_design_end_the_search_which_names_it(tmp_path: Path, bench: Bench) -> None:
+def test_design_that_kills_three_workers_ends_the_search(tmp_path: Path, bench: Bench) -> None:
     bench.ask("die")
     with pytest.raises(EvaluatorError, match=r"3 workers were lost over trial 0 .* design: \{.*\}\. Rerun") as raised:
         aw.optimize(bench.problem(), **SHORT, out=tmp_path / "run", workers=aw.Workers(1))
@@ -247,7 +243,7 @@ def test_three_workers_lost_over_a_design_end_the_search_which_names_it(tmp_path
 
 
 @pytest.mark.slow
-def test_other_versions_on_a_worker_and_a_lost_scheduler_are_one_line_each(tmp_path: Path, bench: Bench) -> None:
+def test_version_mismatch_and_lost_scheduler_are_one_line(tmp_path: Path, bench: Bench) -> None:
     (tmp_path / "other" / "armwright-9.9.dist-info").mkdir(parents=True)
     (tmp_path / "other" / "armwright-9.9.dist-info" / "METADATA").write_text("Name: armwright\nVersion: 9.9\n")
     out = tmp_path / "run"
@@ -280,11 +276,11 @@ def test_other_versions_on_a_worker_and_a_lost_scheduler_are_one_line_each(tmp_p
 # --- what goes wrong --------------------------------------------------------------------------------------------------
 
 
-def test_an_evaluator_s_exception_arrives_with_its_traceback_and_design(tmp_path: Path, bench: Bench) -> None:
+def test_evaluator_exception_has_its_traceback_and_design(tmp_path: Path, bench: Bench) -> None:
     fails_then_goes_on(tmp_path / "run", bench, bench.problem(), None)
 
 
-def test_an_evaluator_s_exception_on_a_worker_arrives_with_its_traceback_and_design(
+def test_worker_evaluator_exception_has_its_traceback_and_design(
     tmp_path: Path, shell: ShellCluster, bench: Bench
 ) -> None:
     shell.only(2)
@@ -312,7 +308,7 @@ def fails_then_goes_on(run: Path, bench: Bench, problem: aw.Problem, workers: aw
 
 
 @pytest.mark.slow
-def test_the_command_line_shows_the_traceback_of_the_evaluator(tmp_path: Path, bench: Bench) -> None:
+def test_command_line_shows_the_evaluator_traceback(tmp_path: Path, bench: Bench) -> None:
     bench.ask("fail")
     command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--out", tmp_path / "run")
     search = begin_command(*command)
@@ -324,7 +320,7 @@ def test_the_command_line_shows_the_traceback_of_the_evaluator(tmp_path: Path, b
     assert line.startswith("armwright: trial 0: sim.py:measure failed: ValueError: no licence (sim.py, line ")
 
 
-def test_an_objective_s_exception_on_a_worker_arrives_with_its_traceback(shell: ShellCluster) -> None:
+def test_worker_objective_exception_has_its_traceback(shell: ShellCluster) -> None:
     shell.only(1)
 
     def each(evaluation: aw.Evaluation) -> Any:
@@ -358,7 +354,7 @@ def test_an_objective_s_exception_on_a_worker_arrives_with_its_traceback(shell: 
         ),
     ],
 )
-def test_what_cannot_be_is_one_line(
+def test_invalid_worker_settings_are_one_line(
     monkeypatch: pytest.MonkeyPatch, ask: Callable[[], object], fault: type[Exception], words: str
 ) -> None:
     monkeypatch.setattr("armwright.study.cluster.CONNECT_SECONDS", 0.5)
@@ -393,7 +389,7 @@ def have_begun(cells: list[Cell]) -> bool:
     return all(n_lines(cell.folder / "trials.jsonl") for cell in cells)
 
 
-def test_the_cell_of_a_killed_shell_worker_is_run_by_the_other(tmp_path: Path, shell: ShellCluster) -> None:
+def test_cell_of_a_killed_shell_worker_is_rerun(tmp_path: Path, shell: ShellCluster) -> None:
     victim, _ = shell.only(2)
     _, cells = two_cells(tmp_path, n_total=300)
 
@@ -411,13 +407,13 @@ def test_the_cell_of_a_killed_shell_worker_is_run_by_the_other(tmp_path: Path, s
     assert [note for note in notes if note.startswith("a worker was lost; BBO, random-3, seed ")]
 
 
-def test_a_cell_over_which_workers_are_lost_has_failed_in_words(tmp_path: Path) -> None:
+def test_cell_that_kills_workers_reports_its_failure(tmp_path: Path) -> None:
     _, (cell, _) = two_cells(tmp_path, n_total=1)
     assert _outcome_of(Finished(cell, is_lost=True)).fault.startswith("3 workers were lost over it")
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_an_experiment_with_its_local_workers(tmp_path: Path) -> None:
+def test_ctrl_c_ends_an_experiment_and_its_workers(tmp_path: Path) -> None:
     plan, cells = two_cells(tmp_path / "out", n_total=10_000)
     file = tmp_path / "two.yaml"
     file.write_text(yaml.safe_dump(plan.model_dump(mode="json", exclude_defaults=True)))

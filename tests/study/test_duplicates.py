@@ -6,7 +6,7 @@ from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
 
-def test_a_repeated_design_is_evaluated_once_and_counted() -> None:
+def test_repeated_design_is_evaluated_once_and_counted() -> None:
     space = DesignSpace.model_validate(
         {"joints": 3, "joint_types": ["P", "Y"], "link": [0.2, 0.3], "grid": {"link": 0.05}}
         | {f"origin_{axis}": [0.0, 0.0] for axis in "xyz"}

@@ -49,12 +49,12 @@ OPEN = Task(name="open", targets=((0.3, 0.0, 0.3), (0.2, 0.1, 0.4)))
         ("5", SearchBudget(evaluations=5)),
     ],
 )
-def test_budgets(words: str, budget: SearchBudget) -> None:
+def test_search_budgets_are_parsed(words: str, budget: SearchBudget) -> None:
     assert SearchBudget.parse(words) == budget
 
 
 @pytest.mark.parametrize("words", ["0", "0s", "-5s", "5 parsecs", "", "s", "1.5", "1e99", "nan", "inf s", "5m"])
-def test_budgets_that_mean_nothing(words: str) -> None:
+def test_invalid_search_budgets_are_refused(words: str) -> None:
     with pytest.raises(SettingsError, match="budget"):
         SearchBudget.parse(words)
 
@@ -64,7 +64,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> FrontRun:
     return find_front(PROBLEM, budget="6000", seed=1, out=tmp_path_factory.mktemp("front") / "run")
 
 
-def test_the_trials_are_the_front(done: FrontRun) -> None:
+def test_trials_of_a_front_run_are_its_front(done: FrontRun) -> None:
     assert done.folder is not None
     values = done.history.values
     assert len(values) > 20
@@ -78,7 +78,7 @@ def test_the_trials_are_the_front(done: FrontRun) -> None:
     assert read.trials == list(done.history.trials)
 
 
-def test_its_summary_and_files(done: FrontRun) -> None:
+def test_front_run_writes_summary_and_designs(done: FrontRun) -> None:
     assert done.folder is not None
     summary = read_summary(done.folder)
     assert summary == json.loads(json.dumps(done.summary))
@@ -99,13 +99,13 @@ def test_its_summary_and_files(done: FrontRun) -> None:
 
 
 @pytest.mark.slow
-def test_a_search_beats_a_study_of_as_many_seconds(done: FrontRun) -> None:
+def test_front_search_beats_a_study_of_similar_duration(done: FrontRun) -> None:
     study = optimize(PROBLEM, proposer="none", n_total=60, seed=1)
     assert hypervolume(done.history.values, (5, 5)) > study.hypervolume[-1]
 
 
 @pytest.mark.slow
-def test_same_seed_same_front_and_resumed_equals_uninterrupted(done: FrontRun, tmp_path: Path) -> None:
+def test_resumed_front_run_equals_uninterrupted_one(done: FrontRun, tmp_path: Path) -> None:
     class StopError(Exception):
         pass
 
@@ -129,7 +129,7 @@ def test_same_seed_same_front_and_resumed_equals_uninterrupted(done: FrontRun, t
 
 
 @pytest.mark.slow
-def test_it_begins_with_a_run_or_a_proposer(tmp_path: Path) -> None:
+def test_front_run_starts_from_a_run_or_a_proposer(tmp_path: Path) -> None:
     study = optimize(PROBLEM, proposer="rules", n_total=30, seed=0, out=tmp_path / "study")
     run = find_front(PROBLEM, budget="500", seed=0, initial_designs=tmp_path / "study", out=tmp_path / "a")
     together = np.vstack([run.history.values, study.history.values])
@@ -146,7 +146,7 @@ def test_it_begins_with_a_run_or_a_proposer(tmp_path: Path) -> None:
         find_front(PROBLEM, budget="500", seed=0, out=tmp_path / "a")
 
 
-def test_folders_of_other_runs_are_refused(done: FrontRun, tmp_path: Path) -> None:
+def test_front_run_refuses_folders_of_other_runs(done: FrontRun, tmp_path: Path) -> None:
     with pytest.raises(RunConflictError, match="seed: 1 stored, 2 requested"):
         find_front(PROBLEM, budget="100", seed=2, out=done.folder)
     with pytest.raises(RunConflictError):
@@ -156,7 +156,7 @@ def test_folders_of_other_runs_are_refused(done: FrontRun, tmp_path: Path) -> No
         find_front(PROBLEM, budget="100", seed=1, out=tmp_path / "study")
 
 
-def test_a_damaged_state_is_said(tmp_path: Path) -> None:
+def test_damaged_search_state_is_reported(tmp_path: Path) -> None:
     find_front(PROBLEM, budget="300", seed=1, out=tmp_path / "run")
     state = tmp_path / "run" / "search.npz"
     for content in (b"", b"PK\x03\x04 nothing", state.read_bytes()[:500]):
@@ -181,7 +181,7 @@ def test_a_damaged_state_is_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_search_stopped_in_the_midst_of_a_generation_goes_on_as_if_not(
+def test_front_run_stopped_within_a_generation_resumes_identically(
     done: FrontRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     select, calls = FrontSearch._select, [0]  # pyright: ignore[reportPrivateUsage]
@@ -202,7 +202,7 @@ def test_a_search_stopped_in_the_midst_of_a_generation_goes_on_as_if_not(
 
 
 @pytest.mark.slow
-def test_a_front_wholly_outside_the_box_is_kept_drawn_and_gone_on_with(tmp_path: Path) -> None:
+def test_front_outside_the_reference_box_is_kept_and_resumed(tmp_path: Path) -> None:
     far = Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0))
     for budget in (600, 900):
         run = find_front(Problem(far), budget=budget, out=tmp_path / "run")
@@ -213,14 +213,14 @@ def test_a_front_wholly_outside_the_box_is_kept_drawn_and_gone_on_with(tmp_path:
     assert verify_run(tmp_path / "run")[1]["verification"]["robust"] >= 0
 
 
-def test_a_proposer_is_not_asked_for_a_folder_of_another_run(tmp_path: Path) -> None:
+def test_proposer_is_not_called_for_a_conflicting_folder(tmp_path: Path) -> None:
     optimize(PROBLEM, proposer="none", n_init=2, n_total=2, out=tmp_path / "study")
     with pytest.raises(RunConflictError):
         find_front(PROBLEM, budget=500, initial_designs=RulesProposer(), out=tmp_path / "study")
     assert not (tmp_path / "study" / "proposals").exists()
 
 
-def test_a_good_beginning_is_no_stall() -> None:
+def test_good_initial_designs_are_not_a_stall() -> None:
     known = known_front(PROBLEM)
     assert known is not None
     search = FrontSearch(
@@ -236,13 +236,13 @@ def test_a_good_beginning_is_no_stall() -> None:
 
 
 @pytest.mark.parametrize("bounds", [{"evaluations": 0}, {"seconds": -1.0}, {"seconds": float("nan")}])
-def test_a_budget_is_above_0(bounds: dict[str, float]) -> None:
+def test_budget_must_be_positive(bounds: dict[str, float]) -> None:
     with pytest.raises(SettingsError, match="above 0"):
         SearchBudget(**bounds)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.slow
-def test_a_run_of_a_gpu_is_read_and_verified_without_one(tmp_path: Path) -> None:
+def test_gpu_run_is_verified_without_a_gpu(tmp_path: Path) -> None:
     find_front(PROBLEM, budget=300, out=tmp_path / "run")
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text().replace("device: cpu", "device: cuda"))
@@ -251,7 +251,7 @@ def test_a_run_of_a_gpu_is_read_and_verified_without_one(tmp_path: Path) -> None
     assert write_figures(tmp_path / "run")
 
 
-def test_a_task_without_a_reference_point() -> None:
+def test_front_run_finds_a_missing_reference_point() -> None:
     run = find_front(Problem(OPEN), budget="2500", seed=0)
     assert run.folder is None
     assert run.config.reference_point == run.history.reference_point
@@ -259,7 +259,7 @@ def test_a_task_without_a_reference_point() -> None:
     assert run.summary["best_known"] is None
 
 
-def test_it_ends_when_nothing_grows() -> None:
+def test_front_run_ends_at_a_stall() -> None:
     narrow = paper_space(1).model_copy(update={f"origin_{axis}": (0.0, 0.0) for axis in "xyz"})
     run = find_front(Problem(OPEN, narrow), budget="1e6", seed=0)
     assert run.summary["search"]["ended_by"] == "stall"
@@ -271,12 +271,12 @@ def known_tasks() -> list[str]:
     return [name for name in builtin_tasks() if (fronts / f"{name}.csv").is_file()]
 
 
-def test_the_paper_s_tasks_have_a_best_known_front() -> None:
+def test_paper_tasks_have_a_best_known_front() -> None:
     assert {"target-1", "target-2", "target-3"} <= set(known_tasks())
 
 
 @pytest.mark.parametrize("name", known_tasks())
-def test_best_known_fronts_are_fronts_of_their_tasks(name: str) -> None:
+def test_best_known_fronts_are_reproducible_fronts(name: str) -> None:
     """Their designs are in the space, none dominates another, and most give their values on this machine, too.
 
     Not all: the solver is chaotic in places, and another processor may round otherwise.
@@ -289,7 +289,7 @@ def test_best_known_fronts_are_fronts_of_their_tasks(name: str) -> None:
     assert np.mean(np.abs(values - known.values).max(axis=1) < 1e-3) > 0.7
 
 
-def test_standing_beside_the_best_known() -> None:
+def test_front_gap_to_the_best_known_front() -> None:
     known = known_front(PROBLEM)
     assert known is not None
     same = front_gap(PROBLEM, known.values, (5.0, 5.0))
@@ -315,10 +315,10 @@ def test_standing_beside_the_best_known() -> None:
         Problem(PROBLEM.task, objectives=OTHERS),
     ],
 )
-def test_other_problems_have_no_best_known_front(problem: Problem) -> None:
+def test_changed_problems_have_no_best_known_front(problem: Problem) -> None:
     assert known_front(problem) is None
 
 
-def test_the_same_space_by_another_name_has_one() -> None:
+def test_renamed_space_keeps_its_best_known_front() -> None:
     renamed: Any = paper_space().model_copy(update={"name": "mine"})
     assert known_front(Problem(PROBLEM.task.model_copy(update={"name": "mine"}), renamed)) is not None

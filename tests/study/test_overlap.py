@@ -91,7 +91,7 @@ def search(proposer: Proposer, n_step: int = 5, n_total: int = 20, in_flight: in
     )
 
 
-def test_an_answer_enters_as_the_next_trial_after_it_came() -> None:
+def test_answer_becomes_the_next_trial_after_its_arrival() -> None:
     proposer = Held()
 
     def watch(progress: Progress) -> None:
@@ -114,7 +114,7 @@ def test_an_answer_enters_as_the_next_trial_after_it_came() -> None:
     }
 
 
-def test_the_black_box_waits_when_it_is_a_block_ahead() -> None:
+def test_black_box_waits_when_a_block_ahead() -> None:
     """Four black-box trials a block; the fifth has to wait for the answer."""
     proposer = Held()
     seen: list[tuple[int, int]] = []
@@ -133,7 +133,7 @@ def test_the_black_box_waits_when_it_is_a_block_ahead() -> None:
 @pytest.mark.parametrize(("n_step", "n_total", "in_flight", "per_call"), [
     (5, 23, 1, 1), (5, 40, 3, 1), (1, 12, 4, 1), (4, 30, 2, 3), (30, 20, 2, 1), (2, 9, 1, 4),
 ])  # fmt: skip
-def test_the_ratio_is_kept_whatever_the_order_of_the_answers(
+def test_ratio_does_not_depend_on_the_order_of_answers(
     seed: int, n_step: int, n_total: int, in_flight: int, per_call: int
 ) -> None:
     proposer = Held(per_call)
@@ -157,7 +157,7 @@ def test_the_ratio_is_kept_whatever_the_order_of_the_answers(
             assert proposer.known[asked] == (trial.number if trial.feedback is None else trial.feedback) <= trial.number
 
 
-def test_a_failed_question_is_a_black_box_trial_in_its_turn() -> None:
+def test_failed_call_becomes_a_black_box_trial() -> None:
     proposer = Held(faulty=(9,))
     releasing = Releasing(proposer, 0)
     releasing.start()
@@ -172,7 +172,7 @@ def test_a_failed_question_is_a_black_box_trial_in_its_turn() -> None:
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("in_flight", "per_call"), [(1, 3), (2, 3), (4, 2)])
-def test_of_several_designs_all_but_the_first_wait_for_their_blocks(seed: int, in_flight: int, per_call: int) -> None:
+def test_further_designs_of_an_answer_wait_for_their_blocks(seed: int, in_flight: int, per_call: int) -> None:
     proposer = Held(per_call)
     releasing = Releasing(proposer, seed)
     releasing.start()
@@ -188,7 +188,7 @@ def test_of_several_designs_all_but_the_first_wait_for_their_blocks(seed: int, i
         assert design == "0" or trial.number >= N_INIT + 4 * place
 
 
-def test_a_fault_that_ends_the_asking_is_told_once() -> None:
+def test_permanent_fault_of_concurrent_calls_is_reported_once() -> None:
     """However many questions under way meet it."""
 
     class Keyless(Proposer):
@@ -206,7 +206,7 @@ def test_a_fault_that_ends_the_asking_is_told_once() -> None:
     assert [note for note in notes if note] == [told]
 
 
-def test_what_came_before_an_interrupt_is_kept() -> None:
+def test_interrupt_waits_for_answers_being_recorded() -> None:
     """The study waits a moment for the threads that keep it."""
 
     class Keeping(Proposer):
@@ -237,7 +237,7 @@ def test_what_came_before_an_interrupt_is_kept() -> None:
     assert proposer.kept.is_set()
 
 
-def test_an_error_in_a_question_is_the_studys() -> None:
+def test_proposer_exception_ends_the_study() -> None:
     class Broken(Proposer):
         name = "broken"
 
@@ -248,15 +248,13 @@ def test_an_error_in_a_question_is_the_studys() -> None:
         search(Broken())
 
 
-def test_in_flight_must_make_sense() -> None:
+def test_invalid_in_flight_is_refused() -> None:
     with pytest.raises(SettingsError, match="in_flight = 0"):
         search(Held(), in_flight=0)
 
 
 @pytest.mark.parametrize("stop", [6, 13])
-def test_nothing_is_paid_for_twice_when_a_run_is_interrupted(
-    chat_server: ChatServer, tmp_path: Path, stop: int
-) -> None:
+def test_interrupted_run_pays_for_no_answer_twice(chat_server: ChatServer, tmp_path: Path, stop: int) -> None:
     def proposer() -> LlmProposer:
         return llm_proposer(chat_server.url)
 
@@ -276,7 +274,7 @@ def test_nothing_is_paid_for_twice_when_a_run_is_interrupted(
     )
 
 
-def test_an_interrupt_ends_the_questions_under_way(chat_server: ChatServer) -> None:
+def test_interrupt_cancels_calls_in_flight(chat_server: ChatServer) -> None:
     """While the server still holds its answers back."""
     released = threading.Event()
 

@@ -64,7 +64,7 @@ def asked(out: Path) -> list[Call]:
     [{}, {"prompt": "minus", "memory": "own"}, {"answer": "one-step", "memory": "own"}, {"prompt": "file"}],
     ids=["plus", "minus-own", "one-step", "file"],
 )
-def test_what_is_printed_is_what_is_sent(chat_server: ChatServer, in_folder: Path, how: dict[str, Any]) -> None:
+def test_printed_prompt_is_the_prompt_sent(chat_server: ChatServer, in_folder: Path, how: dict[str, Any]) -> None:
     out = in_folder / "run"
     if how.get("prompt") == "file":
         (in_folder / "own.md").write_text(OWN, encoding="utf-8")
@@ -89,7 +89,7 @@ def test_what_is_printed_is_what_is_sent(chat_server: ChatServer, in_folder: Pat
     assert printed["properties"] == schemas[-1]["json_schema"]["schema"]["properties"]
 
 
-def test_options_take_precedence_over_the_runs(chat_server: ChatServer, in_folder: Path) -> None:
+def test_options_override_those_of_the_run(chat_server: ChatServer, in_folder: Path) -> None:
     run(in_folder / "run", 3, llm_proposer(chat_server.url, prompt="minus", memory="own"))
     told = shown("--after", "run")[0]
     assert "Step 1" not in told
@@ -100,13 +100,13 @@ def test_options_take_precedence_over_the_runs(chat_server: ChatServer, in_folde
     assert "2 new designs" in told
 
 
-def test_a_new_run(chat_server: ChatServer, in_folder: Path) -> None:
+def test_prompt_of_a_new_run(chat_server: ChatServer, in_folder: Path) -> None:
     before = shown("target-1", "--n-init", "4", "--seed", "5", "--prompt", "minus")[0]
     run(in_folder / "run", 1, llm_proposer(chat_server.url, prompt="minus"))
     assert [call.prompt for call in asked(in_folder / "run")] == [before]
 
 
-def test_a_run_in_a_space_of_its_own_and_without_a_model(in_folder: Path) -> None:
+def test_prompt_after_a_run_without_a_model(in_folder: Path) -> None:
     run(in_folder / "run", 3, "none", Problem(load_task("target-2"), SIX_AXIS))
     told = shown("--after", "run")[0]
     assert "D = 6" in told
@@ -114,7 +114,7 @@ def test_a_run_in_a_space_of_its_own_and_without_a_model(in_folder: Path) -> Non
     assert shown("--after", "run", "--number", "4")[0] != told
 
 
-def test_what_is_still_to_come_is_said(chat_server: ChatServer, in_folder: Path) -> None:
+def test_preview_names_missing_parts(chat_server: ChatServer, in_folder: Path) -> None:
     run(in_folder / "run", 2, llm_proposer(chat_server.url))
     assert shown("--after", "run")[1].endswith("for trial 7; 1 trial comes before it, and will be in it\n")
     designs = [json.loads(json.dumps(dict(design.params))) for design in PROBLEM.space.sample(3, 1)]
@@ -147,7 +147,7 @@ def interrupted(out: Path, stop: int, server: ChatServer, in_flight: int | None)
                  watch=interrupt)  # fmt: skip
 
 
-def test_after_an_interrupt_what_is_printed_is_what_is_sent_next(chat_server: ChatServer, in_folder: Path) -> None:
+def test_prompt_after_an_interrupt_is_the_next_one_sent(chat_server: ChatServer, in_folder: Path) -> None:
     """Two questions were under way, for trials 4 and 7; none was answered."""
     answered = threading.Event()
 
@@ -166,7 +166,7 @@ def test_after_an_interrupt_what_is_printed_is_what_is_sent_next(chat_server: Ch
 
 
 @pytest.mark.parametrize("in_flight", [None, 1])
-def test_where_only_the_thoughts_have_come_their_parameters_are_asked_for_next(
+def test_prompt_after_the_reasoning_requests_the_parameters(
     chat_server: ChatServer, in_folder: Path, in_flight: int | None
 ) -> None:
     run(in_folder / "run", 1, llm_proposer(chat_server.url), in_flight=in_flight)
@@ -181,12 +181,12 @@ def test_where_only_the_thoughts_have_come_their_parameters_are_asked_for_next(
     assert shown("--after", "run", "--number", "4")[0] == asked(in_folder / "run")[0].prompt
 
 
-def test_variables() -> None:
+def test_template_variables_are_listed() -> None:
     assert [line.partition(":")[0] for line in shown("--variables")[0].splitlines()] == list(VARIABLES)
 
 
 @pytest.mark.parametrize("name", ["plus", "minus"])
-def test_a_copy_of_the_template_that_is_printed_is_the_same_prompt(in_folder: Path, name: str) -> None:
+def test_copied_template_gives_the_same_prompt(in_folder: Path, name: str) -> None:
     whole = shown("--template", "--prompt", name)[0]
     (in_folder / "own.md").write_text(whole, encoding="utf-8")
     assert shown("target-1", "--prompt", "own.md")[0] == shown("target-1", "--prompt", name)[0]
@@ -233,7 +233,7 @@ def test_invalid_arguments_are_refused(
     assert "\n" not in str(refusal.value)
 
 
-def test_a_mistake_in_a_template_is_one_line_on_stderr(in_folder: Path) -> None:
+def test_template_error_is_one_line_on_stderr(in_folder: Path) -> None:
     (in_folder / "own.md").write_text("{{ ''.__class__ }}", encoding="utf-8")
     done = armwright("prompt", "target-1", "--prompt", "own.md")
     assert (done.returncode, done.stdout) == (2, "")
@@ -241,7 +241,7 @@ def test_a_mistake_in_a_template_is_one_line_on_stderr(in_folder: Path) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_another_template_for_the_same_run_is_refused_in_one_line(chat_server: ChatServer, in_folder: Path) -> None:
+def test_changed_template_is_refused_in_one_line(chat_server: ChatServer, in_folder: Path) -> None:
     own = in_folder / "own.md"
     for text in (OWN, OWN.replace("Only", "\n".join("Just"))):
         own.write_text(text, encoding="utf-8")

@@ -78,7 +78,7 @@ def test_lines_are_cut_into_equal_steps() -> None:
 
 
 @pytest.mark.parametrize("arms", [moving_arms(30, 5, 1), [SLIDING.arm(design) for design in SLIDING.sample(30, 2)]])
-def test_tip_and_torque_along_a_move_are_pinocchio_s(arms: list[Arm]) -> None:
+def test_tip_and_torque_along_a_move_agree_with_pinocchio(arms: list[Arm]) -> None:
     payload = np.array([0.3, 1.2, 0.0])
     evaluation = evaluate(arms, CORNERS, payload=payload, moves=Moves(((0, 1), (2, 0))))
     paths = evaluation.paths
@@ -99,7 +99,7 @@ def test_tip_and_torque_along_a_move_are_pinocchio_s(arms: list[Arm]) -> None:
     assert paths.error == pytest.approx(np.linalg.norm(paths.reached - paths.samples.points, axis=-1))
 
 
-def test_two_links_in_a_plane_turn_as_the_closed_form_says() -> None:
+def test_planar_move_matches_the_closed_form() -> None:
     """Both elbows, by the law of cosines; the one that the arm begins with is the one that it keeps."""
     a, b = 0.3, 0.25
     targets = np.array([[0.2, 0.0, 0.2], [0.35, 0.0, -0.2]])
@@ -116,7 +116,7 @@ def test_two_links_in_a_plane_turn_as_the_closed_form_says() -> None:
     )
 
 
-def test_a_move_through_the_hole_about_the_base_fails_and_one_beyond_it_does_not() -> None:
+def test_move_through_the_unreachable_centre_fails() -> None:
     arm, limit = planar(0.3, 0.2), 0.1  # reaches no nearer than 0.1 m to its base
     through = evaluate([arm], [[0.3, 0.0, 0.0], [-0.3, 0.0, 0.0]], moves=Moves(((0, 1),)))
     past = evaluate([arm], [[0.3, 0.0, 0.15], [-0.3, 0.0, 0.15]], moves=Moves(((0, 1),)))
@@ -126,7 +126,7 @@ def test_a_move_through_the_hole_about_the_base_fails_and_one_beyond_it_does_not
     assert past.paths.error.max() < 1e-3
 
 
-def test_a_flip_is_a_jump() -> None:
+def test_flip_is_reported_as_a_joint_jump() -> None:
     """A line close by the axis of the base: the first joint has to make half a turn within some steps."""
     links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (0.2, 0.3, 0.3))
     axes = ("z", "y", "y")
@@ -140,7 +140,7 @@ def test_a_flip_is_a_jump() -> None:
     assert paths.jumps[0, turn] == 0.0, "from the end of a move to the start of the next is none"
 
 
-def test_moves_begin_in_the_kept_posture_and_go_on_from_sample_to_sample() -> None:
+def test_moves_continue_from_sample_to_sample() -> None:
     """As one would do it by hand, one move and one sample after the other; to the bit."""
     space = paper_space(5)
     arms = stack_designs(space, space.matrix(space.sample(40, 3)))
@@ -159,7 +159,7 @@ def test_moves_begin_in_the_kept_posture_and_go_on_from_sample_to_sample() -> No
     assert targets[0] == pytest.approx(paths.samples.points[0])
 
 
-def test_one_arm_is_as_one_of_many() -> None:
+def test_moves_do_not_depend_on_the_batch() -> None:
     space, moves = paper_space(4), Moves(((0, 1), (1, 2)))
     arms = [space.arm(design) for design in space.sample(1500, 0)]
     many = evaluate(arms, CORNERS, moves=moves).paths
@@ -192,7 +192,7 @@ def test_mirrored_arms_mirror_their_moves() -> None:
     assert alike.mean() > 0.85, "but for the few arms for which the solver is chaotic"
 
 
-def test_a_finer_step_follows_no_worse() -> None:
+def test_finer_steps_follow_the_line_no_worse() -> None:
     """Of arms that follow a line at all, in distribution."""
     space = paper_space(6)
     arms = [space.arm(design) for design in space.sample(400, 1)]
@@ -214,7 +214,7 @@ def of_all(arms: Sequence[Arm], **how: Any) -> tuple[Evaluation, Evaluation]:
     return evaluate(arms, CORNERS, **how), evaluate(arms, CORNERS, moves=moves, **how)
 
 
-def test_a_target_s_share_counts_the_moves_that_end_there() -> None:
+def test_target_share_counts_the_moves_that_end_there() -> None:
     arms = moving_arms(50, 5, 4)
     ball = Sphere(kind="sphere", center=(0.25, 0.25, 0.25), radius=0.1)
     still, moving = of_all(arms, obstacles=[ball])
@@ -237,7 +237,7 @@ def test_a_target_s_share_counts_the_moves_that_end_there() -> None:
         assert np.array_equal(objective(moving), objective(still)), name
 
 
-def test_torque_use_counts_the_way() -> None:
+def test_torque_utilisation_includes_moves() -> None:
     space = DesignSpace.model_validate({"joints": 4, "actuators": ["XM430-W350"], "safety_factor": 2.0})
     designs = space.sample(40, 0)
     still = Problem(task(objectives=["torque_utilisation"]), space)
@@ -250,7 +250,7 @@ def test_torque_use_counts_the_way() -> None:
     assert np.any(moving.evaluate(designs).values > 1.01 * still.evaluate(designs).values)
 
 
-def test_moves_cost_nothing_where_nothing_asks_for_them() -> None:
+def test_moves_are_computed_on_demand() -> None:
     designs = paper_space().sample(20, 0)
     plain, moving = Problem(task()), Problem(task(moves="in_order"))
     evaluation = moving.physics(designs)
@@ -268,7 +268,7 @@ def test_objectives_of_moves_need_moves() -> None:
         problem.evaluate(paper_space().sample(1, 0))
 
 
-def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_batches_equal_small_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Problem(task(moves="in_order", objectives=["position_error", "path_error"]))
     designs = problem.space.sample(50, 5)
     values = problem.evaluate(designs).values
@@ -279,7 +279,7 @@ def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> Non
 # From the file on
 
 
-def test_a_task_file_says_moves_in_either_way() -> None:
+def test_task_file_states_moves_in_either_form() -> None:
     text = "name: x\ntargets: [[0.1, 0, 0], [0.2, 0, 0], [0.3, 0.1, 0]]\nmoves: {}\nmove_step: 0.01"
     in_order = parse_document(text.format("in_order"), Task, TaskError, "it")
     pairs = parse_document(text.format("[[1, 2], [2, 3]]"), Task, TaskError, "it")
@@ -304,14 +304,14 @@ FAULTS = {
 
 
 @pytest.mark.parametrize(("written", "words"), FAULTS.items())
-def test_moves_that_cannot_be_are_refused_in_one_line(written: str, words: str) -> None:
+def test_invalid_moves_are_refused_in_one_line(written: str, words: str) -> None:
     text = f"name: x\ntargets: [[0, 0, 0], [1, 0, 0], [2, 0, 0]]\nmoves: {written}"
     with pytest.raises(TaskError, match=words) as refused:
         parse_document(text, Task, TaskError, "it.yaml")
     assert "\n" not in str(refused.value)
 
 
-def test_in_order_needs_two_targets_and_a_bound_on_all_samples() -> None:
+def test_moves_in_order_are_bounded() -> None:
     with pytest.raises(ValueError, match="needs at least two targets"):
         Task.model_validate({"name": "x", "targets": [[0, 0, 0]], "moves": "in_order"})
     many = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]] * 120
@@ -320,7 +320,7 @@ def test_in_order_needs_two_targets_and_a_bound_on_all_samples() -> None:
         Task.model_validate({"name": "x", "targets": many, "moves": "in_order", "move_step": 0.006})
 
 
-def test_the_suggested_step_is_taken() -> None:
+def test_suggested_step_is_accepted() -> None:
     targets = [[0.0, 0.0, 0.0], [4.4444, 0.0, 0.0]]
     with pytest.raises(ValueError, match=r"try move_step: 0\.023\b"):
         Task.model_validate({"name": "x", "targets": targets, "moves": "in_order"})
@@ -328,7 +328,7 @@ def test_the_suggested_step_is_taken() -> None:
 
 
 @pytest.mark.slow
-def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
+def test_run_with_moves_from_the_command_line(in_folder: Path) -> None:
     text = f"name: line\ntargets: {[list(point) for point in CORNERS]}\nmoves: in_order\nobjectives: "
     (in_folder / "line.yaml").write_text(f"{text} [position_error, path_error]\n")
     words = ["optimize", "line.yaml", "--proposer", "rules", "--n-total", "15", "--out", "run"]
@@ -345,7 +345,7 @@ def test_a_run_with_moves_from_the_command_line(in_folder: Path) -> None:
     assert "no objective or constraint uses the task's moves" in told.output
 
 
-def test_constraints_bound_what_moves_and_workspaces_come_to() -> None:
+def test_constraints_bound_moves_and_workspaces() -> None:
     sentences = ["path_error <= 0.01", "max_joint_step <= 0.5", "uncovered_fraction <= 0.4", "manipulability >= 0.001"]
     box = {"low": (0.2, -0.2, 0.1), "high": (0.5, 0.2, 0.3), "points": 30}
     problem = Problem(

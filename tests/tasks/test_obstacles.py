@@ -55,7 +55,7 @@ def task_of(records: Sequence[object], **more: object) -> Task:
 # The file
 
 
-def test_what_may_be_written() -> None:
+def test_valid_obstacles_are_accepted() -> None:
     task = task_of(RECORDS)
     assert [obstacle.describe() for obstacle in task.obstacles] == DESCRIPTIONS
     assert task_of(task.model_dump(mode="json")["obstacles"]) == task
@@ -86,19 +86,19 @@ def test_what_may_be_written() -> None:
         ([3], "obstacles[0]"),
     ],
 )
-def test_what_may_not_is_refused_in_one_line(records: list[object], words: str) -> None:
+def test_invalid_obstacles_are_refused_in_one_line(records: list[object], words: str) -> None:
     with pytest.raises(TaskError) as refusal:
         task_of(records)
     assert words in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
-def test_a_mapping_is_no_list() -> None:
+def test_mapping_instead_of_a_list_is_refused() -> None:
     with pytest.raises(TaskError, match="obstacles: expected a list of records, such as"):
         parse_document("name: a\ntargets: [[0, 0, 1]]\nobstacles: {kind: ground}", Task, TaskError, "a.yaml")
 
 
-def test_the_template_shows_one_of_each(tmp_path: Path) -> None:
+def test_task_template_shows_every_obstacle_kind(tmp_path: Path) -> None:
     lines = task_template(tmp_path / "a.yaml").splitlines()
     start = lines.index("# obstacles:")
     shown = yaml.safe_load("\n".join(line.removeprefix("# ") for line in lines[start : lines.index("", start)]))
@@ -106,13 +106,13 @@ def test_the_template_shows_one_of_each(tmp_path: Path) -> None:
 
 
 @given(st.tuples(*[st.floats(-3.0, 3.0)] * 3))
-def test_a_box_is_turned_as_urdf_has_it(rpy: tuple[float, float, float]) -> None:
+def test_box_orientation_follows_urdf(rpy: tuple[float, float, float]) -> None:
     box = Box(kind="box", center=(0.0, 0.0, 0.0), size=(1.0, 1.0, 1.0), rpy=rpy)
     assert box.solid.rotation == pytest.approx(pinocchio.rpy.rpyToMatrix(*rpy), abs=1e-12)
 
 
 @given(st.tuples(*[st.floats(-100.0, 100.0)] * 3).filter(lambda axis: np.linalg.norm(axis) > 1e-3))
-def test_a_cylinder_stands_along_its_axis(axis: tuple[float, float, float]) -> None:
+def test_cylinder_is_aligned_with_its_axis(axis: tuple[float, float, float]) -> None:
     rotation = Cylinder(kind="cylinder", center=(0.0, 0.0, 0.0), radius=1.0, height=1.0, axis=axis).solid.rotation
     assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-9)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
@@ -145,7 +145,7 @@ def test_objectives_of_clearance() -> None:
     assert np.all(alone.evaluate(designs).values <= values)
 
 
-def test_the_paper_s_objectives_do_not_see_them() -> None:
+def test_paper_objectives_ignore_obstacles() -> None:
     with_, without = task_of(RECORDS), task_of([])
     designs = Problem(without).space.sample(20, 0)
     assert np.array_equal(Problem(with_).evaluate(designs).values, Problem(without).evaluate(designs).values)
@@ -154,7 +154,7 @@ def test_the_paper_s_objectives_do_not_see_them() -> None:
 
 
 @pytest.mark.slow
-def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
+def test_obstacles_reach_prompt_and_figures(tmp_path: Path) -> None:
     file = tmp_path / "way.yaml"
     said = {"name": "way", "targets": POINTS, "obstacles": RECORDS, "objectives": ["worst_error", "collision"]}
     file.write_text(yaml.safe_dump(said))
@@ -179,7 +179,7 @@ def test_from_the_file_to_the_prompt_and_the_figures(tmp_path: Path) -> None:
     assert "no objective or constraint uses the task's obstacles" in armwright("optimize", file, *options)
 
 
-def test_a_task_with_other_obstacles_is_another_run(tmp_path: Path) -> None:
+def test_changed_obstacles_are_refused(tmp_path: Path) -> None:
     optimize(Problem(task_of(RECORDS)), proposer="none", n_init=2, n_total=1, out=tmp_path)
     with pytest.raises(RunConflictError, match=r"task\.obstacles: \[.*table"):
         optimize(Problem(task_of(RECORDS[:1])), proposer="none", n_init=2, n_total=1, out=tmp_path)
@@ -188,7 +188,7 @@ def test_a_task_with_other_obstacles_is_another_run(tmp_path: Path) -> None:
 # Drawings
 
 
-def test_faces_are_cut_off_at_the_cube() -> None:
+def test_faces_are_clipped_to_the_plot() -> None:
     rng = np.random.default_rng(0)
     square = np.array([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)])
     cut = 0
@@ -209,7 +209,7 @@ def test_faces_are_cut_off_at_the_cube() -> None:
     assert cut > 100
 
 
-def test_the_page_draws_them_where_they_are(tmp_path: Path, browser: Browser) -> None:
+def test_page_draws_obstacles_in_place(tmp_path: Path, browser: Browser) -> None:
     task = task_of(RECORDS, objectives=["worst_error", "clearance_shortfall"])
     optimize(Problem(task), proposer="none", n_init=4, n_total=6, out=tmp_path, verify=False)
     write_report(tmp_path)

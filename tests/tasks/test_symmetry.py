@@ -35,16 +35,16 @@ def directions(name: str) -> set[tuple[int, ...]]:
     return {tuple(np.round(n / np.abs(n[np.abs(n) > 1e-6]).min()).astype(int).tolist()) for n in found}
 
 
-def test_the_planes_of_target_1_are_a_cubes() -> None:
+def test_target_1_has_the_symmetry_planes_of_a_cube() -> None:
     axes = {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
     assert directions("target-1") == axes | {(1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1)}
 
 
-def test_the_planes_of_target_2_are_its_two_and_its_own() -> None:
+def test_target_2_has_its_known_symmetry_planes() -> None:
     assert directions("target-2") == {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
 
 
-def test_the_planes_of_target_3_are_an_octagons_and_its_own() -> None:
+def test_target_3_has_its_known_symmetry_planes() -> None:
     """Its file has six digits, and is symmetric within 1e-6 m."""
     normals = symmetry_planes(load_task("target-3").target_positions)
     angles = np.degrees(np.arctan2(normals[:, 2], normals[:, 1])) % 180.0
@@ -55,9 +55,7 @@ def test_the_planes_of_target_3_are_an_octagons_and_its_own() -> None:
 
 
 @given(POINTS, ROTATIONS, arrays(float, (3,), elements=MILLIMETRES))
-def test_a_mirrored_set_has_its_plane_wherever_it_is_turned(
-    half: np.ndarray, quaternion: np.ndarray, shift: np.ndarray
-) -> None:
+def test_rotated_mirrored_set_has_its_plane(half: np.ndarray, quaternion: np.ndarray, shift: np.ndarray) -> None:
     points = np.vstack([half, half * (1.0, -1.0, 1.0)])
     assume(np.abs(half[:, 1]).max() > 0.01)
     turn = rotation(quaternion)
@@ -67,7 +65,7 @@ def test_a_mirrored_set_has_its_plane_wherever_it_is_turned(
 
 
 @given(POINTS)
-def test_a_quarter_turn_about_z_turns_the_planes(half: np.ndarray) -> None:
+def test_quarter_turn_rotates_the_planes(half: np.ndarray) -> None:
     assume(np.abs(half[:, 1]).max() > 0.01)
     points = np.vstack([half, half * (1.0, -1.0, 1.0)])
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -91,18 +89,18 @@ def test_every_plane_mirrors_the_set_onto_itself(half: np.ndarray, quaternion: n
 
 
 @given(POINTS, st.randoms(use_true_random=False))
-def test_order_and_points_given_twice_mean_nothing(points: np.ndarray, random: object) -> None:
+def test_planes_do_not_depend_on_order_and_duplicates(points: np.ndarray, random: object) -> None:
     order = [0, *range(len(points))]
     random.shuffle(order)  # type: ignore[attr-defined]
     assert symmetry_planes(points[order]).tolist() == symmetry_planes(points).tolist()
 
 
-def test_random_sets_have_no_plane() -> None:
+def test_random_sets_have_no_symmetry_plane() -> None:
     for seed in range(30):
         assert len(symmetry_planes(random_task(seed).target_positions)) == 0
 
 
-def test_a_point_moved_by_more_than_the_tolerance_breaks_the_symmetry() -> None:
+def test_point_moved_beyond_the_tolerance_breaks_symmetry() -> None:
     rng = np.random.default_rng(0)
     half = rng.uniform(-1.0, 1.0, (5, 3))
     points = np.vstack([half, half * (1.0, -1.0, 1.0)])
@@ -111,7 +109,7 @@ def test_a_point_moved_by_more_than_the_tolerance_breaks_the_symmetry() -> None:
         assert len(symmetry_planes(points)) == planes
 
 
-def test_a_line_has_the_plane_that_halves_it_and_a_point_none() -> None:
+def test_line_has_its_bisecting_plane_and_a_point_none() -> None:
     """Every place lies on one of the other planes through a line: they would say nothing."""
     line = np.array([[0.1, 0.2, 0.3]]) + np.arange(5)[:, None] * np.array([[0.0, 0.3, 0.4]])
     assert symmetry_planes(line) == pytest.approx(np.array([[0.0, 0.6, 0.8]]))
@@ -121,12 +119,12 @@ def test_a_line_has_the_plane_that_halves_it_and_a_point_none() -> None:
     assert distance_to_planes(line[0], line[:1], np.empty((0, 3))) == np.inf
 
 
-def test_a_plane_without_symmetry_has_itself() -> None:
+def test_coplanar_points_have_their_own_plane() -> None:
     points = np.array([[0.0, 0.0, 0.5], [0.7, 0.1, 0.5], [0.2, 0.3, 0.5]])
     assert symmetry_planes(points).tolist() == [[0.0, 0.0, 1.0]]
 
 
-def test_many_points() -> None:
+def test_planes_of_many_points_are_found() -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
     ring = np.column_stack([np.cos(angles), np.sin(angles), np.full(120, 0.3)])
     assert len(symmetry_planes(ring)) == 121
@@ -136,7 +134,7 @@ def test_many_points() -> None:
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_a_plane_that_is_asked_for_is_one_that_is_found(name: str) -> None:
+def test_is_mirrored_agrees_with_the_found_planes(name: str) -> None:
     points = load_task(name).target_positions
     planes = symmetry_planes(points)
     for normal in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.5**0.5, -(0.5**0.5), 0.0)):

@@ -53,12 +53,12 @@ def test_records_become_positions_and_arrays() -> None:
     assert (target_arrays.restarts, one.is_plain) == (1, False)
 
 
-def test_roll_pitch_yaw_are_those_of_urdf() -> None:
+def test_roll_pitch_yaw_follow_urdf() -> None:
     for angles in np.random.default_rng(0).uniform(-np.pi, np.pi, (50, 3)):
         assert rotation_from_rpy(*angles) == pytest.approx(pinocchio.rpy.rpyToMatrix(*angles))
 
 
-def test_a_task_is_written_as_it_was_read() -> None:
+def test_task_round_trips() -> None:
     one = task()
     written = one.model_dump(mode="json")
     assert written["targets"][:2] == [{"position": [0.3, 0.0, 0.1], "axis": [0.0, 0.0, -2.0]}, [0.3, 0.1, 0.4]]
@@ -68,7 +68,7 @@ def test_a_task_is_written_as_it_was_read() -> None:
     assert one.model_copy(update={"name": "other"}).target_specs == one.target_specs
 
 
-def test_a_record_without_more_is_the_point() -> None:
+def test_target_with_only_a_position_is_a_point() -> None:
     record = task("name: a\ntargets: [{position: [0.1, 0.2, 0.3], weight: 1}]")
     assert record == task("name: a\ntargets: [[0.1, 0.2, 0.3]]")
     assert record.is_plain
@@ -93,12 +93,12 @@ def test_a_record_without_more_is_the_point() -> None:
         ("[0, 0]", r"targets\[1\]"),
     ],
 )
-def test_mistakes_are_named(target: str, words: str) -> None:
+def test_mistakes_are_reported(target: str, words: str) -> None:
     with pytest.raises(TaskError, match=words):
         task(f"name: a\ntargets:\n  - [0, 0, 1]\n  - {target}\n")
 
 
-def test_restarts_within_bounds() -> None:
+def test_restarts_are_bounded() -> None:
     with pytest.raises(TaskError, match="restarts"):
         task(RECORDS.replace("restarts: 1", "restarts: -1"))
 
@@ -106,13 +106,13 @@ def test_restarts_within_bounds() -> None:
 # Objectives
 
 
-def test_orientation_counts_without_being_named_and_only_where_it_is_asked_for() -> None:
+def test_orientation_counts_only_for_oriented_targets() -> None:
     assert [o.name for o in Problem(task()).objectives] == ["position_error", "torque", "orientation_error"]
     with pytest.raises(SettingsError, match=r"orientation_error would be 0 .* no target of task a has"):
         Problem(task("name: a\ntargets: [[0, 0, 1]]"), objectives=named_objectives(["orientation_error"]))
 
 
-def test_objectives_heed_weights_and_tolerances() -> None:
+def test_objectives_use_weights_and_tolerances() -> None:
     problem = Problem(task(), paper_space(6))
     found = problem.physics(problem.space.sample(200, 0))
     weight = np.array([1.0, 1.0, 2.0, 1.0])
@@ -135,7 +135,7 @@ def test_objectives_heed_weights_and_tolerances() -> None:
     assert 0.5 < 1.0 - UNREACHED_TARGETS(found).mean() < 1.0, "the axis alone counts, and most arms can point there"
 
 
-def test_verification_uses_the_same_goals() -> None:
+def test_verification_uses_the_same_targets() -> None:
     """In float64 a design is as good as in the search, by and large, and its orientation counts."""
     problem = Problem(task(), paper_space(6))
     designs = problem.space.sample(30, 0)
@@ -180,7 +180,7 @@ def test_tools_of_arms_are_checked() -> None:
 # Prompts and run folders
 
 
-def test_the_prompt_says_what_targets_ask_for() -> None:
+def test_prompt_states_target_requirements() -> None:
     text = load_prompt("plus").render(fixed_history(FixedProblem(task(), paper_space(6))), seed=0)
     for words in (
         "- target 1: axis (0, 0, -2)",
@@ -196,7 +196,7 @@ def test_the_prompt_says_what_targets_ask_for() -> None:
     assert "Orientation and collisions" not in text
 
 
-def test_a_run_keeps_it_all(tmp_path: Path) -> None:
+def test_run_records_target_requirements(tmp_path: Path) -> None:
     problem = Problem(task(), paper_space(6))
     run = optimize(problem, n_init=5, n_total=1, out=tmp_path / "run")
     assert read_config(tmp_path / "run").task == problem.task

@@ -16,7 +16,7 @@ from armwright.tasks.task_template import task_template
 from armwright.yaml_documents import parse_document
 
 
-def test_the_built_in_tasks() -> None:
+def test_builtin_tasks_are_complete() -> None:
     tasks = builtin_tasks()
     assert list(tasks)[:3] == ["target-1", "target-2", "target-3"]
     published = {"autodesign-1": 4, "autodesign-2": 6, "autodesign-3": 6, "slideopt-wide": 9, "slideopt-arm": 7}
@@ -38,7 +38,7 @@ def test_the_built_in_tasks() -> None:
         assert "reconstruction" in tasks[name].provenance
 
 
-def test_the_symmetries_that_the_paper_states() -> None:
+def test_paper_targets_have_the_stated_symmetries() -> None:
     def points(name: str) -> set[tuple[float, ...]]:
         return {tuple(row) for row in np.round(load_task(name).target_positions, 6).tolist()}
 
@@ -49,7 +49,7 @@ def test_the_symmetries_that_the_paper_states() -> None:
     assert circle == pytest.approx(np.full(8, 0.55), abs=1e-6)
 
 
-def test_the_least_task_file(tmp_path: Path) -> None:
+def test_minimal_task_file_is_accepted(tmp_path: Path) -> None:
     file = tmp_path / "shelf.yaml"
     file.write_text("name: shelf\ntargets: [[0.45, 0.0, 0.1]]\n")
     task = load_task(file)
@@ -78,7 +78,7 @@ def test_the_least_task_file(tmp_path: Path) -> None:
         ("[" * 3000, "not valid YAML"),
     ],
 )
-def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+def test_invalid_task_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "task.yaml"
     file.write_text(text)
     with pytest.raises(TaskError) as refusal:
@@ -88,7 +88,7 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, words: str
     assert len(str(refusal.value)) < 400
 
 
-def test_unknown_names_are_helped(tmp_path: Path) -> None:
+def test_unknown_task_names_get_suggestions(tmp_path: Path) -> None:
     with pytest.raises(TaskError, match=r'unknown task "targt-1".*Did you mean "target-1"'):
         load_task("targt-1")
     with pytest.raises(TaskError, match=r"no file .*armwright init"):
@@ -99,7 +99,7 @@ def test_unknown_names_are_helped(tmp_path: Path) -> None:
 
 
 @given(st.text(max_size=200))
-def test_no_text_breaks_the_reader(text: str) -> None:
+def test_arbitrary_text_is_read_or_refused(text: str) -> None:
     with contextlib.suppress(TaskError):
         assert isinstance(parse_document(text, Task, TaskError, "it"), Task)
 
@@ -114,7 +114,7 @@ def test_no_text_breaks_the_reader(text: str) -> None:
         ("1 2  3\n", "m", [(1, 2, 4)]),
     ],
 )
-def test_points_from_csv(tmp_path: Path, text: str, unit: str, expected: list[tuple[float, ...]]) -> None:
+def test_targets_are_read_from_csv(tmp_path: Path, text: str, unit: str, expected: list[tuple[float, ...]]) -> None:
     file = tmp_path / "points.csv"
     file.write_text(text, encoding="utf-8", newline="")
     assert np.array(read_points(file, unit, (0.0, 0.0, 1.0))) == pytest.approx(np.array(expected))
@@ -131,19 +131,19 @@ def test_points_from_csv(tmp_path: Path, text: str, unit: str, expected: list[tu
         ("O.1,0.2,0.3\n0.1,0.2,0.3\n", "line 1"),
     ],
 )
-def test_bad_csv_is_refused_by_line(tmp_path: Path, text: str, words: str) -> None:
+def test_invalid_csv_is_refused_by_line(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "points.csv"
     file.write_text(text)
     with pytest.raises(TaskError, match=words):
         read_points(file)
 
 
-def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
+def test_unknown_unit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TaskError, match='unit: expected m or mm, got "inch"'):
         read_points(tmp_path / "points.csv", "inch")
 
 
-def test_the_template_is_a_task() -> None:
+def test_task_template_is_a_valid_task() -> None:
     task = parse_document(task_template(Path("mine.yaml"), ((0.1, 0.2345678, 0.3),)), Task, TaskError, "it")
     assert (task.name, task.targets) == ("mine", ((0.1, 0.2345678, 0.3),))
     assert len(parse_document(task_template(Path("12.yaml")), Task, TaskError, "it").targets) == 3

@@ -44,14 +44,14 @@ def radical_inverse(number: int, base: int) -> float:
     return 0.0 if number == 0 else (number % base + radical_inverse(number // base, base)) / base
 
 
-def test_points_are_halton_s() -> None:
+def test_workspace_points_are_halton_points() -> None:
     expected = [[radical_inverse(i, base) for base in (2, 3, 5)] for i in range(1, 3001)]
     assert sample_regions((region(points=3000),)) == pytest.approx(np.array(expected))
     by_chance = np.mean([qmc.discrepancy(np.random.default_rng(i).random((200, 3))) for i in range(10)])
     assert qmc.discrepancy(sample_regions((region(points=200),))) < 0.2 * by_chance
 
 
-def test_each_region_has_its_points_and_they_lie_in_it() -> None:
+def test_workspace_points_lie_in_their_region() -> None:
     one, flat, spot = (
         region(points=50),
         region(low=(0.2, -1.0, 0.5), high=(0.4, 1.0, 0.5)),
@@ -68,7 +68,7 @@ def test_each_region_has_its_points_and_they_lie_in_it() -> None:
 # What is reached
 
 
-def test_a_ball_joint_reaches_a_shell() -> None:
+def test_two_link_arm_reaches_a_spherical_shell() -> None:
     """Two links whose first joints point anywhere reach all between |a - b| and a + b from their base."""
     a, b = 0.45, 0.25
     links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (1e-4, a, b))
@@ -85,7 +85,7 @@ def test_a_ball_joint_reaches_a_shell() -> None:
     assert 1.0 - UNCOVERED_FRACTION(evaluation)[0] == pytest.approx(volume, abs=0.03)
 
 
-def test_points_are_tried_like_targets() -> None:
+def test_workspace_points_are_solved_like_targets() -> None:
     problem = Problem(task(objectives=["uncovered_fraction"]))
     designs = problem.space.sample(30, 2)
     arms = [problem.arm(design) for design in designs]
@@ -94,7 +94,7 @@ def test_points_are_tried_like_targets() -> None:
     assert problem.evaluate(designs).values[:, 0] == pytest.approx((as_targets.position_error >= 1e-3).mean(axis=1))
 
 
-def test_longer_arms_cover_no_less() -> None:
+def test_longer_arms_cover_at_least_as_much() -> None:
     """Twice as large an arm in a workspace of twice the size is the same."""
     space = paper_space(5)
     small = [space.arm(design) for design in space.sample(40, 1)]
@@ -118,7 +118,7 @@ def test_longer_arms_cover_no_less() -> None:
     assert UNCOVERED_FRACTION(one).mean() == pytest.approx(UNCOVERED_FRACTION(other).mean(), abs=0.02)
 
 
-def test_a_workspace_costs_nothing_where_nothing_asks_for_it() -> None:
+def test_workspace_is_computed_on_demand() -> None:
     designs = paper_space().sample(10, 0)
     target_1 = load_task("target-1")
     with_ = target_1.model_copy(update={"workspace": task().workspace})
@@ -129,14 +129,14 @@ def test_a_workspace_costs_nothing_where_nothing_asks_for_it() -> None:
     assert Problem(task(), objectives=(UNCOVERED_FRACTION,)).uses(UNCOVERED_FRACTION)
 
 
-def test_without_a_workspace_nothing_is_unreached() -> None:
+def test_no_workspace_means_nothing_uncovered() -> None:
     with pytest.raises(SettingsError, match="uncovered_fraction needs a workspace in the task; try workspace: "):
         Problem(
             random_task(1).model_copy(update={"reference_point": None}), objectives=(OBJECTIVES["uncovered_fraction"],)
         ).evaluate(paper_space().sample(1, 0))
 
 
-def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_batches_equal_small_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = Problem(task(objectives=["uncovered_fraction", "torque"]))
     designs = problem.space.sample(30, 5)
     values = problem.evaluate(designs).values
@@ -156,7 +156,7 @@ def test_a_great_many_designs_are_as_few(monkeypatch: pytest.MonkeyPatch) -> Non
 # From the file on
 
 
-def test_targets_that_are_left_out_are_the_corners() -> None:
+def test_default_targets_are_the_workspace_corners() -> None:
     found = task(workspace=[CUBE, {"low": (1, 0, 0), "high": (2, 1, 0), "points": 9}])
     assert len(found.targets) == 8 + 2, "corners that both have count once"
     assert {(0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (2.0, 1.0, 0.0)} <= set(found.targets)
@@ -180,7 +180,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("written", FAULTS)
 @pytest.mark.parametrize("targets", ["", "targets: [[0.1, 0.2, 0.3]]\n"])
-def test_workspaces_that_cannot_be_are_refused_in_one_line(written: str, targets: str) -> None:
+def test_invalid_workspaces_are_refused_in_one_line(written: str, targets: str) -> None:
     text = f"name: x\n{targets}workspace: {written}"
     if written == "[]" and targets:
         assert parse_document(text, Task, TaskError, "it").workspace == ()

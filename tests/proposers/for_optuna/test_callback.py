@@ -101,7 +101,7 @@ def tpe(seed: int = 0, **settings: Any) -> optuna.Study:
     return optuna.create_study(sampler=TPESampler(seed=seed), **settings)
 
 
-def test_one_trial_in_every_is_a_proposal_and_none_is_left_over() -> None:
+def test_one_trial_per_block_is_a_proposal() -> None:
     study = tpe()
     callback = ProposalCallback(Told(), every=10)
     study.optimize(objective, n_trials=30, callbacks=[callback])
@@ -116,21 +116,21 @@ def test_one_trial_in_every_is_a_proposal_and_none_is_left_over() -> None:
     ("every", "first", "numbers"),
     [(10, 10, [10, 20]), (4, 1, [1, 5, 9, 13, 17, 21]), (1, 20, [20, 21, 22]), (30, 9, [9])],
 )
-def test_the_first_proposal_comes_after_so_many_trials(every: int, first: int, numbers: list[int]) -> None:
+def test_first_proposal_follows_the_initial_trials(every: int, first: int, numbers: list[int]) -> None:
     study = tpe()
     study.optimize(objective, n_trials=23, callbacks=[ProposalCallback(Told(), every, first=first)])
     assert len(study.trials) - 23 == (every == 1)  # one more waits where every trial asks
     assert [trial.number for trial in proposals(study)][: len(numbers)] == numbers
 
 
-def test_a_study_that_goes_on_keeps_the_ratio() -> None:
+def test_continued_study_keeps_the_ratio() -> None:
     study = tpe()
     for n in (7, 1, 5, 12):
         study.optimize(objective, n_trials=n, callbacks=[ProposalCallback(Told(), 5)])
     assert [trial.number for trial in proposals(study)] == [4, 9, 14, 19, 24]
 
 
-def test_failed_and_pruned_trials_count_and_ask_too() -> None:
+def test_failed_and_pruned_trials_count_towards_the_ratio() -> None:
     def failing(trial: optuna.Trial) -> float:
         objective(trial)
         if trial.number in (3, 4):
@@ -145,7 +145,7 @@ def test_failed_and_pruned_trials_count_and_ask_too() -> None:
 
 
 @pytest.mark.parametrize("sampler", [TPESampler(seed=0), NSGAIISampler(population_size=8, seed=0)])
-def test_with_threads_each_block_has_exactly_one_proposal(sampler: optuna.samplers.BaseSampler) -> None:
+def test_each_block_has_one_proposal_with_threads(sampler: optuna.samplers.BaseSampler) -> None:
     study = optuna.create_study(sampler=sampler)
     callback = ProposalCallback(Told(), every=5)
     study.optimize(objective, n_trials=60, n_jobs=4, callbacks=[callback])
@@ -179,7 +179,7 @@ study.optimize(objective, n_trials=10, callbacks=[aw.ProposalCallback(proposer, 
 
 
 @pytest.mark.slow
-def test_several_processes_on_one_storage_share_the_proposals(chat_server: ChatServer, tmp_path: Path) -> None:
+def test_processes_on_one_storage_share_proposals(chat_server: ChatServer, tmp_path: Path) -> None:
     chat_server.answer = lambda request: '{"reasoning": "so", "parameters": {"x": 0.125}, "reason": "an eighth"}'
     place = str(tmp_path / "journal")
     storage = JournalStorage(JournalFileBackend(place))
@@ -202,7 +202,7 @@ def test_several_processes_on_one_storage_share_the_proposals(chat_server: ChatS
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 @pytest.mark.parametrize("genetic", [NSGAIISampler, NSGAIIISampler])
-def test_genetic_samplers_take_proposals_as_parents(genetic: type[NSGAIISampler]) -> None:
+def test_genetic_samplers_use_proposals_as_parents(genetic: type[NSGAIISampler]) -> None:
     """They pass over enqueued trials that have no generation: with plain `enqueue_trial` no proposal is a parent."""
 
     class Best(Told):
@@ -229,7 +229,7 @@ def test_genetic_samplers_take_proposals_as_parents(genetic: type[NSGAIISampler]
     assert not {trial.params["x"] for trial in enqueued.trials[4:]} & {0.001, 0.003}
 
 
-def test_trials_out_of_range_do_not_keep_a_genetic_study_from_proposals() -> None:
+def test_genetic_study_with_out_of_range_trials_gets_proposals() -> None:
     study = optuna.create_study(sampler=NSGAIISampler(population_size=4, seed=0))
     study.enqueue_trial({"x": -5.0, "y": 3})
     with pytest.warns(UserWarning, match="out of range"):
@@ -247,7 +247,7 @@ def test_trials_out_of_range_do_not_keep_a_genetic_study_from_proposals() -> Non
         ({"z": 1.0}, 'unknown parameter "z"'),
     ],
 )
-def test_what_is_outside_the_space_never_enters_the_study(others: dict[str, Any], words: str, log: list[str]) -> None:
+def test_proposals_outside_the_space_are_refused(others: dict[str, Any], words: str, log: list[str]) -> None:
     """Optuna takes an out-of-range value with a warning; an unknown category leaves its trial RUNNING."""
     study = tpe()
     callback = ProposalCallback(Told(**others), every=5)
@@ -264,7 +264,7 @@ def test_what_is_outside_the_space_never_enters_the_study(others: dict[str, Any]
     assert log[0].endswith("the study continues without this proposal")
 
 
-def test_values_reach_optuna_in_its_own_types() -> None:
+def test_proposed_values_have_optuna_types() -> None:
     """A step's float noise is moved onto the grid; numpy's numbers cannot be kept in a storage."""
     study = tpe()
     proposer = Told(x=np.float64(7.0), y=np.int64(5))
@@ -272,7 +272,7 @@ def test_values_reach_optuna_in_its_own_types() -> None:
     assert [type(value) for value in study.trials[1].system_attrs["fixed_params"].values()] == [float, int]
 
 
-def test_a_fault_leaves_the_study_going(log: list[str]) -> None:
+def test_proposer_fault_does_not_stop_the_study(log: list[str]) -> None:
     study = tpe()
     callback = ProposalCallback(Failing(ProposalError("timeout", "too slow"), ProposalError("answer", "what?")), 5)
     study.optimize(objective, n_trials=20, callbacks=[callback])
@@ -281,7 +281,7 @@ def test_a_fault_leaves_the_study_going(log: list[str]) -> None:
     assert log == [f"{words}; the study continues without this proposal" for words in ("too slow", "what?")]
 
 
-def test_a_fault_that_asking_again_does_not_mend_is_said_once(log: list[str]) -> None:
+def test_permanent_fault_is_logged_once(log: list[str]) -> None:
     proposer = Failing(ProposalError("key", "wrong key", final=True))
     callback = ProposalCallback(proposer, 5)
     study = tpe()
@@ -291,7 +291,7 @@ def test_a_fault_that_asking_again_does_not_mend_is_said_once(log: list[str]) ->
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
-def test_on_wish_a_model_that_fails_at_first_stops_the_study(n_jobs: int) -> None:
+def test_on_failure_stop_raises_before_the_first_trial(n_jobs: int) -> None:
     def callback(*faults: ProposalError) -> ProposalCallback:
         return ProposalCallback(Failing(*faults), 5, on_model_failure="stop")
 
@@ -332,7 +332,7 @@ def arms(problem: Problem, study: optuna.Study, n_trials: int, callback: Proposa
 
 
 @pytest.mark.slow
-def test_rules_in_a_plain_study_beat_the_study_alone() -> None:
+def test_rules_improve_a_plain_study() -> None:
     volumes: list[list[float]] = [[], []]
     for seed in range(2):
         for k in (0, 1):
@@ -345,7 +345,7 @@ def test_rules_in_a_plain_study_beat_the_study_alone() -> None:
     assert np.mean(volumes[1]) > np.mean(volumes[0])
 
 
-def test_a_history_is_made_of_complete_trials_alone() -> None:
+def test_history_contains_only_complete_trials() -> None:
     study = tpe(directions=["minimize"] * 2)
     arms(PROBLEM, study, 6, ProposalCallback(RulesProposer(), 3, problem=PROBLEM))
     study.tell(study.ask(), state=TrialState.FAIL)
@@ -358,7 +358,7 @@ def test_a_history_is_made_of_complete_trials_alone() -> None:
     assert history.trials[7].values == tuple(study.trials[9].values)
 
 
-def test_a_task_without_a_reference_point_gets_one_from_the_first_trials() -> None:
+def test_missing_reference_point_comes_from_the_first_trials() -> None:
     problem = Problem(Task(name="mine", targets=((0.2, 0.1, 0.3), (0.3, -0.1, 0.2))))
     study = arms(problem, tpe(directions=["minimize"] * 2), 12, ProposalCallback(RulesProposer(), 2, problem=problem))
     bound = study_history(study, problem).reference_point
@@ -367,7 +367,7 @@ def test_a_task_without_a_reference_point_gets_one_from_the_first_trials() -> No
     assert study_history(study, problem).reference_point == bound
 
 
-def test_the_language_model_for_arms_works_in_a_plain_study(chat_server: ChatServer) -> None:
+def test_arm_llm_proposer_works_in_a_plain_study(chat_server: ChatServer) -> None:
     proposer = llm_proposer(chat_server.url, origin="scripted")
     study = arms(PROBLEM, tpe(directions=["minimize"] * 2), 8, ProposalCallback(proposer, 4, problem=PROBLEM))
     assert [trial.user_attrs.get("proposal") for trial in study.trials] == [
@@ -398,7 +398,7 @@ def origins(study: optuna.Study) -> list[float]:
 
 
 @pytest.mark.parametrize("callbacks", [1, 2])
-def test_one_proposer_in_two_studies_thinks_anew_for_each(thinker: ChatServer, callbacks: int) -> None:
+def test_proposer_is_called_separately_for_each_study(thinker: ChatServer, callbacks: int) -> None:
     """Both ask for trials 3 and 7; so would a study that is taken up again."""
     llm = llm_proposer(thinker.url, max_calls=4)
     made = [ProposalCallback(llm, 4, problem=PROBLEM) for _ in range(callbacks)]
@@ -411,7 +411,7 @@ def test_one_proposer_in_two_studies_thinks_anew_for_each(thinker: ChatServer, c
     assert [callback.faults for callback in made] == [{}] * callbacks  # each study has the whole budget
 
 
-def test_designs_left_of_another_study_are_not_taken_for_this_one() -> None:
+def test_pending_designs_stay_with_their_study() -> None:
     class Pair(RulesProposer):
         def propose(self, history: Any, seed: int, number: int) -> Any:
             return [Proposal(d, f"pair-{number}.{i}") for i, d in enumerate(PROBLEM.space.sample(2, len(history)))]
@@ -422,7 +422,7 @@ def test_designs_left_of_another_study_are_not_taken_for_this_one() -> None:
         assert [trial.user_attrs["proposal"] for trial in study.trials if trial.user_attrs] == ["pair-2.0"]
 
 
-def test_a_proposer_cannot_serve_two_studies_at_a_time(thinker: ChatServer) -> None:
+def test_proposer_refuses_two_studies_at_once(thinker: ChatServer) -> None:
     llm = llm_proposer(thinker.url)
 
     def meanwhile(request: Request) -> Answer:
@@ -436,7 +436,7 @@ def test_a_proposer_cannot_serve_two_studies_at_a_time(thinker: ChatServer) -> N
     assert origins(study) == [0.01]
 
 
-def test_the_calls_of_a_study_are_kept_and_what_was_paid_for_is_used(thinker: ChatServer, tmp_path: Path) -> None:
+def test_recorded_calls_of_a_study_are_reused(thinker: ChatServer, tmp_path: Path) -> None:
     storage = InMemoryStorage()
 
     def go_on(n_trials: int) -> optuna.Study:
@@ -468,7 +468,7 @@ def test_the_calls_of_a_study_are_kept_and_what_was_paid_for_is_used(thinker: Ch
         ProposalCallback(Told(), folder="calls")
 
 
-def test_several_designs_of_one_call_enter_one_a_block() -> None:
+def test_designs_of_one_call_enter_one_per_block() -> None:
     class Pair(RulesProposer):
         per_call = 2
         calls = 0
@@ -485,7 +485,7 @@ def test_several_designs_of_one_call_enter_one_a_block() -> None:
     assert pair.calls == 2
 
 
-def test_a_study_of_other_directions_or_designs_is_refused() -> None:
+def test_study_with_other_directions_or_parameters_is_refused() -> None:
     callback = ProposalCallback(RulesProposer(), 2, problem=PROBLEM)
     with pytest.raises(SettingsError, match="directions minimize; a study over an armwright problem minimises 2"):
         tpe().optimize(objective, n_trials=2, callbacks=[callback])
@@ -505,6 +505,6 @@ def test_a_study_of_other_directions_or_designs_is_refused() -> None:
         ({"proposer": Told(), "on_model_failure": "ignore"}, 'on_model_failure "ignore" is not one of'),
     ],
 )
-def test_wrong_settings_are_refused(settings: dict[str, Any], words: str) -> None:
+def test_invalid_settings_are_refused(settings: dict[str, Any], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         ProposalCallback(**settings)

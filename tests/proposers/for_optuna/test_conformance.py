@@ -86,7 +86,7 @@ def rules(every: int = 3, **settings: Any) -> aw.ProposalCallback:
 
 @pytest.mark.parametrize("objective", [mixed, two])
 @pytest.mark.parametrize("sampler", SAMPLERS)
-def test_each_kind_of_parameter_with_each_sampler(
+def test_every_sampler_accepts_proposals_of_every_parameter_kind(
     sampler: Callable[..., BaseSampler], objective: Callable[[optuna.Trial], Any]
 ) -> None:
     study = optuna.create_study(directions=["minimize"] * (1 + (objective is two)), sampler=sampler(seed=1))
@@ -115,7 +115,7 @@ def storage(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[BaseStor
         database.engine.dispose()
 
 
-def test_each_storage_keeps_proposals_and_gives_them_back(storage: BaseStorage) -> None:
+def test_proposals_survive_in_every_storage(storage: BaseStorage) -> None:
     study = optuna.create_study(storage=storage, directions=["minimize"] * 2, sampler=TPESampler(seed=0))
     study.optimize(two, n_trials=12, callbacks=[rules()])
     again = optuna.load_study(study_name=study.study_name, storage=storage, sampler=TPESampler(seed=1))
@@ -125,7 +125,7 @@ def test_each_storage_keeps_proposals_and_gives_them_back(storage: BaseStorage) 
 
 
 @pytest.mark.parametrize("sampler", [TPESampler(seed=0), NSGAIISampler(population_size=6, seed=0)])
-def test_threads(sampler: BaseSampler) -> None:
+def test_threads_get_distinct_proposals(sampler: BaseSampler) -> None:
     study = optuna.create_study(directions=["minimize"] * 2, sampler=sampler)
     callback = rules()
     study.optimize(two, n_trials=45, n_jobs=4, callbacks=[callback])
@@ -134,7 +134,7 @@ def test_threads(sampler: BaseSampler) -> None:
     assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
 
 
-def test_failed_pruned_and_nan_trials_teach_nothing_and_stop_nothing() -> None:
+def test_failed_pruned_and_nan_trials_are_ignored() -> None:
     def broken(trial: optuna.Trial) -> float:
         value = mixed(trial)
         if "proposal" in trial.user_attrs or trial.number % 4 == 0:
@@ -155,7 +155,7 @@ def test_failed_pruned_and_nan_trials_teach_nothing_and_stop_nothing() -> None:
 
 @pytest.mark.parametrize("value", [float("inf"), -float("inf"), 1e308, -1e308, 0.0])
 @pytest.mark.parametrize("n_objectives", [1, 3])
-def test_values_beyond_measure_and_none_better_than_another(value: float, n_objectives: int) -> None:
+def test_equal_and_infinite_values_are_handled(value: float, n_objectives: int) -> None:
     """Where all are alike, or all infinite; one is not."""
     study = optuna.create_study(directions=["maximize"] * n_objectives, sampler=RandomSampler(seed=0))
     callback = rules()
@@ -169,7 +169,7 @@ def test_values_beyond_measure_and_none_better_than_another(value: float, n_obje
     assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
 
 
-def test_maximising_the_opposite_is_the_same_study() -> None:
+def test_maximising_the_negated_objective_gives_the_same_study() -> None:
     def proposals(direction: str, sign: float) -> list[dict[str, Any]]:
         study = optuna.create_study(directions=[direction, "minimize"], sampler=RandomSampler(seed=0))
         study.optimize(lambda t: (sign * mixed(t), t.params["plain"]), n_trials=30, callbacks=[rules()])
@@ -178,7 +178,7 @@ def test_maximising_the_opposite_is_the_same_study() -> None:
     assert proposals("minimize", 1.0) == proposals("maximize", -1.0)
 
 
-def test_one_seed_is_one_study_and_another_seed_is_another() -> None:
+def test_proposals_depend_on_the_seed() -> None:
     def proposals(seed: int) -> list[dict[str, Any]]:
         study = optuna.create_study(sampler=RandomSampler(seed=0))
         study.optimize(mixed, n_trials=30, callbacks=[rules(seed=seed)])
@@ -187,7 +187,7 @@ def test_one_seed_is_one_study_and_another_seed_is_another() -> None:
     assert proposals(0) == proposals(0) != proposals(1)
 
 
-def test_a_study_that_is_stopped_asks_no_more_and_goes_on_with_what_was_proposed() -> None:
+def test_stopped_study_resumes_with_pending_proposals() -> None:
     study = optuna.create_study(sampler=RandomSampler(seed=0))
     callback = rules()
 
@@ -203,7 +203,7 @@ def test_a_study_that_is_stopped_asks_no_more_and_goes_on_with_what_was_proposed
     assert len(study.trials) == 6
 
 
-def test_trials_of_before_teach_from_the_first_proposal_on() -> None:
+def test_earlier_trials_inform_the_first_proposal() -> None:
     before = optuna.create_study(sampler=RandomSampler(seed=0))
     before.optimize(mixed, n_trials=20)
     study = optuna.create_study(sampler=RandomSampler(seed=1))
@@ -213,7 +213,7 @@ def test_trials_of_before_teach_from_the_first_proposal_on() -> None:
     assert first.user_attrs["proposal"].rpartition("-")[2] != "far"
 
 
-def test_what_a_user_enqueued_comes_first_and_is_not_lost() -> None:
+def test_trials_enqueued_by_the_user_run_first() -> None:
     study = optuna.create_study(sampler=RandomSampler(seed=0))
     for k in range(5):
         study.enqueue_trial({"whole": 2 * k}, user_attrs={"mine": k})
@@ -224,7 +224,7 @@ def test_what_a_user_enqueued_comes_first_and_is_not_lost() -> None:
     assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
 
 
-def test_parameters_that_are_new_in_each_trial() -> None:
+def test_parameters_new_in_each_trial_are_accepted() -> None:
     study = optuna.create_study(sampler=TPESampler(seed=0))
     callback = rules()
     study.optimize(
@@ -236,7 +236,7 @@ def test_parameters_that_are_new_in_each_trial() -> None:
     assert {trial.state for trial in study.trials} == {TrialState.COMPLETE}
 
 
-def test_constraints_keep_infeasible_trials_from_being_parents() -> None:
+def test_infeasible_trials_are_not_parents() -> None:
     def objective(trial: optuna.Trial) -> float:
         x, y = trial.suggest_float("x", 0.0, 1.0), trial.suggest_categorical("y", ["allowed", "forbidden"])
         trial.set_constraint("forbidden", 1.0 if y == "forbidden" else -1.0)
@@ -250,7 +250,7 @@ def test_constraints_keep_infeasible_trials_from_being_parents() -> None:
     assert {y for rule, y in by_rule if rule != "swap"} == {"allowed"}
 
 
-def test_a_parameter_that_is_fixed_is_kept_by_a_stated_space() -> None:
+def test_stated_space_keeps_a_fixed_parameter() -> None:
     """Optuna's enqueued trials go before its samplers, so a PartialFixedSampler alone does not bind proposals."""
     study = optuna.create_study(sampler=TPESampler(seed=0))
     study.optimize(mixed, n_trials=5)
@@ -261,7 +261,7 @@ def test_a_parameter_that_is_fixed_is_kept_by_a_stated_space() -> None:
     assert {trial.params["whole"] for trial in study.trials[5:]} == {4}
 
 
-def test_a_range_that_moves_away_leaves_optuna_to_warn_of_what_was_waiting() -> None:
+def test_optuna_warns_of_pending_proposals_outside_a_changed_range() -> None:
     study = optuna.create_study(sampler=RandomSampler(seed=0))
     study.optimize(lambda t: t.suggest_float("x", 0.0, 1.0), n_trials=3, callbacks=[rules(first=3)])
     with warnings.catch_warnings(record=True) as seen:

@@ -57,7 +57,7 @@ def categories(draw: st.DrawFn) -> tuple[CategoricalDistribution, Any]:
 
 @pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
 @given(st.dictionaries(st.text(max_size=70), st.one_of(ints(), floats(), categories()), min_size=1, max_size=5))
-def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
+def test_written_answers_round_trip_and_fit_optuna(
     drawn: dict[str, tuple[BaseDistribution, Any]],
 ) -> None:
     space = {name: distribution for name, (distribution, _) in drawn.items()}
@@ -74,7 +74,7 @@ def test_what_is_written_is_read_back_to_the_same_and_optuna_takes_it(
 
 
 @given(st.one_of(ints(), categories()))
-def test_the_schema_allows_what_is_written(drawn: tuple[BaseDistribution, Any]) -> None:
+def test_schema_allows_written_answers(drawn: tuple[BaseDistribution, Any]) -> None:
     distribution, value = drawn
     (parameter,) = study_parameters({"x": distribution}, [])
     schema = answer_schema([parameter], OBJECTIVES, PromptOptions(answer="one-step", memory="own"))
@@ -91,13 +91,13 @@ def test_the_schema_allows_what_is_written(drawn: tuple[BaseDistribution, Any]) 
 
 
 @given(st.lists(st.text(max_size=70), unique=True, max_size=8))
-def test_every_parameter_has_a_key_of_its_own_that_vendors_take(names: list[str]) -> None:
+def test_parameter_keys_are_unique_and_valid_for_vendors(names: list[str]) -> None:
     found = unique_keys(names)
     assert len(set(found)) == len(names)
     assert all(key.isascii() and 1 <= len(key) <= 64 and not set(key) & set(" /[](){}") for key in found)
 
 
-def test_a_plain_name_is_its_own_key() -> None:
+def test_plain_name_is_its_own_key() -> None:
     assert unique_keys(["lr", "layer/units", "layer_units", "学习率"]) == ["lr", "layer_units_2", "layer_units", "___"]
 
 
@@ -125,9 +125,7 @@ def test_a_plain_name_is_its_own_key() -> None:
         (CategoricalDistribution([1, 2]), "2", 2),
     ],
 )
-def test_what_models_write_is_read_in_the_type_that_was_meant(
-    distribution: BaseDistribution, written: Any, value: Any
-) -> None:
+def test_values_are_read_in_the_intended_type(distribution: BaseDistribution, written: Any, value: Any) -> None:
     found = read_value("x", written, distribution)
     assert found == value
     assert type(found) is type(value)
@@ -154,7 +152,7 @@ def test_what_models_write_is_read_in_the_type_that_was_meant(
         (CategoricalDistribution(["a", "b"]), {"a": 1}, "is not one of a, b"),
     ],
 )
-def test_what_no_distribution_holds_is_refused_in_words(
+def test_values_outside_a_distribution_are_refused_with_the_reason(
     distribution: BaseDistribution, written: Any, words: str
 ) -> None:
     with pytest.raises(DesignError) as refusal:
@@ -162,17 +160,17 @@ def test_what_no_distribution_holds_is_refused_in_words(
     assert words in str(refusal.value)
 
 
-def test_a_nan_among_the_choices_is_found() -> None:
+def test_nan_choice_is_recognised() -> None:
     assert math.isnan(checked_value("x", float("nan"), CategoricalDistribution([1.0, float("nan")])))
 
 
-def test_choices_of_the_same_text_are_told_apart() -> None:
+def test_choices_with_equal_text_are_distinguished() -> None:
     assert choice_texts(CategoricalDistribution(["a", None, 0.5])) == ["a", "null", "0.5"]
     assert choice_texts(CategoricalDistribution(["1", 1])) == ["'1'", "1"]
     assert choice_texts(CategoricalDistribution(["", "a"])) == ["''", "'a'"]
 
 
-def test_a_distribution_is_described_by_kind_and_range() -> None:
+def test_distribution_is_described_by_kind_and_range() -> None:
     assert describe(IntDistribution(2, 8, step=2)) == "whole number, 2 to 8 in steps of 2"
     assert describe(FloatDistribution(1e-5, 0.1, log=True)) == "number, 1e-05 to 0.1, on a log scale"
     assert describe(CategoricalDistribution(["a", True])) == "one of a, true"
@@ -193,25 +191,25 @@ def test_conditional_parameters_may_be_left_out() -> None:
     assert schema["properties"]["parameters"]["required"] == ["kernel", "C"]
 
 
-def test_an_answer_without_the_object_around_the_parameters_is_read() -> None:
+def test_answer_without_the_parameters_object_is_read() -> None:
     answer = read_answer({"KERNEL": "rbf", "c": "2.5", "reason": "a  try\n"}, PARAMETERS, OBJECTIVES)
     assert (dict(answer.params), answer.reason, answer.expected) == ({"kernel": "rbf", "C": 2.5}, "a try", None)
 
 
-def test_no_reason_is_no_reason() -> None:
+def test_missing_reason_is_empty() -> None:
     """Not the word None; and what is not seen is not kept."""
     parameters = [Parameter("C", "C", FloatDistribution(0.0, 9.0))]
     assert read_answer({"C": 1, "reason": None}, parameters, OBJECTIVES).reason == ""
     assert read_answer({"C": 1, "reason": "so\x1b[2J\u200b it is"}, parameters, OBJECTIVES).reason == "so it is"
 
 
-def test_a_parameter_may_be_called_reason() -> None:
+def test_parameter_may_be_named_reason() -> None:
     parameters = [Parameter("reason", "reason", IntDistribution(0, 9))]
     answer = StudyAnswer({"reason": 4}, "four")
     assert read_answer(json.loads(written_answer(answer, parameters, OBJECTIVES)), parameters, OBJECTIVES) == answer
 
 
-def test_all_that_is_wrong_is_said_at_once() -> None:
+def test_all_errors_are_reported_at_once() -> None:
     with pytest.raises(DesignError) as refusal:
         read_answer({"parameters": {"C": 1e3, "kernl": "rbf", "gamma": "big"}}, PARAMETERS, OBJECTIVES)
     words = str(refusal.value)
@@ -222,6 +220,6 @@ def test_all_that_is_wrong_is_said_at_once() -> None:
 
 
 @pytest.mark.parametrize("expected", [None, [1.0], {}, {"value": "much"}, {"value": float("inf")}, {"other": 1.0}])
-def test_expected_values_that_are_none_are_left_out(expected: Any) -> None:
+def test_missing_expected_values_are_omitted(expected: Any) -> None:
     content = {"parameters": {"kernel": "rbf", "C": 1.0}, "expected": expected}
     assert read_answer(content, PARAMETERS, OBJECTIVES).expected is None

@@ -55,7 +55,7 @@ def made(rule: str, study: optuna.Study, seed: int) -> tuple[dict[str, Any], str
 
 @pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
 @given(st.one_of(ints(), floats()), st.floats(-0.5, 1.5))
-def test_the_scale_from_0_to_1_and_back(drawn: tuple[BaseDistribution, Any], share: float) -> None:
+def test_unit_scale_round_trips(drawn: tuple[BaseDistribution, Any], share: float) -> None:
     distribution, value = drawn
     assume(is_number(distribution))
     assert 0.0 <= to_unit(value, distribution) <= 1.0 + 1e-9
@@ -66,7 +66,7 @@ def test_the_scale_from_0_to_1_and_back(drawn: tuple[BaseDistribution, Any], sha
     assert ends == pytest.approx([distribution.low, distribution.high], rel=1e-12)
 
 
-def test_equal_steps_of_a_log_scale_and_the_widest_range_of_floats() -> None:
+def test_unit_scale_handles_log_and_widest_ranges() -> None:
     log, wide = FloatDistribution(1e-300, 1e300, log=True), FloatDistribution(-1.7e308, 1.7e308)
     assert from_unit(0.5, log) == pytest.approx(1.0)
     assert to_unit(1.0, log) == pytest.approx(0.5)
@@ -88,7 +88,7 @@ def trials(draw: st.DrawFn) -> tuple[dict[str, BaseDistribution], list[dict[str,
 
 @pytest.mark.filterwarnings("ignore:The distribution is specified by:UserWarning")
 @given(trials(), st.integers(0, 2**31))
-def test_whatever_the_study_each_rule_stays_in_its_space(
+def test_rules_stay_in_the_space_of_any_study(
     drawn: tuple[dict[str, BaseDistribution], list[dict[str, Any]], list[list[float]]], seed: int
 ) -> None:
     """Any kinds, conditional at random, values up to infinity, equal trials: a proposal that Optuna's check passes."""
@@ -104,7 +104,7 @@ def test_whatever_the_study_each_rule_stays_in_its_space(
     assert proposal == proposer.propose(study, seed, 7)
 
 
-def test_gaps_are_filled_between_neighbours() -> None:
+def test_gap_rule_proposes_between_neighbours() -> None:
     study = study_of(FRONT, TWO)
     for seed in range(20):
         own, reason = made("fill", study, seed)
@@ -116,7 +116,7 @@ def test_gaps_are_filled_between_neighbours() -> None:
     assert sum("0" in reason for reason in reasons) > 30  # the wider gap more often
 
 
-def test_ends_are_carried_on_beyond() -> None:
+def test_extrapolation_rule_extends_the_front_ends() -> None:
     """The trials of least first value have ever smaller lr: so the next has."""
     study = study_of([(params("flat", 10.0 ** -(3 - i), 5), (i, -i)) for i in range(3)], TWO)
     for seed in range(20):
@@ -124,7 +124,7 @@ def test_ends_are_carried_on_beyond() -> None:
         assert own["lr"] < 1e-3 if reason.startswith("beyond trial 0") else own["lr"] > 0.1
 
 
-def test_a_swapped_choice_brings_what_hangs_on_it() -> None:
+def test_swapped_choice_brings_its_conditional_parameters() -> None:
     study = study_of(FRONT, TWO)
     for seed in range(20):
         own, reason = made("swap", study, seed)
@@ -135,7 +135,7 @@ def test_a_swapped_choice_brings_what_hangs_on_it() -> None:
 
 
 @pytest.mark.parametrize("direction", ["minimize", "maximize"])
-def test_the_trend_goes_downhill(direction: str) -> None:
+def test_trend_rule_descends(direction: str) -> None:
     """Of a value that grows with x and falls with y, whatever z: x falls, y grows."""
     rng = np.random.default_rng(0)
     sign = 1.0 if direction == "minimize" else -1.0
@@ -152,14 +152,14 @@ def test_the_trend_goes_downhill(direction: str) -> None:
         assert best["x"] - own["x"] > abs(own["z"] - best["z"])
 
 
-def test_the_slope_is_that_of_the_plane() -> None:
+def test_estimated_slope_is_that_of_a_plane() -> None:
     units = np.random.default_rng(1).random((400, 2))
     slope = ridge_slope(units, units @ [2.0, -1.0])
     assert slope[0] / slope[1] == pytest.approx(-2.0, rel=0.05)
     assert np.all(ridge_slope(units[:1], np.ones(1)) == 0.0)
 
 
-def test_infeasible_trials_are_no_parents_while_there_are_feasible_ones() -> None:
+def test_feasible_trials_are_preferred_as_parents() -> None:
     study = study_of(FRONT[:2], TWO)
     for _ in range(5):
         study.add_trial(
@@ -174,7 +174,7 @@ def test_infeasible_trials_are_no_parents_while_there_are_feasible_ones() -> Non
     assert [view.complete[row].number for row in view.best] == [0, 1]
 
 
-def test_nothing_is_proposed_twice_and_a_space_that_is_used_up_is_no_fault() -> None:
+def test_exhausted_space_repeats_designs_without_a_fault() -> None:
     """Of eight points five are left for proposals to find; after that they have to come again."""
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=1, first=3)
@@ -189,7 +189,7 @@ def test_nothing_is_proposed_twice_and_a_space_that_is_used_up_is_no_fault() -> 
     assert (callback.proposed, callback.faults) == (24, {})
 
 
-def test_rules_that_brought_more_come_more_often() -> None:
+def test_successful_rules_are_chosen_more_often() -> None:
     study = study_of(FRONT[:2], TWO)
     for i in range(12):
         own = params("flat", 0.2, 5)
@@ -207,7 +207,7 @@ def test_rules_that_brought_more_come_more_often() -> None:
     assert rules.count("cross") > 3 * rules.count("trend")
 
 
-def test_ranges_that_changed_count_as_far_as_they_hold() -> None:
+def test_trials_outside_a_changed_range_are_ignored() -> None:
     study = optuna.create_study()
     for high in (10.0, 5.0):
         for _ in range(5):
@@ -220,7 +220,7 @@ def test_ranges_that_changed_count_as_far_as_they_hold() -> None:
         assert 0.0 <= aw.StudyRulesProposer().propose(study, seed, seed).params.get("x", 0.0) <= 5.0
 
 
-def test_a_stated_space_that_the_study_does_not_have_is_told() -> None:
+def test_stated_space_missing_from_the_study_is_reported() -> None:
     """No trial lies in it, so there is nothing to make a proposal of; one from the space itself is refused."""
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     callback = aw.ProposalCallback(aw.StudyRulesProposer(space={"x": FloatDistribution(2.0, 5.0)}), every=5)
@@ -228,7 +228,7 @@ def test_a_stated_space_that_the_study_does_not_have_is_told() -> None:
     assert (callback.proposed, callback.faults) == (0, {"design": 3})
 
 
-def test_a_study_without_parameters_has_no_proposal() -> None:
+def test_study_without_parameters_gets_no_proposal() -> None:
     study = optuna.create_study()
     with pytest.raises(ProposalError, match="no trial has shown a parameter yet"):
         aw.StudyRulesProposer().propose(study, 0, 0)
@@ -237,7 +237,7 @@ def test_a_study_without_parameters_has_no_proposal() -> None:
         aw.StudyRulesProposer().propose(study, 0, 0)
 
 
-def test_after_one_trial_it_goes_far_from_it() -> None:
+def test_second_proposal_is_far_from_a_single_trial() -> None:
     study = study_of([(params("flat", 1e-4, 1), (1.0,))], ("minimize",))
     proposal = aw.StudyRulesProposer().propose(study, 0, 1)
     assert (proposal.id, proposal.reason) == ("rules-0001-far", "far from all trials")
@@ -245,7 +245,7 @@ def test_after_one_trial_it_goes_far_from_it() -> None:
     assert math.log10(proposal.params["lr"]) > -2
 
 
-def test_what_was_enqueued_need_not_be_in_the_space() -> None:
+def test_enqueued_trials_may_lie_outside_the_space() -> None:
     """Of another kind of design that no trial has shown yet, or of a name that nobody suggests."""
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     study.enqueue_trial({"kind": "a", "x": 0.5, "old": 3})
@@ -260,7 +260,7 @@ def test_what_was_enqueued_need_not_be_in_the_space() -> None:
 
 
 @pytest.mark.parametrize("much", [math.inf, 1e300])
-def test_constraints_may_be_broken_without_end(much: float) -> None:
+def test_infinite_violations_are_handled(much: float) -> None:
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
 
     def objective(trial: optuna.Trial) -> float:
@@ -273,7 +273,7 @@ def test_constraints_may_be_broken_without_end(much: float) -> None:
     assert (callback.proposed, callback.faults) == (20, {})
 
 
-def test_choices_that_cannot_be_told_apart_are_none() -> None:
+def test_indistinguishable_choices_are_ignored() -> None:
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
 
     def objective(trial: optuna.Trial) -> float:
