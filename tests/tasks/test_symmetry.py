@@ -5,9 +5,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.spatial import distance
 
 from armwright.tasks.catalogue import builtin_names, load_task, random_task
-from armwright.tasks.symmetry import centre, distance_to_planes, is_mirrored, symmetry_planes
+from armwright.tasks.symmetry import centre, distance_to_planes, symmetry_planes
 
 MILLIMETRES = st.integers(-1000, 1000).map(lambda mm: mm / 1000)
 POINTS = arrays(float, st.tuples(st.integers(2, 8), st.just(3)), elements=MILLIMETRES)
@@ -134,9 +135,10 @@ def test_planes_of_many_points_are_found() -> None:
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_is_mirrored_agrees_with_the_found_planes(name: str) -> None:
+def test_planes_that_mirror_the_points_are_found(name: str) -> None:
     points = load_task(name).target_positions
-    planes = symmetry_planes(points)
+    planes, offsets = symmetry_planes(points), points - centre(points)
     for normal in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.5**0.5, -(0.5**0.5), 0.0)):
         found = any(abs(abs(plane @ np.array(normal)) - 1.0) < 1e-9 for plane in planes)
-        assert is_mirrored(points, np.array(normal)) == found
+        mirrored = offsets - 2.0 * np.outer(offsets @ np.array(normal), normal)
+        assert found == (distance.cdist(mirrored, offsets).min(axis=1).max() < 1e-6)

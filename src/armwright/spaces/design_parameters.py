@@ -5,7 +5,7 @@ parameter: a roll joint has no stroke.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import cast
@@ -121,11 +121,10 @@ def _per_module(
         return
     for j in range(1, space.max_joints + 1):
         always = j <= space.min_joints and (used is None or len(used) == len(space.joint_types))
-        parameter = (
-            FloatParameter(f"{kind}_{j}", float(values[0]), float(values[1]), unit)
-            if unit
-            else CategoricalParameter(f"{kind}_{j}", cast("tuple[str, ...]", values))
-        )
+        if unit:
+            parameter = FloatParameter(f"{kind}_{j}", float(values[0]), float(values[1]), unit)
+        else:
+            parameter = CategoricalParameter(f"{kind}_{j}", cast("tuple[str, ...]", values))
         yield ConditionalParameter(parameter, None if always else j, used)
 
 
@@ -165,38 +164,29 @@ def _on_grid(parameter: FloatParameter, step: float) -> FloatParameter:
 
 def check_parameters(space: SpaceSchema) -> None:
     """Raise ValueError for restrictions, grids and ties that do not fit the parameters."""
-    _check_restrictions(space)
-    _check_grid(space)
+    names = [entry.name for entry in _unrestricted(space)]
+    real = [entry.name for entry in _unrestricted(space) if isinstance(entry.parameter, FloatParameter)]
+    _check_known("restrict", [name for name, _ in space.restrict], names)
+    _check_known("grid", [name for name, _ in space.grid], [*GRID_KINDS, *real])
+    _check_known("tie", [name for pair in space.tie for name in pair], names)
+    for name, step in space.grid:
+        if not GRID_ERROR < step <= MAX_LENGTH:
+            raise ValueError(f"grid: {name} = {step:g}: expected a step above 0")
     _check_ties(space)
 
 
-def _check_restrictions(space: SpaceSchema) -> None:
-    parameters = {entry.name: entry.parameter for entry in _unrestricted(space)}
-    for name, to in space.restrict:
-        if name not in parameters:
-            raise ValueError(f'restrict: unknown parameter "{name}".{did_you_mean(name, parameters)}')
-        _restrict(parameters[name], to)
-
-
-def _check_grid(space: SpaceSchema) -> None:
-    real = [entry.name for entry in _unrestricted(space) if isinstance(entry.parameter, FloatParameter)]
-    known = [*GRID_KINDS, *real]
-    for name, step in space.grid:
+def _check_known(key: str, names: Iterable[str], known: Sequence[str]) -> None:
+    for name in names:
         if name not in known:
-            raise ValueError(f'grid: unknown real parameter "{name}".{did_you_mean(name, known)}')
-        if not GRID_ERROR < step <= MAX_LENGTH:
-            raise ValueError(f"grid: {name} = {step:g}: expected a step above 0")
+            raise ValueError(f'{key}: unknown parameter "{name}".{did_you_mean(name, known)}')
 
 
 def _check_ties(space: SpaceSchema) -> None:
-    known, ties = conditional_parameters(space), dict(space.tie)
+    parameters, ties = conditional_parameters(space), dict(space.tie)
     for name, other in ties.items():
-        for used in (name, other):
-            if used not in known:
-                raise ValueError(f'tie: unknown parameter "{used}".{did_you_mean(used, known)}')
         if other in ties:
             raise ValueError(f"tie: {name} is tied to {other}, which is tied itself; tie both to a free parameter")
-        tied, free = known[name], known[other]
+        tied, free = parameters[name], parameters[other]
         if tied.parameter != replace(free.parameter, name=name):
             raise ValueError(f"tie: {name} and {other} have different ranges or choices")
         if free.types is not None or (free.module or 0) > (tied.module or 0):

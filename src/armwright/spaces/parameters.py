@@ -173,11 +173,6 @@ class Design:
         return tuple(float(value) for value in self._numbered("link"))
 
     @property
-    def directions(self) -> tuple[str, ...]:
-        """The link directions in order; empty if they are not parameters of the space."""
-        return tuple(str(value) for value in self._numbered("direction"))
-
-    @property
     def mount(self) -> str | None:
         """What the arm is mounted on; None if it is not a parameter of the space."""
         return None if "mount" not in self.params else str(self.params["mount"])

@@ -32,12 +32,6 @@ def symmetry_planes(points: Array) -> Array:
     return normals
 
 
-def is_mirrored(points: Array, normal: Array) -> bool:
-    """Return True if the plane through the centre with this unit normal (3,) mirrors the points (T, 3) [m]."""
-    offsets = _offsets(points)
-    return _partners(offsets, _mirrored(offsets, normal), TOLERANCE) is not None
-
-
 def centre(points: Array) -> Array:
     """Return the mean (3,) of the different points among `points` (T, 3) [m]."""
     return np.unique(points, axis=0).mean(axis=0)
