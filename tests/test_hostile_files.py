@@ -29,7 +29,7 @@ from armwright.spaces.design_space import load_space
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
-from armwright.yaml_documents import LARGEST_DOCUMENT
+from armwright.yaml_documents import MAX_BYTES
 from tests.fuzz.targets import a_run, looked_at
 
 
@@ -79,7 +79,7 @@ def test_hostile_documents_are_refused_in_one_line(tmp_path: Path, text: str, wo
 def test_endless_and_huge_files_are_refused(tmp_path: Path) -> None:
     for place in (Path("/dev/zero"), tmp_path / "big.yaml"):
         if place.parent == tmp_path:
-            place.write_bytes(b" " * (LARGEST_DOCUMENT + 1))
+            place.write_bytes(b" " * (MAX_BYTES + 1))
         with pytest.raises(SpaceError, match="at most 4 MiB"):
             load_space(place)
     with pytest.raises(SpaceError, match="cannot read"):

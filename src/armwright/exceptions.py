@@ -28,7 +28,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
 
-LONGEST_MESSAGE = 3000  # characters
+MAX_MESSAGE = 3000  # characters
 
 
 class ArmwrightError(Exception):
@@ -150,7 +150,7 @@ class StoppedError(ArmwrightError):
     exit_code = 130
 
     def __init__(self, folder: Path) -> None:
-        super().__init__(f"stopped as asked; every finished trial is in {folder}/, and the same command resumes")
+        super().__init__(f"stopped on request; every finished trial is in {folder}/, and the same command resumes")
 
 
 def _line(text: str) -> str:
@@ -162,9 +162,9 @@ def _line(text: str) -> str:
 
 
 def _cut(text: str) -> str:
-    if len(text) <= LONGEST_MESSAGE:
+    if len(text) <= MAX_MESSAGE:
         return text
-    return f"{text[: LONGEST_MESSAGE // 2]} […] {text[-LONGEST_MESSAGE // 3 :]}"
+    return f"{text[: MAX_MESSAGE // 2]} […] {text[-MAX_MESSAGE // 3 :]}"
 
 
 def did_you_mean(name: str, allowed: Iterable[str], renamed: Mapping[str, str] = MappingProxyType({})) -> str:

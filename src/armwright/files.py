@@ -59,11 +59,9 @@ def check_name(name: str) -> str:
 
 def to_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     """Return records with the same keys as CSV with a header; empty if there are none."""
-    out = io.StringIO()
-    writer: csv.DictWriter[str] | None = None
-    for row in rows:
-        if writer is None:
-            writer = csv.DictWriter(out, fieldnames=list(row), lineterminator="\n")
-            writer.writeheader()
-        writer.writerow(row)
+    rows, out = list(rows), io.StringIO()
+    if rows:
+        writer = csv.DictWriter(out, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
     return out.getvalue()

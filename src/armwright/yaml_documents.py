@@ -12,23 +12,23 @@ from armwright.exceptions import did_you_mean
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
-LARGEST_DOCUMENT = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has about 0.3 MB
+MAX_BYTES = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has about 0.3 MB
 RENAMED = {"jitter": "target_noise"}  # former keys of files
-MOST_NODES = 400_000  # values in a document; 10,000 targets with all their keys have 240,000
+MAX_NODES = 400_000  # values in a document; 10,000 targets with all their keys have 240,000
 
 
 def read_document(path: Path, schema: type[Schema], error: type[Exception]) -> Schema:
     """Read a YAML file as a value of `schema`; raise `error` with a one-line message if it is not one."""
     try:
         with path.open("rb") as file:
-            data = file.read(LARGEST_DOCUMENT + 1)  # not stat(): a device has no size
+            data = file.read(MAX_BYTES + 1)  # not stat(): a device has no size
         text = data.decode("utf-8")
     except UnicodeDecodeError as fault:
         raise error(f"{path} is not a text file in UTF-8") from fault
     except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
         raise error(f"cannot read {path}: {getattr(fault, 'strerror', None) or fault}") from fault
-    if len(data) > LARGEST_DOCUMENT:
-        raise error(f"{path}: expected at most {LARGEST_DOCUMENT // 2**20} MiB")
+    if len(data) > MAX_BYTES:
+        raise error(f"{path}: expected at most {MAX_BYTES // 2**20} MiB")
     return parse_document(text, schema, error, str(path))
 
 
@@ -89,8 +89,8 @@ class _DocumentLoader(_Loader):
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         self._nodes += 1
-        if self._nodes > MOST_NODES:
-            raise yaml.YAMLError(f"expected at most {MOST_NODES:,} values")
+        if self._nodes > MAX_NODES:
+            raise yaml.YAMLError(f"expected at most {MAX_NODES:,} values")
         if self.check_event(yaml.AliasEvent):
             raise yaml.YAMLError("anchors and aliases (&, *) are not allowed")
         tag = getattr(self.peek_event(), "tag", None)
@@ -146,6 +146,3 @@ class _DocumentDumper(yaml.SafeDumper):
     def represent_sequence(self, tag: str, sequence: Any, flow_style: bool | None = None) -> yaml.SequenceNode:
         plain = all(not isinstance(item, (dict, list)) for item in sequence)
         return super().represent_sequence(tag, sequence, flow_style=plain)
-
-
-_DocumentDumper.add_representer(list, _DocumentDumper.represent_list)

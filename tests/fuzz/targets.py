@@ -216,12 +216,12 @@ def run_space(data: bytes) -> None:
 
 
 def run_experiment(data: bytes) -> None:
-    from armwright.experiments.cells import MOST_CELLS, plan_cells
+    from armwright.experiments.cells import MAX_CELLS, plan_cells
     from armwright.experiments.plan import load_experiment
 
     out = folder() / "out"
     plan, beside = load_experiment(str(file_of(data, "experiment.yaml")))
-    if 2000 < len(plan.task_list) * len(plan.seed_list) * len(plan.methods) <= MOST_CELLS:
+    if 2000 < len(plan.task_list) * len(plan.seed_list) * len(plan.methods) <= MAX_CELLS:
         return
     cells, skipped = plan_cells(plan, beside, out)
     for cell in [*cells, *(one.cell for one in skipped)]:

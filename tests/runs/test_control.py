@@ -165,7 +165,7 @@ def test_ctrl_c_ends_a_paused_study(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(("proposer", "number"), [("rules", 0), ("none", 3), ("rules", 4), ("rules", 11)])
 def test_stopped_study_resumes_identically(tmp_path: Path, proposer: str, number: int) -> None:
     out = tmp_path / "run"
-    with pytest.raises(StoppedError, match=r"stopped as asked; every finished trial is in .*run/, and the same com"):
+    with pytest.raises(StoppedError, match=r"stopped on request; every finished trial is in .*run/, and the same com"):
         run(out, proposer, watch=after(number, lambda: stop_study(out)))
     assert len(lines(out)) == number + 1
     assert (status(out).doing, status(out).number, status(out).fault) == ("stopped", number + 1, "")
@@ -268,7 +268,7 @@ def test_stopped_cell_reports_its_failure(chat_server: ChatServer, tmp_path: Pat
     chat_server.answer = answer
     stopped = run_cell(cell)
     assert stopped.fault == (
-        f"stopped as asked; every finished trial is in {cell.folder}/, and the same command resumes"
+        f"stopped on request; every finished trial is in {cell.folder}/, and the same command resumes"
     )
     assert run_cell(cell).fault == ""
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
+from pydantic import TypeAdapter
+
 BASELINES = "baselines.csv"
 
 
@@ -33,18 +35,7 @@ def baselines() -> tuple[Baseline, ...]:
     """Return all baselines by task and method."""
     text = (resources.files("armwright.experiments") / BASELINES).read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
-    return tuple(
-        Baseline(
-            task=row["task"],
-            method=row["method"],
-            runs=int(row["runs"]),
-            e_hv=float(row["e_hv"]),
-            sigma_hv=float(row["sigma_hv"]),
-            final=float(row["final"]),
-            share=float(row["share"]),
-        )
-        for row in csv.DictReader(lines)
-    )
+    return TypeAdapter(tuple[Baseline, ...]).validate_python(tuple(csv.DictReader(lines)))
 
 
 def baselines_of(task: str) -> list[Baseline]:

@@ -16,7 +16,7 @@ from armwright.llm.transcript import TRANSCRIPTS
 from armwright.tasks.catalogue import load_task
 
 RUNS = "runs"  # in an experiment's folder
-MOST_CELLS = 100_000
+MAX_CELLS = 100_000
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ def plan_cells(
     if replay is not None and not replay.is_dir():
         raise SettingsError(f"--replay: expected the folder of an earlier experiment, got {replay}")
     n_cells = len(plan.task_list) * len(plan.seed_list) * len(plan.methods)
-    if n_cells > MOST_CELLS:
-        raise SettingsError(f"the experiment has {n_cells:,} cells; expected at most {MOST_CELLS:,}")
+    if n_cells > MAX_CELLS:
+        raise SettingsError(f"the experiment has {n_cells:,} cells; expected at most {MAX_CELLS:,}")
     space = None if plan.space is None else str((beside / plan.space).resolve())
     tasks = [_task(name, beside) for name in plan.task_list]
     names = [name for _, name in tasks]

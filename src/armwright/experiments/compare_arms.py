@@ -40,14 +40,7 @@ from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 
 EXISTING_ARMS = "existing_arms.json"  # in a run folder: the arms of its last comparison
-MEASURES: tuple[Objective, ...] = (
-    POSITION_ERROR,
-    TORQUE,
-    WORST_ERROR,
-    UNREACHED_TARGETS,
-    PEAK_TORQUE,
-    TORQUE_UTILISATION,
-)
+MEASURES = (POSITION_ERROR, TORQUE, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, TORQUE_UTILISATION)
 
 
 @dataclass(frozen=True)
@@ -207,9 +200,7 @@ def _history(run: Path, task: Task, space: DesignSpace | None) -> History:
     own = history.problem.task
     if not len(history):
         raise RunFolderError(f"{run} has no finished trial yet, so there is nothing to compare with")
-    if not (
-        np.array_equal(task.target_positions, own.target_positions) and np.array_equal(task.payloads, own.payloads)
-    ):
+    if task.targets != own.targets or not np.array_equal(task.payloads, own.payloads):
         raise TaskError(f"{run} is a run of the task {own.name}, with other targets or payloads")
     return history
 
@@ -236,6 +227,7 @@ def _compared(
     notes = [*notes, *(f"{name} unknown, so the arm cannot be compared with the front" for name in unknown)]
     notes += [f"unknown whether it meets {constraint.description}" for constraint, value in bounds if value is None]
     counts = None if history is None else dominance_counts(values, violated, history)
+    dominates, dominated_by = counts or (None, None)
     return ComparedArm(
         name=name,
         joints=int((evaluation.arms.motion < FIXED).sum()),
@@ -244,8 +236,8 @@ def _compared(
         base=base,
         values=values,
         measures={objective.name: _value(objective, evaluation) for objective in MEASURES},
-        dominates=None if counts is None else counts[0],
-        dominated_by=None if counts is None else counts[1],
+        dominates=dominates,
+        dominated_by=dominated_by,
         violated=violated,
         notes=tuple(notes),
     )
@@ -254,11 +246,9 @@ def _compared(
 def _value(quantity: Objective, evaluation: Evaluation) -> float | None:
     """Return a quantity of the arm; None if its URDF lacks what is needed: efforts, prices, or the shape of links."""
     actuation = evaluation.arms.actuation
-    if quantity.name == TORQUE_UTILISATION.name and actuation is None:
-        return None
-    if quantity.name == PRICE.name and (actuation is None or np.isnan(actuation.price).any()):
-        return None
-    if quantity.name in {clearance.name for clearance in CLEARANCE_QUANTITIES}:
+    lacks_efforts = quantity == TORQUE_UTILISATION and actuation is None
+    lacks_prices = quantity == PRICE and (actuation is None or np.isnan(actuation.price).any())
+    if lacks_efforts or lacks_prices or quantity in CLEARANCE_QUANTITIES:
         return None
     return float(quantity(evaluation)[0])
 

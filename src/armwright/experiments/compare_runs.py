@@ -198,13 +198,10 @@ class Comparison:
         return {run.seed: float(run.curve.mean()) for run in self.runs_of(method, task) if len(run.curve)}
 
     def _time_to_target(self, method: str, task: str, level: float) -> TimeToTarget:
-        trials = self.trials_to(method, task, level)
-        median = float(np.median(trials))
-        reached = sum(map(math.isfinite, trials))
-        target = self._target(task, level)
-        return TimeToTarget(
-            task, method, level, target, reached, len(trials), median if math.isfinite(median) else None
-        )
+        trials, target = self.trials_to(method, task, level), self._target(task, level)
+        reached, median = sum(map(math.isfinite, trials)), float(np.median(trials))
+        known_median = median if math.isfinite(median) else None
+        return TimeToTarget(task, method, level, target, reached, len(trials), known_median)
 
     def _result(self, method: str, task: str) -> MethodResult:
         runs, curves = self.runs_of(method, task), self.curves(method, task)

@@ -16,7 +16,7 @@ from armwright.tasks.catalogue import builtin_names
 from armwright.yaml_documents import parse_document, read_document
 
 ALL_TASKS = "all"  # every built-in task, instead of a list
-MOST_SEEDS = 10_000
+MAX_SEEDS = 10_000
 Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$"), AfterValidator(check_name)]
 Count = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
@@ -78,7 +78,7 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     name: Key  # also of its folder
     description: str = ""
     tasks: tuple[str, ...] | Literal["all"]
-    seeds: Annotated[int, Field(ge=1, le=MOST_SEEDS)] | tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...] = 5
+    seeds: Annotated[int, Field(ge=1, le=MAX_SEEDS)] | tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...] = 5
     n_init: Count = 10
     n_total: Count = 200
     space: str | None = None
@@ -185,8 +185,8 @@ def with_seeds(plan: ExperimentPlan, seeds: int | None) -> ExperimentPlan:
     """Return the plan with this number of seeds from 0 on."""
     if seeds is None:
         return plan
-    if not 1 <= seeds <= MOST_SEEDS:
-        raise SettingsError(f"--seeds: expected a whole number from 1 to {MOST_SEEDS}, got {seeds}")
+    if not 1 <= seeds <= MAX_SEEDS:
+        raise SettingsError(f"--seeds: expected a whole number from 1 to {MAX_SEEDS}, got {seeds}")
     return plan.model_copy(update={"seeds": seeds})
 
 
