@@ -13,7 +13,7 @@ from pathlib import Path
 import armwright
 from armwright.experiments.baselines import BASELINES, baselines, baselines_of
 from armwright.files import to_csv
-from armwright.runs.best_known import best_known_hypervolume
+from armwright.runs.front_gap import best_known_hypervolume
 from armwright.tasks.catalogue import builtin_tasks
 
 PACKAGE = Path(armwright.__file__).parent

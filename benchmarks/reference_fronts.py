@@ -21,7 +21,7 @@ import armwright
 from armwright.arrays import Array
 from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem.problem import Problem
-from armwright.runs.best_known import known_front
+from armwright.runs.front_gap import known_front
 from armwright.search.front_search import FrontSearch
 from armwright.search.survival import front, thinned
 from armwright.spaces.parameters import FloatParameter

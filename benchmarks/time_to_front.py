@@ -15,7 +15,7 @@ from peers import Nsga2
 
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
-from armwright.runs.best_known import known_front
+from armwright.runs.front_gap import known_front
 from armwright.study.front_run import find_front
 from armwright.study.progress import Progress
 from armwright.study.search_budget import SearchBudget, SearchProgress

@@ -135,7 +135,7 @@ def run(tmp_path: Path) -> Path:
         (("hypervolume",), {}), (("hypervolume", "history"), [[1], 2]), (("hypervolume", "final"), "x"),
         (("attribution",), []), (("attribution", "bbo"), None), (("proposer", "failures"), 1),
         (("proposer_bias",), "x"),
-        (("seconds",), {}), (("best_known",), {"share": 1}), (("front_size",), 10**400), (("n_trials",), -1),
+        (("seconds",), {}), (("front_gap",), {"share": 1}), (("front_size",), 10**400), (("n_trials",), -1),
     ],
     ids=str,
 )  # fmt: skip

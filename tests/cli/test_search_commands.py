@@ -15,11 +15,11 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     assert done.stderr == ""
     for words in ("of the best known hypervolume", "robust", "sensitive", "budget spent", "a toy"):
         assert words in done.stdout
-    assert (in_folder / "runs" / "target-1-front-seed4" / "summary.json").is_file()
+    assert (in_folder / "runs" / "target-1-design-seed4" / "summary.json").is_file()
     more = armwright("design", "target-1", "--budget", "800", "--seed", "4", "--no-figures", "--json")
     summary = json.loads(more.stdout)
     assert summary["search"]["evaluations"] >= 800
-    assert summary["folder"] == "runs/target-1-front-seed4"
+    assert summary["folder"] == "runs/target-1-design-seed4"
 
     armwright("optimize", "target-1", *SHORT, "--out", "mine")
     refined = armwright("refine", "mine", "--evaluations", "120")
@@ -54,7 +54,7 @@ def test_robust_and_refine_every(in_folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["evaluations"] > summary["n_trials"]
-    assert summary["best_known"] is None
+    assert summary["front_gap"] is None
     config = (in_folder / "r" / "config.yaml").read_text()
     assert "tolerance: 0.001" in config
     assert "refine_every: 3" in config
@@ -74,7 +74,7 @@ def test_robust_and_refine_every(in_folder: Path) -> None:
         (2, ("design", "target-1", "--proposer", "none"), "proposes no initial designs"),
         (2, ("design", "target-1", "--proposer", "rules", "--from", "x"), "use one of them"),
         (1, ("design", "target-1", "--from", "nothing"), "not a run folder"),
-        (2, ("optimize", "target-1", "--refine-every", "0"), "refine_every = 0"),
+        (2, ("optimize", "target-1", "--refine-every", "0"), "refine_every: expected"),
         (1, ("refine", "nothing"), "not a run folder"),
     ],
 )

@@ -5,7 +5,7 @@ import runpy
 import pytest
 
 from armwright.experiments.baselines import baselines, baselines_of
-from armwright.runs.best_known import best_known_hypervolume
+from armwright.runs.front_gap import best_known_hypervolume
 from armwright.tasks.catalogue import builtin_tasks
 from tests import ROOT
 

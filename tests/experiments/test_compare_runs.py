@@ -24,8 +24,8 @@ from armwright.experiments.statistics import interval, paired_test
 from armwright.problem.problem import Problem
 from armwright.report.comparison_figures import write_comparison_figures
 from armwright.report.tables import latex, markdown, write_tables
-from armwright.runs.best_known import known_front
 from armwright.runs.folder import read_run
+from armwright.runs.front_gap import known_front
 from armwright.study.front_run import find_front
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task

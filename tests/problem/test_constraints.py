@@ -32,8 +32,8 @@ from armwright.proposers.for_optuna.proposer import study_history
 from armwright.proposers.replay import ReplayProposer
 from armwright.report.figures import write_figures
 from armwright.runs.attribution import attribution_by_source
-from armwright.runs.best_known import known_front
 from armwright.runs.folder import read_run
+from armwright.runs.front_gap import known_front
 from armwright.runs.history import History, found_reference_point
 from armwright.runs.results import verify_run
 from armwright.runs.selection import numbers_of, pick
@@ -258,7 +258,7 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
     assert record["nearest"] is None
     assert list(record["violated_by"].values()) == (broken > 0.0).sum(axis=0).tolist()
     assert known_front(problem) is None
-    assert run.summary["best_known"] is None
+    assert run.summary["front_gap"] is None
     # on disk
     _, there = read_run(tmp_path / "run")
     assert list(there) == list(run.trials)

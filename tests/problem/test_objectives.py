@@ -239,7 +239,7 @@ def test_task_objectives_reach_run_prompt_figures_and_page(tmp_path: Path, names
     values = np.array([member.values for member in front.front])
     point = front.summary["hypervolume"]["reference_point"]
     assert front.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(values, ref=point), rel=0.02)
-    assert front.summary["best_known"] is None
+    assert front.summary["front_gap"] is None
     verification = verify_run(tmp_path / "run")[1]["verification"]
     assert verification["robust"] + verification["sensitive"] == len(history.front)
     page = RunContent(tmp_path / "run")

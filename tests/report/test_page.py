@@ -19,8 +19,8 @@ from armwright.exceptions import RunFolderError
 from armwright.kinematics.forward import joint_positions
 from armwright.pareto import front_indices
 from armwright.report.page import program, write_report
-from armwright.runs.best_known import known_front
 from armwright.runs.folder import read_run
+from armwright.runs.front_gap import known_front
 from armwright.runs.history import History
 from armwright.runs.selection import pick_from, read_condition
 from tests.support.browser import Tab
@@ -80,7 +80,7 @@ def test_page_opens_offline_without_requests(run: Path, tab: Tab) -> None:
     facts = tab.text("#facts")
     summary = json.loads((run / "summary.json").read_text())
     assert f"{summary['hypervolume']['final']:.4g}" in facts
-    assert f"{100 * summary['best_known']['share']:.1f} % of the best known" in facts
+    assert f"{100 * summary['front_gap']['share']:.1f} % of the best known" in facts
     assert tab.text("#repeat code") == "armwright optimize target-2 --proposer rules --n-total 40 --seed 1"
 
 

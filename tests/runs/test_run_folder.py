@@ -90,7 +90,7 @@ def test_summary_has_the_documented_keys(run: StudyResult) -> None:
         "n_trials",
         "by_source",
         "hypervolume",
-        "best_known",
+        "front_gap",
         "front_size",
         "verification",
         "evaluations",

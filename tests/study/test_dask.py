@@ -266,7 +266,7 @@ def test_version_mismatch_and_lost_scheduler_are_one_line(tmp_path: Path, bench:
         cluster.close()
     assert search.returncode == 1
     assert complained == (
-        f"armwright: lost the connection to the Dask scheduler at {cluster.address}; rerun the same command to resume\n"
+        f"armwright: lost the connection to the Dask cluster at {cluster.address}; rerun the same command to resume\n"
     )
     assert f"evaluating on the Dask cluster at {cluster.address}\n" in said
     bench.release("hold")

@@ -16,8 +16,8 @@ from armwright.problem.objectives import POSITION_ERROR, TORQUE
 from armwright.problem.problem import Problem
 from armwright.proposers.rules import RulesProposer
 from armwright.report.figures import write_figures
-from armwright.runs.best_known import front_gap, known_front
 from armwright.runs.folder import read_run
+from armwright.runs.front_gap import front_gap, known_front
 from armwright.runs.results import read_summary, verify_run
 from armwright.search.front_search import FrontSearch
 from armwright.spaces.design_space import paper_space
@@ -90,7 +90,7 @@ def test_front_run_writes_summary_and_designs(done: FrontRun) -> None:
     final = summary["hypervolume"]["final"]
     assert search["hypervolume_history"][-1][1] == pytest.approx(final, rel=5e-3)
     assert 0.995 * final < hypervolume(done.history.values, (5, 5)) <= final
-    assert summary["best_known"]["share"] == pytest.approx(final / summary["best_known"]["hypervolume"])
+    assert summary["front_gap"]["share"] == pytest.approx(final / summary["front_gap"]["hypervolume"])
     _, verified = verify_run(done.folder)
     assert verified == summary
     assert summary["verification"]["robust"] + summary["verification"]["sensitive"] == len(done.history)
@@ -256,7 +256,7 @@ def test_front_run_finds_a_missing_reference_point() -> None:
     assert run.folder is None
     assert run.config.reference_point == run.history.reference_point
     assert run.summary["hypervolume"]["final"] > 0.0
-    assert run.summary["best_known"] is None
+    assert run.summary["front_gap"] is None
 
 
 def test_front_run_ends_at_a_stall() -> None:

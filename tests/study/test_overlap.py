@@ -249,7 +249,7 @@ def test_proposer_exception_ends_the_study() -> None:
 
 
 def test_invalid_in_flight_is_refused() -> None:
-    with pytest.raises(SettingsError, match="in_flight = 0"):
+    with pytest.raises(SettingsError, match="in_flight: expected a whole number"):
         search(Held(), in_flight=0)
 
 

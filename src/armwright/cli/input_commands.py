@@ -79,7 +79,7 @@ def tasks(
     """List the built-in tasks, or describe the tasks given."""
     from armwright.cli.show_inputs import show_task, show_tasks
     from armwright.experiments.baselines import baselines_of
-    from armwright.runs.best_known import best_known_hypervolume
+    from armwright.runs.front_gap import best_known_hypervolume
     from armwright.tasks.catalogue import builtin_tasks, load_task
 
     listed = [load_task(name) for name in names] if names else list(builtin_tasks().values())

@@ -48,7 +48,7 @@ def design(
     figures: Figures = True,
     stall: Annotated[bool, typer.Option("--stall/--no-stall", help="Stop early if the hypervolume stalls.")] = True,
     seed: Seed = 0,
-    out: Annotated[Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-front-seedSEED")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-design-seedSEED")] = None,
     json_: SummaryJson = False,
 ) -> None:
     """Find the whole Pareto front of TASK by direct search in batches.
@@ -69,7 +69,7 @@ def design(
         if choice.proposer is None:
             raise SettingsError(f"--proposer {proposer} proposes no initial designs; leave it out")
         console.print(choice.reason)
-    folder = out or Path("runs") / f"{problem.task.name}-front-seed{seed}"
+    folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
     try:
         with search_progress(console) as watch:
             run = find_front(

@@ -90,7 +90,7 @@ def show_refined(console: Console, refined: RefinedRun) -> None:
         f"refined {refined.tried} designs in {refined.evaluations:,} evaluations: added {refined.added} improved "
         f"designs; hypervolume {before[-1]:.3f} -> {final:.3f}"
     )
-    _show_best_known(console, refined.summary["best_known"])
+    _show_front_gap(console, refined.summary["front_gap"])
 
 
 def _show_hypervolume(console: Console, history: History, summary: dict[str, Any], remedy: str) -> None:
@@ -106,10 +106,10 @@ def _show_hypervolume(console: Console, history: History, summary: dict[str, Any
         console.print(
             f"All designs lie beyond the reference point, so none counts. Use {remedy} or another reference point."
         )
-    _show_best_known(console, summary["best_known"])
+    _show_front_gap(console, summary["front_gap"])
 
 
-def _show_best_known(console: Console, gap: dict[str, Any] | None) -> None:
+def _show_front_gap(console: Console, gap: dict[str, Any] | None) -> None:
     if gap is None:
         return
     console.print(f"{gap['share']:.1%} of the best known hypervolume ({gap['hypervolume']:.3f})")

@@ -53,7 +53,7 @@ def _run_record(folder: Path) -> dict[str, Any]:
         return record | {"state": f"damaged {CONFIG}"}
     record |= {"task": config.task.name, "method": describe_method(config), "seed": config.seed}
     if summary is not None:
-        known = summary["best_known"]
+        known = summary["front_gap"]
         return record | {
             "trials": summary["n_trials"],
             "hypervolume": summary["hypervolume"]["final"],

@@ -19,7 +19,7 @@ from armwright.runs.results import read_summary
 from armwright.search.samplers import sampler_factory
 from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.tolerance import TOLERANCE
-from armwright.study.cluster import MOST_LOSSES, Cluster, Finished, Workers
+from armwright.study.cluster import MAX_LOSSES, Cluster, Finished, Workers
 from armwright.study.front_run import find_front
 from armwright.study.settings import run_config, study_method
 from armwright.study.study import optimize
@@ -150,7 +150,7 @@ def _run_on(workers: Workers, cells: Sequence[Cell], notify: Callable[[str], Non
 def _outcome_of(finished: Finished) -> CellOutcome:
     cell: Any = finished.key
     if finished.is_lost:
-        return CellOutcome(cell, 0.0, fault=f"{MOST_LOSSES} workers were lost over it (killed, or out of memory?)")
+        return CellOutcome(cell, 0.0, fault=f"{MAX_LOSSES} workers were lost over it (killed, or out of memory?)")
     return finished.value if finished.error is None else CellOutcome(cell, 0.0, fault=str(finished.error))
 
 

@@ -24,9 +24,9 @@ from armwright.report.drawing import (
 )
 from armwright.report.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
 from armwright.runs.attribution import front_by_source, gained_by_source
-from armwright.runs.best_known import front_gap
 from armwright.runs.config import FrontMethod
 from armwright.runs.folder import read_run
+from armwright.runs.front_gap import front_gap
 from armwright.runs.history import FrontMember, History
 from armwright.runs.results import FIGURES, read_summary
 

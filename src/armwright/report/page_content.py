@@ -23,9 +23,9 @@ from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LAB
 from armwright.robot.arm import AXES, Arm, Joint, Link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.runs.best_known import known_front
 from armwright.runs.config import FrontMethod, Method, RunConfig
 from armwright.runs.folder import read_config
+from armwright.runs.front_gap import known_front
 from armwright.runs.history import REFINE, History
 from armwright.runs.results import read_summary
 from armwright.runs.selection import bounded_numbers, numbers_of

@@ -15,8 +15,10 @@ from armwright.runs.trial import Count
 class Attribution:
     """The contribution of the trials of one source.
 
-    trials: how many there are. front: how many of them are on the final front.
-    hypervolume_gained: see `hypervolume_gains`, summed; None as long as there is no reference point.
+    Attributes:
+        trials: Number of trials.
+        front: Number of trials on the final front.
+        hypervolume_gained: Sum of `hypervolume_gains`; None without a reference point.
     """
 
     trials: Count
@@ -35,10 +37,10 @@ def attribution_by_source(history: History) -> dict[str, Attribution]:
 
 
 def hypervolume_gains(history: History) -> Array | None:
-    """Return (N,) the hypervolume that each trial, random ones included, added when it entered.
+    """Return (N,) the hypervolume that each trial, random ones included, added when it finished.
 
-    The sum is the final hypervolume. What a trial would have brought later, or what it took away from one that came
-    after it, is not weighed. None as long as there is no reference point.
+    The sum is the final hypervolume. A trial is not charged for what later trials cannot add because of it. The result
+    is None without a reference point.
     """
     if history.reference_point is None:
         return None
@@ -48,7 +50,7 @@ def hypervolume_gains(history: History) -> Array | None:
 def gained_by_source(history: History) -> dict[str, Array] | None:
     """Return for each source (I + 1,) the hypervolume that its trials gained after 0, 1, …, I counted iterations.
 
-    None as long as there is no reference point.
+    None without a reference point.
     """
     gains = hypervolume_gains(history)
     if gains is None:
@@ -65,7 +67,7 @@ def front_by_source(history: History) -> dict[str, NDArray[np.int_]]:
     first, *_ = last = _last_trials(history).tolist()
     on_front = np.flatnonzero(front_mask(history.masked_objectives[:first]))
     fronts = [on_front]
-    for number in range(first, last[-1]):  # one trial more; what has left a front never comes back
+    for number in range(first, last[-1]):  # one more trial; a design that has left the front never returns
         on_front = np.append(on_front, number)
         on_front = on_front[front_mask(history.masked_objectives[on_front])]
         fronts.append(on_front)

@@ -27,19 +27,12 @@ from armwright.spaces.parameters import Design
 
 RANDOM = "random"
 BBO = "bbo"
-INITIAL_DESIGN = "initial_design"  # given by the user, such as an existing arm
+INITIAL_DESIGN = "initial_design"  # of the user, such as an existing arm
 REFINE = "refine"  # a refined design of the front
 FRONT_SEARCH = "front_search"
 NOT_PROPOSED = (RANDOM, BBO, INITIAL_DESIGN, REFINE, FRONT_SEARCH)
-GROWING = (
-    "values",
-    "violations",
-    "masked_objectives",
-    "front",
-    "proposed",
-    "_course",
-    "_first_of",
-)  # what more trials add to
+# Properties that a longer history extends.
+CACHED = ("values", "violations", "masked_objectives", "front", "proposed", "_hypervolumes", "_first_of")
 
 
 @dataclass(frozen=True)
@@ -55,10 +48,14 @@ class FrontMember:
 
 @dataclass(frozen=True)
 class History:
-    """The finished trials of a study in the order of their numbers; the first `n_init` are random.
+    """The finished trials of a study by number; the first `n_init` are random.
 
-    frozen_reference_point: the one that the run found for itself, where the task states none.
-    earlier: what is known of a history that this one goes on with, and of how many trials (`grown`).
+    Attributes:
+        problem: The problem.
+        trials: The trials.
+        n_init: Number of random trials.
+        frozen_reference_point: The one chosen from the random trials, if the task states none.
+        earlier: Values of the history that this one extends (`grown`), with its number of trials.
     """
 
     problem: Problem
@@ -76,13 +73,13 @@ class History:
         return iter(self.trials)
 
     def grown(self, trials: Sequence[FinishedTrial], frozen_reference_point: tuple[float, ...] | None) -> "History":
-        """Return the history of these trials, which begin with this one's; reuse the values computed for those."""
+        """Return the history of these trials, which begin with this one's, and reuse the values computed for those."""
         same_point = frozen_reference_point == self.frozen_reference_point
         if same_point and len(trials) == len(self):
             return self
-        known = {**self.earlier, **{name: (len(self), vars(self)[name]) for name in GROWING if name in vars(self)}}
+        known = {**self.earlier, **{name: (len(self), vars(self)[name]) for name in CACHED if name in vars(self)}}
         if not same_point:
-            known.pop("_course", None)
+            known.pop("_hypervolumes", None)
         return History(self.problem, trials, self.n_init, frozen_reference_point, known)
 
     def _known(self, name: str, nothing: Any) -> tuple[Any, Sequence[FinishedTrial]]:
@@ -90,61 +87,63 @@ class History:
         n, known = self.earlier.get(name, (0, nothing))
         return known, self.trials[n:]
 
+    def _matrix(self, name: str, width: int) -> Array:
+        """Return the (N, width) matrix of a field of the trials."""
+        known, new = self._known(name, np.empty((0, width)))
+        rows = np.array([getattr(trial, name) for trial in new], dtype=np.float64)
+        return np.vstack([known, rows.reshape(len(new), width)])
+
     @cached_property
     def values(self) -> Array:
         """(N, M) the objectives; of the paper's: position error [m], torque [α-scaled]."""
-        known, new = self._known("values", np.empty((0, len(self.problem.objectives))))
-        rows = [trial.values for trial in new]
-        return np.vstack([known, np.array(rows, dtype=np.float64).reshape(len(rows), known.shape[1])])
+        return self._matrix("values", len(self.problem.objectives))
 
     @cached_property
     def violations(self) -> Array:
         """(N, C) violation of each constraint of the task; satisfied at <= 0."""
-        known, new = self._known("violations", np.empty((0, len(self.problem.constraints))))
-        rows = [trial.violations for trial in new]
-        return np.vstack([known, np.array(rows, dtype=np.float64).reshape(len(rows), known.shape[1])])
+        return self._matrix("violations", len(self.problem.constraints))
 
     @cached_property
     def feasible(self) -> NDArray[np.bool_]:
-        """(N,) whether all constraints are met; of a task without any: always."""
+        """(N,) True if all constraints are satisfied."""
         return feasible_mask(self.violations)
 
     @cached_property
     def masked_objectives(self) -> Array:
-        """(N, M) `values`, infinite where a design is infeasible: what fronts and hypervolumes are made of."""
+        """(N, M) `values`, infinite for infeasible designs, as fronts and hypervolumes need them."""
         if not self.problem.constraints:
             return self.values
         known, _ = self._known("masked_objectives", np.empty((0, len(self.problem.objectives))))
         n = len(known)
         return np.vstack([known, masked_objectives(self.values[n:], self.violations[n:])])
 
-    def nearest(self, most: int) -> list[int]:
-        """Return at most this many trial numbers with the smallest total violation, in its order."""
-        return np.argsort(total_violation(self.violations), kind="stable")[:most].tolist()
+    def nearest(self, n: int) -> list[int]:
+        """Return at most `n` trial numbers, by increasing total violation."""
+        return np.argsort(total_violation(self.violations), kind="stable")[:n].tolist()
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:
-        """The task's own, else the frozen one; None before the first n_init trials."""
+        """The task's, else the frozen one; None before the first n_init trials."""
         return self.problem.reference_point or self.frozen_reference_point
 
     @cached_property
     def front(self) -> list[FrontMember]:
-        """The Pareto set of the feasible designs, by rising first objective."""
+        """The Pareto set of the feasible designs, by increasing first objective."""
         known, new = self._known("front", [])
         members = {member.number: member for member in known}
         numbers = [*sorted(members), *range(len(self) - len(new), len(self))]
-        on_front = [numbers[place] for place in front_indices(self.masked_objectives[numbers])] if numbers else []
+        on_front = [numbers[i] for i in front_indices(self.masked_objectives[numbers])] if numbers else []
         return [members[number] if number in members else self.member(number) for number in on_front]
 
     @cached_property
     def proposed(self) -> tuple[FinishedTrial, ...]:
-        """The trials that are proposers'."""
+        """The trials of proposers."""
         known, new = self._known("proposed", ())
         return (*known, *(trial for trial in new if trial.source not in NOT_PROPOSED))
 
     @cached_property
     def _first_of(self) -> dict[Design, int]:
-        """The first trial of each design; histories that grow from one another add to the same one."""
+        """The first trial of each design; histories that extend each other share one dictionary."""
         known, new = self._known("_first_of", {})
         for trial in new:
             known.setdefault(trial.design, trial.number)
@@ -166,11 +165,11 @@ class History:
         return FrontMember(number, trial.source, trial.design, self.problem.arm(trial.design), trial.values)
 
     @cached_property
-    def _course(self) -> tuple[Array, FrontTracker]:
-        """(N,) `hypervolumes`, and what they go on with."""
+    def _hypervolumes(self) -> tuple[Array, FrontTracker]:
+        """(N,) `hypervolumes`, and the front that a longer history continues with."""
         assert self.reference_point is not None
         tracker = FrontTracker(len(self.problem.objectives), self.reference_point)
-        (known, tracker), _ = self._known("_course", (np.zeros(0), tracker))
+        (known, tracker), _ = self._known("_hypervolumes", (np.zeros(0), tracker))
         tracker, new = copy(tracker), np.zeros(len(self) - len(known))
         for i, row in enumerate(self.masked_objectives[len(known) :]):
             tracker.add(row)
@@ -179,12 +178,12 @@ class History:
 
     @property
     def hypervolumes(self) -> Array:
-        """(N,) after each trial, the random ones included; (0,) as long as there is no reference point."""
-        return np.zeros(0) if self.reference_point is None else self._course[0]
+        """(N,) after each trial, the random ones included; (0,) without a reference point."""
+        return np.zeros(0) if self.reference_point is None else self._hypervolumes[0]
 
     @property
     def hypervolume(self) -> Array:
-        """Over the counted trials (those after the first n_init); the initial points count in each value."""
+        """After each counted trial (those after the first n_init); the random trials contribute to each value."""
         return self.hypervolumes[self.n_init :]
 
     def found_reference_point(self) -> tuple[float, ...]:
@@ -192,14 +191,14 @@ class History:
         return found_reference_point(self.values[: self.n_init], self.violations[: self.n_init])
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
-        """Evaluate the designs of these trials again; the kernels return the same bits."""
+        """Evaluate the designs of these trials again; the result is equal to the bit."""
         return self.problem.physics([self.trials[number].design for number in numbers])
 
 
-def found_reference_point(values: Array, broken: Array) -> tuple[float, ...]:
+def found_reference_point(values: Array, violations: Array) -> tuple[float, ...]:
     """Choose a reference point from the feasible designs if their front has M designs, else from all.
 
-    A front of fewer is the worst of itself in some objective: within 1.1 times its values there is hardly any room.
+    A front of fewer designs leaves hardly any volume within 1.1 times its values.
     """
-    feasible = masked_objectives(values, broken)
+    feasible = masked_objectives(values, violations)
     return default_reference_point(feasible if front_mask(feasible).sum() >= values.shape[1] else values)

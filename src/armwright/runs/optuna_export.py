@@ -116,17 +116,17 @@ class _Export:
         objectives = self.history.problem.objectives
         with quietly(), catch_warnings():
             simplefilter("ignore", ExperimentalWarning)  # metric names
-            study = optuna.create_study(
-                storage=storage, study_name=name, directions=[StudyDirection.MINIMIZE] * len(objectives)
-            )
+            directions = [StudyDirection.MINIMIZE] * len(objectives)
+            study = optuna.create_study(storage=storage, study_name=name, directions=directions)
             study.set_metric_names([objective.name for objective in objectives])
         for key, value in self._study_attributes().items():
-            study.set_user_attr(key, value)
+            if value is not None:
+                study.set_user_attr(key, value)
         return study
 
     def _study_attributes(self) -> dict[str, Any]:
         config, history = self.config, self.history
-        attributes = {
+        return {
             "armwright": config.versions.get("armwright"),
             "task": config.task.name,
             "space": config.space.name,
@@ -136,7 +136,6 @@ class _Export:
             "reference_point": history.reference_point,
             "hypervolume": float(history.hypervolume[-1]) if len(history.hypervolume) else None,
         }
-        return {key: value for key, value in attributes.items() if value is not None}
 
     def _verdicts(self) -> dict[int, str]:
         """Return "robust" or "sensitive" by trial number, for a front that was verified."""

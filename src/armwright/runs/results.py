@@ -23,9 +23,9 @@ from armwright.problem.unreached_reason import unreached_reason
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.attribution import attribution_by_source
-from armwright.runs.best_known import front_gap
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import RunFolder, read_run
+from armwright.runs.front_gap import front_gap
 from armwright.runs.history import FrontMember, History
 from armwright.runs.proposer_bias import proposer_bias
 from armwright.runs.summary import ProposerSummary, parse_summary
@@ -167,7 +167,7 @@ def _common_record(
         "by_source": dict(Counter(trial.source for trial in history)),
         **_feasibility_record(history),
         "hypervolume": {"reference_point": list(reference or ()), **volume},
-        "best_known": None if gap is None else asdict(gap),
+        "front_gap": None if gap is None else asdict(gap),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
     }

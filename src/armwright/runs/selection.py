@@ -1,4 +1,4 @@
-"""Choosing among the designs of a front: by conditions, by one number, by weights, or the knee."""
+"""Selection of designs of a front: by conditions, by one quantity, by weights, or the knee."""
 
 import math
 import re
@@ -22,14 +22,14 @@ _HOLDS = {"<=": np.less_equal, ">=": np.greater_equal, "<": np.less, ">": np.gre
 
 @dataclass(frozen=True)
 class Condition:
-    """A bound for a number of a design: its name, how it is bounded, and by what."""
+    """A bound for a quantity of a design."""
 
     name: str
     relation: str
     bound: float
 
     def holds(self, numbers: Mapping[str, float]) -> bool:
-        """Whether a design with these numbers meets it."""
+        """Return whether a design with these quantities satisfies the condition."""
         return bool(_HOLDS[self.relation](numbers[self.name], self.bound))
 
 
@@ -55,10 +55,7 @@ def read_weights(text: str) -> dict[str, float]:
 
 
 def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
-    """Return the quantities to select by: objectives, real parameters, the length and mass of the arm.
-
-    And what the constraints bound.
-    """
+    """Return the quantities to select by: real parameters, length and mass, bounded quantities, objectives."""
     space = history.problem.space
     reals = {
         p.name: float(member.design.params.get(p.name, 0.0)) for p in space.parameters if isinstance(p, FloatParameter)
@@ -71,7 +68,7 @@ def numbers_of(history: History, member: FrontMember) -> dict[str, float]:
 def bounded_numbers(history: History, number: int) -> dict[str, float]:
     """Return the quantities of a design that the constraints bound, by name."""
     pairs = zip(history.problem.constraints, history.trials[number].violations, strict=True)
-    return {constraint.quantity.name: constraint.measured(broken) for constraint, broken in pairs}
+    return {constraint.quantity.name: constraint.measured(violation) for constraint, violation in pairs}
 
 
 def pick(
@@ -81,12 +78,20 @@ def pick(
     weights: Mapping[str, float] | None = None,
     numbers: Sequence[int] | None = None,
 ) -> list[FrontMember]:
-    """Select the designs of the front that meet all conditions, the best first.
+    """Select the designs of the front that satisfy all conditions, the best first.
 
-    by: the number that should be small. weights: of the objectives, each divided by its reference point, whose sum
-    should be small. Without either, the knee of the front comes first, then what lies nearest to its corner.
-    numbers: only these trials, such as the robust ones.
-    FailureError where none meets the conditions; SettingsError for a name that does not exist.
+    Without `by` and `weights`, the knee of the front comes first, then the designs nearest to its corner.
+
+    Args:
+        history: The trials.
+        where: Conditions.
+        by: The quantity to sort by, smallest first.
+        weights: Weights of the objectives, which are divided by the reference point and summed.
+        numbers: The trials to select from, such as the robust ones; None for all.
+
+    Raises:
+        FailureError: No design satisfies the conditions.
+        SettingsError: A quantity does not exist, or both `by` and `weights` are given.
 
     Examples:
         >>> import armwright as aw
@@ -133,7 +138,7 @@ def pick_from(
     weights: Mapping[str, float] | None = None,
     robust: bool = False,
 ) -> tuple[History, list[FrontMember]]:
-    """Select designs of a run folder; robust: only designs that were verified to be robust."""
+    """Select designs of a run folder; robust: only verified robust designs."""
     _, history = read_run(run)
     numbers = None
     if robust and history.front:

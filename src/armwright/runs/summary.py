@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BaseModel, Field
 
 from armwright.runs.attribution import Attribution
-from armwright.runs.best_known import FrontGap
+from armwright.runs.front_gap import FrontGap
 from armwright.runs.proposer_bias import ProposerBias
 from armwright.runs.trial import Count
 
@@ -90,7 +90,7 @@ class _Search(_Record):
 class _Summary(_Record):
     n_trials: Count
     by_source: dict[str, Count]
-    best_known: FrontGap | None
+    front_gap: FrontGap | None
     front_size: Count
     verification: _Verification | None
 

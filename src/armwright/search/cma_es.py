@@ -16,8 +16,8 @@ from armwright.search.encoding import DesignEncoding
 from armwright.spaces.parameters import Parameter
 
 POPULATION = 12  # samples per design and generation
-FIRST_STEP = 0.05  # of a parameter's range
-LONGEST_STEP = 0.3
+INITIAL_STEP = 0.05  # of a parameter's range
+MAX_STEP = 0.3
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class _Strategies:
     def __init__(self, means: Array, rng: np.random.Generator) -> None:
         n, dims = means.shape
         self._rng = rng
-        self._mean, self._sigma = means.copy(), np.full(n, FIRST_STEP)
+        self._mean, self._sigma = means.copy(), np.full(n, INITIAL_STEP)
         self._covariance = np.tile(np.eye(dims), (n, 1, 1))
         self._path, self._sigma_path = np.zeros((2, n, dims))
         self._generation = 0
@@ -129,7 +129,7 @@ class _Strategies:
         normaliser = math.sqrt(1 - (1 - c) ** (2 * self._generation))
         h_sigma = length / normaliser < (1.4 + 2 / (step.shape[1] + 1)) * self._expected
         growth = np.exp(c / self._damping * (length / self._expected - 1))
-        self._sigma = np.clip(self._sigma * growth, 1e-6, LONGEST_STEP)
+        self._sigma = np.clip(self._sigma * growth, 1e-6, MAX_STEP)
 
         c = self._c_path
         self._path = (1 - c) * self._path + h_sigma[:, None] * math.sqrt(c * (2 - c) * self._mass) * step

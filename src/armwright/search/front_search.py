@@ -150,11 +150,11 @@ class FrontSearch:
         matrix = self.ask()
         self.tell(matrix, self._evaluate(matrix))
 
-    def best(self, most: int) -> Indices:
-        """Return the sorted indices in `matrix` of at most `most` designs that keep most of the hypervolume."""
+    def best(self, n: int) -> Indices:
+        """Return the sorted indices in `matrix` of at most `n` designs that keep most of the hypervolume."""
         if self.hypervolume == 0.0:
-            return np.sort(nearest(self._front_values, self._reference_point, most))
-        return np.sort(thinned(self._front_values, self._reference_point, most))
+            return np.sort(nearest(self._front_values, self._reference_point, n))
+        return np.sort(thinned(self._front_values, self._reference_point, n))
 
     def state(self) -> dict[str, Any]:
         """Return the arrays and numbers that `restore` needs; later steps do not change them."""

@@ -9,7 +9,7 @@ from armwright.pareto import front_mask
 
 Indices = NDArray[np.intp]
 
-MOST_EXACT = 3  # objectives; with more, exact contributions take seconds per thousand points
+MAX_EXACT_OBJECTIVES = 3  # objectives; with more, exact contributions take seconds per thousand points
 
 
 def front(values: Array, reference_point: Array) -> Indices:
@@ -18,11 +18,11 @@ def front(values: Array, reference_point: Array) -> Indices:
     return within[front_mask(values[within])]
 
 
-def nearest(values: Array, reference_point: Array, most: int) -> Indices:
-    """Return the indices of at most `most` points on the front of `values` (N, M), nearest to the reference box."""
+def nearest(values: Array, reference_point: Array, n: int) -> Indices:
+    """Return the indices of at most `n` points on the front of `values` (N, M), nearest to the reference box."""
     best = np.flatnonzero(front_mask(values))
     excess = np.maximum(values[best] / reference_point - 1.0, 0.0).sum(axis=1)
-    return best[np.argsort(excess, kind="stable")[:most]]
+    return best[np.argsort(excess, kind="stable")[:n]]
 
 
 def survivors(values: Array, reference_point: Array, capacity: int) -> Indices:
@@ -41,7 +41,7 @@ def survivors(values: Array, reference_point: Array, capacity: int) -> Indices:
     return np.concatenate([best, others[np.lexsort((rank, outside))]])[:capacity]
 
 
-def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, most: int) -> Indices:
+def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, n: int) -> Indices:
     """Return the indices of the best points of the best structures.
 
     A structure is as good as its point with the largest box: the volume that the point alone dominates, bounded by the
@@ -52,14 +52,14 @@ def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array
         values: (N, M) objective values.
         structures: (N,) structure of each point.
         reference_point: (M,) bound of the boxes.
-        most: number of structures.
+        n: number of structures.
     """
     gains = np.maximum(reference_point - values, 0.0)
     boxes = np.prod(gains, axis=1)
     order = np.argsort(structures, kind="stable")
     starts = np.flatnonzero(np.diff(structures[order], prepend=-1))
     largest = np.maximum.reduceat(boxes[order], starts)
-    leading = np.argsort(-largest, kind="stable")[:most]
+    leading = np.argsort(-largest, kind="stable")[:n]
     sizes = np.diff(starts, append=len(order))
     kept: list[Indices] = []
     for weighted in (boxes, *(boxes[:, None] * gains**2).T):
@@ -73,7 +73,7 @@ def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array
 def thinned(front: Array, reference_point: Array, capacity: int) -> Indices:
     """Return the indices of at most `capacity` points of a `front` (N, M) that keep most of its hypervolume."""
     kept = np.arange(len(front))
-    if len(kept) > capacity and front.shape[1] > MOST_EXACT:
+    if len(kept) > capacity and front.shape[1] > MAX_EXACT_OBJECTIVES:
         return _farthest(front, reference_point, capacity)
     while len(kept) > capacity:
         # Contributions change when neighbours are removed, so the surplus is removed in several rounds.

@@ -24,8 +24,8 @@ from uuid import uuid4
 from armwright.exceptions import ArmwrightError, ClusterError, FailureError, SettingsError
 from armwright.extras import check_extra
 
-MOST_WORKERS = 10_000
-MOST_LOSSES = 3  # workers lost over the same task before it is given up
+MAX_WORKERS = 10_000
+MAX_LOSSES = 3  # workers lost over the same task before it is given up
 CONNECT_SECONDS = 20.0
 CLOSE_SECONDS = 5.0
 # Versions that the numbers depend on: equal in this process and in every worker.
@@ -54,8 +54,8 @@ class Workers:
     def __post_init__(self) -> None:
         if self.n_workers is None and not self.scheduler:
             raise SettingsError("expected a number of workers or the address of a Dask scheduler, got neither")
-        if self.n_workers is not None and not 1 <= self.n_workers <= MOST_WORKERS:
-            raise SettingsError(f"expected 1 to {MOST_WORKERS:,} workers, got {self.n_workers}")
+        if self.n_workers is not None and not 1 <= self.n_workers <= MAX_WORKERS:
+            raise SettingsError(f"expected 1 to {MAX_WORKERS:,} workers, got {self.n_workers}")
         check_extra("distributed", "evaluation by workers")
 
     @property
@@ -79,13 +79,6 @@ class _Task:
     key: Hashable
     name: str
     future: Any
-
-
-@dataclass(frozen=True)
-class _Failure:
-    """What a task raised, returned as a value: anything else may not survive pickling."""
-
-    error: ArmwrightError
 
 
 class Cluster:
@@ -129,7 +122,7 @@ class Cluster:
 
         Args:
             key: what `wait` returns with the value.
-            name: what the user is told that runs again, if a worker is lost.
+            name: names the task in the message that it runs again, if a worker is lost.
             function: a function of this package.
             arguments: anything that can be pickled.
         """
@@ -170,7 +163,7 @@ class Cluster:
     def _count_losses(self, keys: frozenset[str]) -> Finished | None:
         for key in keys & self._tasks.keys():
             self._losses[key] += 1
-            if self._losses[key] >= MOST_LOSSES:
+            if self._losses[key] >= MAX_LOSSES:
                 return self._give_up(key)
             self._notify(f"a worker was lost; {self._tasks[key].name} runs again on another one")
         return None
@@ -194,7 +187,7 @@ class Cluster:
         if versions:
             raise self._version_error(versions)
         key = self._tasks.pop(future.key).key
-        return Finished(key, error=value.error) if isinstance(value, _Failure) else Finished(key, value)
+        return Finished(key, error=value) if isinstance(value, ArmwrightError) else Finished(key, value)
 
     def _version_error(self, versions: dict[str, str]) -> ClusterError:
         differences = [
@@ -203,9 +196,7 @@ class Cluster:
         return ClusterError(f"a worker has {', '.join(differences)}; install the same versions for every worker")
 
     def _connection_error(self) -> ClusterError:
-        what = "the Dask scheduler" if self._workers.scheduler else "the local workers"
-        where = f" at {self._workers.scheduler}" if self._workers.scheduler else ""
-        return ClusterError(f"lost the connection to {what}{where}; rerun the same command to resume")
+        return ClusterError(f"lost the connection to {self._workers.description}; rerun the same command to resume")
 
 
 def _sent_by_value() -> tuple[Callable[..., dict[str, str]], Callable[..., Any]]:
@@ -239,16 +230,16 @@ _versions_of, _run_pickled = _sent_by_value()
 
 
 def _run(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Run a task; called on the worker."""
+    """Run a task on the worker; return its value, or an error that survives pickling."""
     try:
         return function(*arguments)
     except ArmwrightError as error:
         error.__cause__ = error.__context__ = None
-        return _Failure(error.with_traceback(None))
-    except Exception as fault:  # noqa: BLE001 (raised again by whoever waits)
+        return error.with_traceback(None)
+    except Exception as fault:  # noqa: BLE001 (raised again by the caller of `wait`)
         error = FailureError(f"{type(fault).__name__}: {fault}")
         error.add_note(traceback.format_exc())
-        return _Failure(error)
+        return error
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import Any
 from armwright.exceptions import EvaluatorError, SettingsError
 from armwright.problem.problem import Problem
 from armwright.spaces.parameters import Design
-from armwright.study.cluster import MOST_LOSSES, Cluster, Workers
+from armwright.study.cluster import MAX_LOSSES, Cluster, Workers
 from armwright.study.evaluation_backend import Evaluated, EvaluationBackend, describe_design, evaluate_trial
 
 
@@ -48,7 +48,7 @@ class DaskBackend(EvaluationBackend):
         design = self._designs.pop(number)
         if finished.is_lost:
             raise EvaluatorError(
-                f"{MOST_LOSSES} workers were lost over trial {number} (killed, or out of memory?); design: "
+                f"{MAX_LOSSES} workers were lost over trial {number} (killed, or out of memory?); design: "
                 f"{describe_design(design)}. Rerun the same command to resume with it"
             )
         if finished.error is not None:

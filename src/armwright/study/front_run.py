@@ -34,7 +34,7 @@ from armwright.study.settings import run_config
 from armwright.study.study import optimize
 
 SAVE_SECONDS = 5.0
-MOST_DESIGNS = 300  # of the front that become trials: those with the largest hypervolume contributions
+MAX_DESIGNS = 300  # of the front that become trials: those with the largest hypervolume contributions
 N_SAMPLE = 10  # random designs that give the reference point, if the task states none
 N_PROPOSED = 20  # initial designs requested from a proposer
 
@@ -204,7 +204,7 @@ class _DirectSearch:
 
     def _front_trials(self) -> list[FinishedTrial]:
         """Return the best designs of the front as trials."""
-        kept = self.search.best(MOST_DESIGNS)
+        kept = self.search.best(MAX_DESIGNS)
         matrix, values = self.search.matrix[kept], self.search.values[kept]
         violations = np.empty((len(matrix), 0))
         if self.problem.constraints:  # the search knows penalised values only

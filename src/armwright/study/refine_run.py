@@ -17,7 +17,7 @@ from armwright.search.cma_es import POPULATION, Refined
 from armwright.search.refine import EVALUATIONS, refine_members, worth_refining
 from armwright.seeding import REFINING, derived_seed
 
-MOST_EVALUATIONS = 10**9
+MAX_EVALUATIONS = 10**9
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
         path: run folder.
         evaluations: number of evaluations per design.
     """
-    if not POPULATION <= evaluations <= MOST_EVALUATIONS:
+    if not POPULATION <= evaluations <= MAX_EVALUATIONS:
         raise SettingsError(
-            f"evaluations = {evaluations} for each design: from {POPULATION} to {MOST_EVALUATIONS} can be spent"
+            f"evaluations = {evaluations} for each design: from {POPULATION} to {MAX_EVALUATIONS} can be spent"
         )
     path = Path(path)
     config, _ = read_run(path)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from armwright.exceptions import SettingsError
 
-LARGEST_BUDGET = 10**12
+MAX_BUDGET = 10**12
 _BUDGET = re.compile(r"(\d+(?:\.\d+)?(?:e\d+)?)(s|min|h)?")
 _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
@@ -24,15 +24,15 @@ class SearchBudget:
 
     def __post_init__(self) -> None:
         for name, bound in (("evaluations", self.evaluations), ("seconds", self.seconds)):
-            if bound is not None and not 0.0 < bound <= LARGEST_BUDGET:
-                raise SettingsError(f"a budget of {bound} {name}: above 0 and at most {LARGEST_BUDGET:g}")
+            if bound is not None and not 0.0 < bound <= MAX_BUDGET:
+                raise SettingsError(f"a budget of {bound} {name}: above 0 and at most {MAX_BUDGET:g}")
 
     @classmethod
     def parse(cls, text: str) -> "SearchBudget":
         """Return the budget of `5s`, `2min`, `1h`, or of a number of evaluations such as `100000` or `1e6`."""
         match = _BUDGET.fullmatch(text.strip().replace("_", ""))
         amount = float(match[1]) if match else 0.0
-        if match is None or not 0.0 < amount <= LARGEST_BUDGET or (match[2] is None and amount != int(amount)):
+        if match is None or not 0.0 < amount <= MAX_BUDGET or (match[2] is None and amount != int(amount)):
             raise SettingsError(
                 f'budget = "{text}" is neither a time above 0 (5s, 2min, 1h) nor a number of evaluations (100000, 1e6)'
             )

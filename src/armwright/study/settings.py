@@ -13,7 +13,7 @@ from armwright.search.samplers import SamplerFactory, sampler_name
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
 
-LARGEST = 2**31 - 1
+MAX_INTEGER = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
 
 
@@ -93,6 +93,6 @@ def check_integer(name: str, value: Any, least: int) -> int:
         number = operator.index(value)  # accepts the integers of numpy
     except TypeError:
         number = -1
-    if isinstance(value, bool) or not least <= number <= LARGEST:
-        raise SettingsError(f"{name} = {value!r}: a whole number from {least} to {LARGEST} is needed")
+    if isinstance(value, bool) or not least <= number <= MAX_INTEGER:
+        raise SettingsError(f"{name}: expected a whole number from {least} to {MAX_INTEGER}, got {value!r}")
     return number

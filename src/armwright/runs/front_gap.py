@@ -1,6 +1,7 @@
-"""The best fronts known of the built-in tasks: how far from the true front a run ended.
+"""The gap between the front of a run and the best known front of a built-in task.
 
-Shipped in fronts/, one CSV file a task, made by benchmarks/reference_fronts.py; the first lines say how.
+The best known fronts are in best_known_fronts/, one CSV file per task, made by benchmarks/reference_fronts.py. The
+first lines of a file say how.
 """
 
 import csv
@@ -21,12 +22,12 @@ from armwright.spaces.parameters import Design, FloatParameter
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
 
-BEYOND = 5e-4  # of the best known hypervolume: any other front fills the gaps of a finite one by less
+MIN_GAIN = 5e-4  # of the best known hypervolume; any other front fills the gaps of a finite one by less
 
 
 @dataclass(frozen=True)
 class KnownFront:
-    """A front: designs and their values (K, M), by rising first objective."""
+    """A front: designs and their (K, M) values, by increasing first objective."""
 
     designs: tuple[Design, ...]
     values: Array
@@ -36,10 +37,11 @@ class KnownFront:
 class FrontGap:
     """A front compared with the best known one, within the same reference point.
 
-    hypervolume: of the best known front.
-    share: of it, what the front has; above 1 where it is better.
-    beyond: how many of the front's designs the best known front does not dominate.
-    gain: what these add to the best known hypervolume, relative; where it is less than 0.05 %, both are 0.
+    Attributes:
+        hypervolume: Hypervolume of the best known front.
+        share: Hypervolume of the front divided by it; above 1 if the front is better.
+        beyond: Number of designs that the best known front does not dominate.
+        gain: What these add to the best known hypervolume, relative. If it is less than 0.05 %, both are 0.
     """
 
     hypervolume: float
@@ -51,17 +53,17 @@ class FrontGap:
 def known_front(problem: Problem) -> KnownFront | None:
     """Return the best known front of a problem, if it has a built-in task's targets and the paper's space."""
     paper = paper_space()
-    same_space = problem.space.model_copy(update={"name": paper.name}) == paper
-    as_the_paper = (
-        problem.objectives == PAPER_OBJECTIVES
+    is_known = (
+        problem.space.model_copy(update={"name": paper.name}) == paper
+        and not problem.tolerance
+        and problem.objectives == PAPER_OBJECTIVES
         and not problem.task.payloads.any()
         and not problem.constraints
         and problem.task.is_plain
     )
-    if not same_space or problem.tolerance or not as_the_paper:
+    if not is_known:
         return None
-    own = problem.task.name
-    for name in sorted(builtin_names(), key=lambda name: name != own):  # nearly always it is the first
+    for name in sorted(builtin_names(), key=lambda name: name != problem.task.name):  # nearly always the first
         if load_task(name).targets == problem.task.targets:
             return _read(name)
     return None
@@ -87,7 +89,7 @@ def front_gap(problem: Problem, values: Array, reference_point: Sequence[float])
     together = np.vstack([known.values, inside])
     beyond = int(front_mask(together)[len(known.values) :].sum())
     gain = hypervolume(together, reference_point) / best - 1.0
-    if gain < BEYOND:
+    if gain < MIN_GAIN:
         beyond, gain = 0, 0.0
     return FrontGap(best, hypervolume(inside, reference_point) / best, beyond, gain)
 
