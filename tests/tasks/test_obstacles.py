@@ -174,7 +174,9 @@ def test_obstacles_reach_prompt_and_figures(tmp_path: Path) -> None:
     prompt = armwright("prompt", "--after", tmp_path / "run")
     assert all(f"\n- {words}\n" in prompt for words in DESCRIPTIONS)
     assert "Orientation does not matter. The inverse kinematics steers around nothing" in prompt
-    assert repeat_command(config).startswith("armwright optimize TASK.yaml")
+    named = config.task.model_copy(update={"name": "random-arm"})  # close to the names of built-in tasks
+    for task in (config.task, named):
+        assert repeat_command(config.model_copy(update={"task": task})).startswith("armwright optimize TASK.yaml")
     options = ["--objectives", "position_error", *size, "--no-figures", "--out", tmp_path / "other"]
     assert "no objective or constraint uses the task's obstacles" in armwright("optimize", file, *options)
 

@@ -11,12 +11,13 @@ import asyncio
 import json
 import secrets
 from collections.abc import AsyncGenerator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 from starlette.applications import Starlette
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response, StreamingResponse
@@ -26,7 +27,7 @@ from armwright.exceptions import ArmwrightError
 from armwright.files import replace_surrogates
 from armwright.report.live_run import LiveRun
 from armwright.report.page import render_page
-from armwright.runs.control import MAX_HINT_LENGTH, add_hint, pause_study, resume_study, stop_study
+from armwright.runs.control import add_hint, pause_study, resume_study, stop_study
 
 POLL = 0.25  # [s] between two checks of the run folder
 HEARTBEAT = 15.0  # [s] between events while nothing changes
@@ -42,21 +43,12 @@ HEADERS = {
 
 
 class ControlRequest(BaseModel, frozen=True, extra="forbid"):
-    """A request of the page's user to the study."""
+    """A request of the page's user to the study; text: that of a hint for the next prompt."""
 
-    action: Literal["pause", "resume", "stop"]
-
-
-class HintRequest(BaseModel, frozen=True, extra="forbid"):
-    """A hint for the next prompt."""
-
-    action: Literal["hint"]
-    text: str = Field(min_length=1, max_length=MAX_HINT_LENGTH)
+    action: Literal["pause", "resume", "stop", "hint"]
+    text: str = ""
 
 
-_REQUESTS: TypeAdapter[ControlRequest | HintRequest] = TypeAdapter(
-    Annotated[ControlRequest | HintRequest, Field(discriminator="action")]
-)
 _ACTIONS: dict[str, Callable[[Path], None]] = {"pause": pause_study, "resume": resume_study, "stop": stop_study}
 
 
@@ -96,7 +88,6 @@ class _Handlers:
         self._token = token
         self._pages = pages
         self._run = LiveRun(folder)
-        self._changed = asyncio.Condition()
 
     @asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncGenerator[None]:
@@ -143,15 +134,13 @@ class _Handlers:
         except ClientDisconnect:
             return Response(status_code=400)  # nobody receives it
         try:
-            await self._apply(_REQUESTS.validate_json(body))
+            await asyncio.to_thread(self._apply, ControlRequest.model_validate_json(body))
         except ValidationError:
             return PlainTextResponse("expected pause, resume, stop or hint", status_code=422)
         except ArmwrightError as fault:
             return PlainTextResponse(str(fault), status_code=409)
         except FileNotFoundError:
             return PlainTextResponse("the run folder is gone", status_code=409)
-        await asyncio.to_thread(self._run.look)
-        await self._announce()
         return Response(status_code=204)
 
     def _refusal(self, request: Request) -> Response | None:
@@ -165,41 +154,32 @@ class _Handlers:
             return PlainTextResponse("expected application/json", status_code=415)
         return None
 
-    async def _apply(self, request: ControlRequest | HintRequest) -> None:
+    def _apply(self, request: ControlRequest) -> None:
         if not self._folder.is_dir():
             raise FileNotFoundError(self._folder)
-        if isinstance(request, HintRequest):
-            await asyncio.to_thread(add_hint, self._folder, request.text)
+        if request.action == "hint":
+            add_hint(self._folder, request.text)
         else:
-            await asyncio.to_thread(_ACTIONS[request.action], self._folder)
+            _ACTIONS[request.action](self._folder)
+        self._run.look()
 
     async def _watch(self) -> None:
-        sent = self._run.status
         while True:
             await asyncio.to_thread(self._run.look)
-            if self._run.status != sent:
-                sent = self._run.status
-                await self._announce()
             await asyncio.sleep(POLL)
 
-    async def _announce(self) -> None:
-        async with self._changed:
-            self._changed.notify_all()
-
     async def _statuses(self) -> AsyncGenerator[str]:
-        """Yield the status as an event whenever it changes, and now and then while it does not."""
+        """Yield the status as an event whenever it changes, and at intervals while it does not."""
         self._pages.count += 1
         self._pages.were_open = True
         sent, since = None, 0.0
         try:
             while not self._pages.is_closing:
                 now = asyncio.get_running_loop().time()
-                if self._run.status is not sent or now - since > HEARTBEAT:
+                if self._run.status != sent or now - since > HEARTBEAT:
                     sent, since = self._run.status, now
                     yield f"event: status\ndata: {json.dumps(sent)}\n\n"
-                async with self._changed:
-                    with suppress(TimeoutError):
-                        await asyncio.wait_for(self._changed.wait(), POLL)
+                await asyncio.sleep(POLL)
         finally:
             self._pages.count -= 1
 
@@ -215,13 +195,13 @@ class _Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        hosts: list[str] = [value.decode("latin-1") for name, value in scope["headers"] if name == b"host"]
 
         async def send_with_headers(message: Any) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in HEADERS.items())]
+                MutableHeaders(scope=message).update(HEADERS)
             await send(message)
 
+        hosts = Headers(scope=scope).getlist("host")
         app = self._app
         if len(hosts) != 1 or not self._is_allowed(hosts[0]):  # with two, a proxy might use the other one
             app = PlainTextResponse("unknown host; use the address that the server printed", 421)

@@ -12,7 +12,6 @@ from armwright.report.page_content import RunContent, design_files
 from armwright.runs.control import (
     CONTROL,
     STATUS,
-    Hint,
     read_control,
     read_status,
 )
@@ -78,35 +77,33 @@ class LiveRun:
 
     def _status(self) -> dict[str, Any]:
         """Return the content of the page's status bar."""
-        content, status, asked = self._content, read_status(self.folder), read_control(self.folder)
-        history = None if content is None else content.history
+        content, status, control = self._content, read_status(self.folder), read_control(self.folder)
+        trials = () if content is None else content.history.trials
+        calls = () if content is None else content.calls
         study = None if content is None else content.study
-        planned = None if study is None else study.n_trials
-        n = 0 if history is None else len(history)
-        doing = "unknown" if status is None else status.doing
+        is_finished = content is not None and content.summary is not None
+        doing = status.doing if status is not None else "finished" if is_finished else "unknown"
         if doing in RUNNING and not is_held(self.folder):
             doing = "gone"
-        if status is None and content is not None and content.summary is not None:
-            doing = "finished"
-        recent = [] if history is None else [trial.seconds.get("total", 0.0) for trial in history.trials[-RECENT:]]
-        left = None if planned is None or not recent else (planned - n) * sum(recent) / len(recent)
-        calls = () if content is None else content.calls
-        used = used_hints(calls)
+        recent = [trial.seconds.get("total", 0.0) for trial in trials[-RECENT:]]
+        planned = None if study is None else study.n_trials
+        n_init = 0 if study is None else study.n_init
+        used = used_hints(calls)  # proposals, named PROPOSER-NUMBER, by hint
         return {
             "run": f"{self._server}-{self._run}",
             "doing": doing,
             "since": 0.0 if status is None else status.since,
-            "designs": n,
+            "designs": len(trials),
             "calls": len(calls),
             "planned": planned,
-            "finished": content is not None and content.summary is not None,
-            "left": left,
-            "paused": asked.paused,
+            "finished": is_finished,
+            "left": None if planned is None or not recent else (planned - len(trials)) * sum(recent) / len(recent),
+            "paused": control.paused,
             "fault": self.fault or ("" if status is None else status.fault),
             "takes_hints": study is not None and _asks_a_model(study.proposer or {}),
             "hints": [
-                {"text": hint.text, "used": _iteration(used, hint, 0 if study is None else study.n_init)}
-                for hint in asked.hints
+                {"text": hint.text, "used": int(used[hint].rpartition("-")[2]) - n_init + 1 if hint in used else None}
+                for hint in control.hints
             ],
         }
 
@@ -114,13 +111,6 @@ class LiveRun:
 def _asks_a_model(proposer: Mapping[str, Any]) -> bool:
     """Return whether a hint would reach a model; rules, people and replays take none."""
     return "prompt" in proposer and "replay" not in proposer and proposer["name"] != "manual"
-
-
-def _iteration(used: dict[Hint, str], hint: Hint, n_init: int) -> int | None:
-    """Return the iteration whose prompt contained the hint."""
-    if hint not in used:
-        return None
-    return int(used[hint].rpartition("-")[2]) - n_init + 1
 
 
 def _stamp(path: Path) -> tuple[int, ...] | None:

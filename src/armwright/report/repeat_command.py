@@ -5,6 +5,8 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import BaseModel
+
 from armwright.llm.model_options import ModelOptions
 from armwright.problem.objectives import OBJECTIVES
 from armwright.runs.config import FrontMethod, Method, RunConfig
@@ -14,10 +16,6 @@ from armwright.tasks.catalogue import builtin_names, load_task
 
 OWN_TASK, OWN_SPACE = "TASK.yaml", "SPACE.yaml"  # placeholders for the user's own files
 DEFAULTS = {"sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200}
-TASK_FIELDS = (  # fields that distinguish one task from another
-    "target_specs", "payload", "payload_factors", "target_noise", "restarts", "obstacles", "moves", "move_step",
-    "move_time", "workspace", "constraints", "objectives", "reference_point",
-)  # fmt: skip
 
 
 def repeat_command(config: RunConfig, refined: bool = False, spent: int | None = None) -> str:
@@ -34,18 +32,16 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     Returns:
         The command; empty if objectives, sampler or proposer are the user's own code.
     """
-    name, task = config.task.name, config.task
+    name = config.task.name
     if any(record.name not in OBJECTIVES for record in config.objectives) or config.tolerance not in (0.0, TOLERANCE):
         return ""
-    builtin = load_task(name) if name in builtin_names() or name.startswith("random-") else None
-    alike = builtin is not None and all(getattr(builtin, key) == getattr(task, key) for key in TASK_FIELDS)
-    words = [name if alike else OWN_TASK]
+    builtin = load_task(name) if name in builtin_names() or re.fullmatch(r"random-\d+", name) else None
+    is_builtin = builtin is not None and _content(builtin) == _content(config.task)
+    spaces = [name for name in builtin_spaces() if _content(load_space(name)) == _content(config.space)]
     settings: dict[str, Any] = {}
     n_designs = 0
-    known = {name: load_space(name).model_dump(exclude={"name"}) for name in builtin_spaces()}
-    alike = [name for name, content in known.items() if content == config.space.model_dump(exclude={"name"})]
-    if "paper" not in alike:
-        settings["space"] = alike[0] if alike else OWN_SPACE
+    if "paper" not in spaces:
+        settings["space"] = spaces[0] if spaces else OWN_SPACE
     if isinstance(config.method, FrontMethod):
         first = config.method.initial_designs or {}
         settings |= {"budget": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
@@ -60,8 +56,13 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
     options += [text for n in range(n_designs) for text in ("--initial-design", f"DESIGN-{n + 1}.json")]
     options += ["--robust"] * (config.tolerance > 0.0)
-    line = shlex.join(["armwright", command, *words, *options, "--seed", str(config.seed)])
+    line = shlex.join(["armwright", command, name if is_builtin else OWN_TASK, *options, "--seed", str(config.seed)])
     return f"{line} && armwright refine RUN" if refined else line
+
+
+def _content(model: BaseModel) -> dict[str, Any]:
+    """Return what distinguishes one task or space from another."""
+    return model.model_dump(exclude={"name", "description", "provenance"})
 
 
 def _study_options(method: Method) -> dict[str, Any]:
