@@ -28,7 +28,7 @@ from armwright.llm.prompt import (
     load_prompt,
     parameters_prompt,
 )
-from armwright.llm.prompt_values import LONGEST_DESCRIPTION, VARIABLES, spread
+from armwright.llm.prompt_values import VARIABLES, spread
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace, paper_space
@@ -36,7 +36,6 @@ from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.parameters import exact
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
-from armwright.text import one_line
 from tests.support.fixed_problem import (
     ONE_JOINT,
     ONE_OBJECTIVE,
@@ -421,7 +420,10 @@ hostile = st.sampled_from(
         "½√",
     ]
 )
-words = st.lists(st.one_of(hostile, st.text(max_size=30)), max_size=5).map(" ".join)
+# Hypothesis draws constants of the source, so "None" is not rare.
+words = (
+    st.lists(st.one_of(hostile, st.text(max_size=30)), max_size=5).map(" ".join).filter(lambda text: "None" not in text)
+)
 
 
 @settings(max_examples=20)
@@ -472,7 +474,7 @@ def test_prompt_of_any_problem_is_complete_and_bounded(
     assert "\x1b" not in text
     assert "\u202e" not in text
     assert not re.search(r"\(1 (designs|joints|targets)|\b1 (designs|joints) ", text)
-    assert "None" not in text.replace(one_line(description, LONGEST_DESCRIPTION), "")
+    assert "None" not in text
 
 
 def test_longest_prompt_is_bounded() -> None:

@@ -47,12 +47,12 @@ def answer_schema(problem: Problem, options: PromptOptions) -> dict[str, Any]:
     fields: dict[str, Any] = {parameter.name: _property(parameter) for parameter in problem.space.parameters}
     if options.expects:
         for objective in problem.objectives:
-            words = f"the {objective.symbol} that you expect of this design, summed over all targets [{objective.unit}]"
-            fields[f"expected_{objective.name}"] = {"type": "number", "description": words}
+            text = f"the {objective.symbol} that you expect of this design, summed over all targets [{objective.unit}]"
+            fields[f"expected_{objective.name}"] = {"type": "number", "description": text}
     fields["reason"] = {"type": "string", "description": "the main reason for this design, in one sentence"}
     if options.proposals > 1:
-        words = f"{options.proposals} designs, each different from the others"
-        content = {"designs": {"type": "array", "description": words, "items": object_schema(fields)}}
+        text = f"{options.proposals} designs, each different from the others"
+        content = {"designs": {"type": "array", "description": text, "items": object_schema(fields)}}
     else:
         content = fields
     return response_schema("NewDesign" if options.proposals == 1 else "NewDesigns", content, options)
@@ -128,10 +128,10 @@ def without_words_around(text: str) -> str:
 def _property(parameter: Parameter) -> dict[str, Any]:
     if isinstance(parameter, CategoricalParameter):
         return {"type": "string", "enum": list(parameter.choices)}
-    words = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}"
+    description = f"{exact(parameter.low)} <= {parameter.name} <= {exact(parameter.high)} {parameter.unit}"
     if parameter.step > 0.0:
-        words += f", in steps of {exact(parameter.step)}"
-    return {"type": "number", "description": words}
+        description += f", in steps of {exact(parameter.step)}"
+    return {"type": "number", "description": description}
 
 
 def response_schema(title: str, fields: Mapping[str, Any], options: PromptOptions) -> dict[str, Any]:
@@ -184,9 +184,9 @@ def _value(parameter: Parameter | None, value: Any) -> Any:
     """Return the value in the form that the design space expects, or the value itself."""
     if isinstance(parameter, CategoricalParameter):
         is_text = isinstance(value, (str, int)) and not isinstance(value, bool)
-        word = str(value).strip().strip("'\"").lower() if is_text else ""
+        text = str(value).strip().strip("'\"").lower() if is_text else ""
         for choice in parameter.choices:
-            if word == choice.lower() or JOINT_NAMES.get(word) == choice:
+            if text == choice.lower() or JOINT_NAMES.get(text) == choice:
                 return choice
         return _short(value)
     return _number(value, "" if parameter is None else parameter.unit)

@@ -1,6 +1,6 @@
 """The line format of free answers: ORIGIN, JOINTS, LINKS and more.
 
-A line is read only if all of it is understood; numbers mixed with other words are no value.
+A line is read only if all of it is understood; numbers mixed with other text are no value.
 """
 
 import re
@@ -16,7 +16,7 @@ LISTS = {  # lists with a value per module, and the prefix of their parameters
 }  # fmt: skip
 GROUPS = ("origin", "mount", *LISTS)
 NOTHING = "-"  # in a list, for a module without such a value
-JOINT_NAMES = {words.partition(",")[0]: kind for kind, words in JOINT_DESCRIPTIONS.items()}  # "yaw": "Y"
+JOINT_NAMES = {description.partition(",")[0]: kind for kind, description in JOINT_DESCRIPTIONS.items()}  # "yaw": "Y"
 LONGEST_LINE = 2000  # characters; longer lines are ignored
 
 _MINUS = str.maketrans({"−": "-", "﹣": "-", "-": "-", "＋": "+"})
@@ -31,11 +31,11 @@ _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
 _LEFT_OVER = re.compile(r"[\s,;|()\[\]{}$*_`~≈\"'.]*")  # allowed between values
 
-_WORDS = "|".join([*(group.upper() for group in GROUPS), "EXPECTED", "REASON"])
+_KEYWORDS = "|".join([*(group.upper() for group in GROUPS), "EXPECTED", "REASON"])
 # At the start of a line with any list marker or emphasis; in capitals also within the line.
 _NAME = re.compile(
-    rf"(?:^[ \t>*_#`|•–-]{{0,20}}(?:\d+[.)] ?)?[*_`]{{0,3}}(?P<first>(?i:{_WORDS}))"
-    rf"|(?<=[\s;,])[*_`]{{0,3}}(?P<later>{_WORDS}))[ \t*_`]*[:=]",
+    rf"(?:^[ \t>*_#`|•–-]{{0,20}}(?:\d+[.)] ?)?[*_`]{{0,3}}(?P<first>(?i:{_KEYWORDS}))"
+    rf"|(?<=[\s;,])[*_`]{{0,3}}(?P<later>{_KEYWORDS}))[ \t*_`]*[:=]",
     re.MULTILINE,
 )
 
@@ -100,39 +100,37 @@ def _named_lines(text: str) -> Iterator[tuple[int, str, str]]:
         yield match.start(), (match["first"] or match["later"]).lower(), lines[0] if lines else ""
 
 
-def _values(name: str, words: str) -> dict[str, Any] | None:
+def _values(name: str, text: str) -> dict[str, Any] | None:
     """Return the values of a line by parameter; None if it holds no values."""
     if name == "reason":
-        return {"reason": words.strip(" \t*_`")}
-    words = _LATEX.sub(" ", words.translate(_MINUS))
+        return {"reason": text.strip(" \t*_`")}
+    text = _LATEX.sub(" ", text.translate(_MINUS))
     if name == "joints":
-        return _joints(words)
+        return _joints(text)
     if name == "mount":
-        mounts = re.findall(r"[A-Za-z]+(?:[-+][xy])?", words)
+        mounts = re.findall(r"[A-Za-z]+(?:[-+][xy])?", text)
         return {"mount": mounts[0].lower()} if len(mounts) == 1 else None
     if name == "motors":
-        names = re.findall(
-            r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*", _spaced(re.sub(r"motor_\d+\s*[:=]", "", words))
-        )
+        names = re.findall(r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*", _spaced(re.sub(r"motor_\d+\s*[:=]", "", text)))
         return _listed(name, [motor.rstrip(".") for motor in names])
     if name == "directions":
-        signed = re.findall(r"[-+] ?[xyzXYZ]", re.sub(r"direction_\d+\s*[:=]", "", words))
+        signed = re.findall(r"[-+] ?[xyzXYZ]", re.sub(r"direction_\d+\s*[:=]", "", text))
         return _listed(name, [direction.replace(" ", "").lower() for direction in signed])
     if name == "origin":
-        words = re.sub(r"(?<!\w)([xyz])\s*[:=]", r"origin_\1 =", words)
+        text = re.sub(r"(?<!\w)([xyz])\s*[:=]", r"origin_\1 =", text)
     elif name == "links":
-        words = re.sub(r"(?<!\w)[lL]_?(\d+)\s*[:=]", r"link_\1 =", words)
-    named = _NAMED.findall(words)
+        text = re.sub(r"(?<!\w)[lL]_?(\d+)\s*[:=]", r"link_\1 =", text)
+    named = _NAMED.findall(text)
     if named and name != "expected":
-        rest = _LEFT_OVER.fullmatch(_NAMED.sub("", words))
+        rest = _LEFT_OVER.fullmatch(_NAMED.sub("", text))
         return {key.lower(): _with_unit(number, unit) for key, number, unit in named} if rest else None
-    words = _in_brackets(_NAMES_ALONE.sub("", words), r"\d|nan|inf")
+    text = _in_brackets(_NAMES_ALONE.sub("", text), r"\d|nan|inf")
     if name in ("strokes", "ranges"):
-        words = re.sub(r"(?<!\S)-(?!\S)", "nan", _spaced(words))
+        text = re.sub(r"(?<!\S)-(?!\S)", "nan", _spaced(text))
     if name == "expected":
-        words = re.sub(r"[A-Za-z]\w*\s*[:=]", "", words)
-    items = _ITEM.findall(words)
-    if not items or not _LEFT_OVER.fullmatch(_ITEM.sub("", words)):
+        text = re.sub(r"[A-Za-z]\w*\s*[:=]", "", text)
+    items = _ITEM.findall(text)
+    if not items or not _LEFT_OVER.fullmatch(_ITEM.sub("", text)):
         return None
     if name == "expected":
         return {"expected": [float(number) for number, _ in items]}
@@ -141,9 +139,9 @@ def _values(name: str, words: str) -> dict[str, Any] | None:
     return {_parameter(name, i): _with_unit(*item) for i, item in enumerate(items)}
 
 
-def _spaced(words: str) -> str:
+def _spaced(text: str) -> str:
     """Replace the separators of a list by blanks."""
-    return re.sub(r"[,;|()\[\]{}]", " ", words)
+    return re.sub(r"[,;|()\[\]{}]", " ", text)
 
 
 def _listed(group: str, values: Sequence[Any]) -> dict[str, Any] | None:
@@ -151,28 +149,28 @@ def _listed(group: str, values: Sequence[Any]) -> dict[str, Any] | None:
     return {_parameter(group, i): value for i, value in enumerate(values) if value != NOTHING} or None
 
 
-def _joints(words: str) -> dict[str, Any] | None:
+def _joints(text: str) -> dict[str, Any] | None:
     kinds = {kind.lower(): kind for kind in JOINT_DESCRIPTIONS} | JOINT_NAMES
-    words = re.sub(r"joint_\d+\s*[:=]", "", _NAMES_ALONE.sub("", words))
-    words = re.sub(rf"\b([A-Za-z])\s*\((?:{'|'.join(kinds)})\)", r"\1", words, flags=re.IGNORECASE)  # Y (yaw)
-    words = _in_brackets(words, r"[A-Za-z]")
-    types = re.findall(r"[A-Za-z]+", words)
+    text = re.sub(r"joint_\d+\s*[:=]", "", _NAMES_ALONE.sub("", text))
+    text = re.sub(rf"\b([A-Za-z])\s*\((?:{'|'.join(kinds)})\)", r"\1", text, flags=re.IGNORECASE)  # Y (yaw)
+    text = _in_brackets(text, r"[A-Za-z]")
+    types = re.findall(r"[A-Za-z]+", text)
     if len(types) == 1 and (types[0].isupper() or not set(types[0].lower()) - kinds.keys()):
-        types = list(types[0])  # YPRP as one word
-    if not types or not re.fullmatch(r"[\s,;|()\[\]{}$*_`\"'.>–-]*", re.sub(r"[A-Za-z]+", "", words)):
+        types = list(types[0])  # YPRP as one text
+    if not types or not re.fullmatch(r"[\s,;|()\[\]{}$*_`\"'.>–-]*", re.sub(r"[A-Za-z]+", "", text)):
         return None
     if any(len(kind) > 1 and kind.lower() not in kinds for kind in types):
         return None
     return {_parameter("joints", i): kinds.get(kind.lower(), kind) for i, kind in enumerate(types)}
 
 
-def _in_brackets(words: str, value: str) -> str:
+def _in_brackets(text: str, value: str) -> str:
     """Return the content of the only brackets with a value, or the text without brackets that hold none."""
-    groups: list[str] = _BRACKETS.findall(words)
+    groups: list[str] = _BRACKETS.findall(text)
     with_values = [group for group in groups if re.search(value, group, re.IGNORECASE)]
     if len(with_values) == 1:
         return with_values[0]
-    return _BRACKETS.sub(lambda match: match[0] if match[1] in with_values else "", words)
+    return _BRACKETS.sub(lambda match: match[0] if match[1] in with_values else "", text)
 
 
 def _with_unit(number: str, unit: str) -> float | str:

@@ -30,6 +30,7 @@ from armwright.llm.backend import (
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
 from armwright.llm.redaction import WithoutKeys, redacted, without_keys
 from armwright.llm.servers import Server, server_of
+from armwright.text import one_line
 
 with requires_extra("llm", "a language model"):
     from genai_prices import Usage, calc_price
@@ -107,6 +108,8 @@ class ModelClient(LlmBackend):
         model = options.model or ""
         if not model.rpartition(":")[2].strip():
             raise SettingsError(f'model "{model}" names no model; expected a name such as openai-chat:gpt-4o')
+        if options.answer == "text":
+            raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
         self.model = model
         self.origin = options.origin
         self.timeout = options.timeout
@@ -304,8 +307,7 @@ def _cost(response: ModelResponse, server: Server | None) -> float | None:
 
 
 def _one_line(text: object) -> str:
-    line = redacted(replace_surrogates(" ".join(str(text).split()))).rstrip(".")
-    return line if len(line) <= 300 else line[:297] + "..."
+    return one_line(redacted(str(text)), 300).rstrip(".")
 
 
 @cache

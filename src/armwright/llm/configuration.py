@@ -21,7 +21,7 @@ class ConfiguredModel:
 
     @property
     def place(self) -> str:
-        """The server in words; empty for the vendor's."""
+        """The server as a phrase; empty for the vendor's."""
         return f" at {self.options.base_url}" if self.options.base_url else ""
 
     def __str__(self) -> str:

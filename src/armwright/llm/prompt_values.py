@@ -168,9 +168,8 @@ def _describe_payload(task: Task) -> str:
         return ""
     if np.ptp(payloads) == 0.0:
         return f"At every target the tip carries a payload of {payloads[0]:g} kg, a point mass."
-    shown = spread(len(payloads), MOST_TARGETS)
-    each = "each" if len(shown) == len(payloads) else "some of"
-    listed = ", ".join(f"{payloads[i]:g}" for i in shown)
+    listed, omission = _sample([f"{payload:g}" for payload in payloads])
+    each = "some of" if omission else "each"
     return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
 
 
@@ -179,10 +178,8 @@ def _describe_moves(task: Task) -> str:
     pairs = task.straight_moves.pairs
     if task.moves == IN_ORDER:
         return "from each target to the next, in the order of the list"
-    shown = [pairs[i] for i in spread(len(pairs), MOST_TARGETS)]
-    listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in shown)
-    more = "" if len(shown) == len(pairs) else f" (some of {len(pairs)})"
-    return f"between the targets of these numbers, counted from 1: {listed}{more}" if pairs else ""
+    listed, omission = _sample([f"{start + 1} to {end + 1}" for start, end in pairs])
+    return f"between the targets of these numbers, counted from 1: {listed}{omission}" if pairs else ""
 
 
 def _describe_times(task: Task) -> str:
@@ -192,9 +189,14 @@ def _describe_times(task: Task) -> str:
         return ""
     if len(set(times)) == 1:
         return f"{times[0]:g} s"
-    shown = spread(len(times), MOST_TARGETS)
-    more = "" if len(shown) == len(times) else f" (some of {len(times)})"
-    return f"{', '.join(f'{times[i]:g}' for i in shown)} s, in the order of the moves{more}"
+    listed, omission = _sample([f"{time:g}" for time in times])
+    return f"{listed} s, in the order of the moves{omission}"
+
+
+def _sample(items: Sequence[str]) -> tuple[str, str]:
+    """Join at most MOST_TARGETS of the items; the second text says if some are omitted."""
+    shown = spread(len(items), MOST_TARGETS)
+    return ", ".join(items[i] for i in shown), "" if len(shown) == len(items) else f" (some of {len(items)})"
 
 
 def shown_values(

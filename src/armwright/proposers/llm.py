@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-from armwright.exceptions import SettingsError
 from armwright.llm.budget import CallBudget
 from armwright.llm.feedback import N_PARETO, N_RANDOM
 from armwright.llm.model_options import ModelOptions
@@ -28,8 +27,6 @@ class LlmProposer(PromptedProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        if options.answer == "text":
-            raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
         budget = CallBudget(options.max_calls, options.max_cost)
         super().__init__(ModelClient(options), options, options.source, budget=budget)
         self.options = options
@@ -46,20 +43,19 @@ class LlmProposer(PromptedProposer):
         calls = -(-n // self.options.proposals)
         given, written = self._tokens_each(problem)
         steps = 2 if self.options.form == "then-schema" else 1
-        words = (
+        estimate = (
             f"{n} proposals: about {steps * calls + 1} calls, {_thousands(calls * given)} tokens in, "
             f"{_thousands(calls * written)} out"
         )
-        return f"{words}; {describe_cost(self.options, calls * given, calls * written)}"
+        return f"{estimate}; {describe_cost(self.options, calls * given, calls * written)}"
 
     def _tokens_each(self, problem: Problem) -> tuple[int, int]:
         """Return input and output tokens per proposal: the mean so far, or the estimate for a full prompt."""
         calls = [call for call in self._transcript.calls if call.proposal and call.fault is None]
-        asked = {call.proposal for call in calls}
-        if asked:
-            return tuple(
-                sum(n) // len(asked) for n in zip(*((c.input_tokens, c.output_tokens) for c in calls), strict=True)
-            )  # pyright: ignore[reportReturnType]
+        proposals = {call.proposal for call in calls}
+        if proposals:
+            tokens = sum(call.input_tokens for call in calls), sum(call.output_tokens for call in calls)
+            return tokens[0] // len(proposals), tokens[1] // len(proposals)
         given = min(
             MOST_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + _feedback_tokens(problem)
         )

@@ -51,7 +51,8 @@ class ReplayProposer(PromptedProposer):
         prompt, then = _as_recorded(file, recorded, calls, options or PromptOptions())
         super().__init__(ReplayBackend(calls, file, strict), then, name, prompt=prompt)
         self.recording: ReplayBackend = self.backend  # pyright: ignore[reportAttributeAccessIssue]
-        self._trials = _recorded_trials(folder, recorded)
+        has_trials = recorded is not None and (folder / TRIALS).is_file()
+        self._trials: Sequence[FinishedTrial] = read_run(folder)[1].trials if has_trials else ()
 
     def settings(self) -> Mapping[str, Any]:
         """Return the source of the replay, and how it was asked."""
@@ -151,9 +152,3 @@ def _designs(answer: str) -> int:
     with suppress(ValueError, TypeError, KeyError):  # one design, or a transcript edited by hand
         return max(1, len(json.loads(answer)["designs"]))
     return 1
-
-
-def _recorded_trials(folder: Path, config: RunConfig | None) -> Sequence[FinishedTrial]:
-    if config is None or not (folder / TRIALS).is_file():
-        return ()
-    return read_run(folder)[1].trials

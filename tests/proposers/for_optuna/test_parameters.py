@@ -11,7 +11,7 @@ from optuna.distributions import BaseDistribution, CategoricalDistribution, Floa
 
 from armwright.exceptions import DesignError
 from armwright.llm.model_options import PromptOptions
-from armwright.proposers.for_optuna.answer import StudyAnswer, answer_schema, read_answer, written_answer
+from armwright.proposers.for_optuna.answer import answer_schema, read_answer, written_answer
 from armwright.proposers.for_optuna.parameter_values import (
     checked_value,
     choice_texts,
@@ -21,6 +21,7 @@ from armwright.proposers.for_optuna.parameter_values import (
 )
 from armwright.proposers.for_optuna.parameters import Parameter, checked_params, study_parameters, unique_keys
 from armwright.proposers.for_optuna.prompt import StudyObjective
+from armwright.proposers.for_optuna.proposer import StudyProposal
 
 OBJECTIVES = [StudyObjective("value", "value", "minimised")]
 CHOICES = st.one_of(st.none(), st.booleans(), st.integers(-9, 9), st.floats(-9, 9), st.text(max_size=6))
@@ -63,7 +64,7 @@ def test_written_answers_round_trip_and_fit_optuna(
     space = {name: distribution for name, (distribution, _) in drawn.items()}
     params = {name: value for name, (_, value) in drawn.items()}
     parameters = study_parameters(space, [])
-    text = written_answer(StudyAnswer(params, "so", (1.5,)), parameters, OBJECTIVES)
+    text = written_answer(StudyProposal(params, "", "so", (1.5,)), parameters, OBJECTIVES)
     back = read_answer(json.loads(text), parameters, OBJECTIVES)
     assert dict(back.params) == params
     assert [type(back.params[name]) for name in params] == [type(value) for value in params.values()]
@@ -205,7 +206,7 @@ def test_missing_reason_is_empty() -> None:
 
 def test_parameter_may_be_named_reason() -> None:
     parameters = [Parameter("reason", "reason", IntDistribution(0, 9))]
-    answer = StudyAnswer({"reason": 4}, "four")
+    answer = StudyProposal({"reason": 4}, "", "four")
     assert read_answer(json.loads(written_answer(answer, parameters, OBJECTIVES)), parameters, OBJECTIVES) == answer
 
 

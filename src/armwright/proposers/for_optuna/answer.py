@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, cast
 
 from optuna.distributions import CategoricalDistribution, IntDistribution
@@ -13,20 +12,12 @@ from armwright.llm.model_options import PromptOptions
 from armwright.proposers.for_optuna.parameter_values import choice_texts, json_value, read_value
 from armwright.proposers.for_optuna.parameters import Parameter, unknown_parameter
 from armwright.proposers.for_optuna.prompt import StudyObjective
+from armwright.proposers.for_optuna.proposer import StudyProposal
 from armwright.text import one_line
 
 OTHER_KEYS = ("parameters", "reasoning", "reason", "expected")  # keys of an answer that are no parameters
 MOST_ERRORS = 10  # reported at once
 LEFT_OUT = ("", "null", "none", "n/a", "-")  # values that models write for conditional parameters they leave out
-
-
-@dataclass(frozen=True)
-class StudyAnswer:
-    """Parameters by name, the reason for them, and the expected values if they were asked for."""
-
-    params: Mapping[str, Any]
-    reason: str = ""
-    expected: tuple[float, ...] | None = None
 
 
 def answer_schema(
@@ -51,8 +42,8 @@ def answer_schema(
 
 def read_answer(
     content: Mapping[str, Any], parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]
-) -> StudyAnswer:
-    """Read the parameters of an answer.
+) -> StudyProposal:
+    """Read the parameters of an answer as a proposal without an id.
 
     Raises:
         DesignError: Values are missing or invalid; the message lists all of them.
@@ -75,11 +66,11 @@ def read_answer(
     if errors:
         raise DesignError("; ".join(errors[:MOST_ERRORS]))
     reason = one_line(str(content.get("reason") or ""), LONGEST_REASON)
-    return StudyAnswer(params, reason, _expected(content.get("expected"), objectives))
+    return StudyProposal(params, "", reason, _expected(content.get("expected"), objectives))
 
 
 def written_answer(
-    answer: StudyAnswer, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], reasoning: str = ""
+    answer: StudyProposal, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective], reasoning: str = ""
 ) -> str:
     """Return an answer as JSON, which `read_answer` reads without loss."""
     values = {p.key: json_value(answer.params[p.name], p.distribution) for p in parameters if p.name in answer.params}
@@ -106,8 +97,8 @@ def _by_name(content: Mapping[str, Any], parameters: Sequence[Parameter]) -> tup
     """
     inner = content.get("parameters")
     given = cast("dict[str, Any]", inner) if isinstance(inner, dict) else content
-    names = {word.casefold(): p.name for p in parameters for word in (p.key, p.name)}
-    names |= {word: p.name for p in parameters for word in (p.name, p.key)}
+    names = {key.casefold(): p.name for p in parameters for key in (p.key, p.name)}
+    names |= {key: p.name for p in parameters for key in (p.name, p.key)}
     values: dict[str, Any] = {}
     unknown: list[str] = []
     for key, value in given.items():

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +41,6 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        if options.answer == "text":
-            raise SettingsError('answer "text" is for manual answers; a model needs "two-step" or "one-step"')
         super().__init__(ModelClient(options), options.source, CallBudget(options.max_calls, options.max_cost))
         self.description = description
         self.options = options
@@ -67,8 +66,7 @@ class StudyLlmProposer(LlmSession, StudyProposer):
             self._output_format(parameters, objectives),
             lambda thoughts: parameters_prompt(parameters, objectives, thoughts, self.options.expects),
         )
-        answer = read_answer(json.loads(text), parameters, objectives)
-        return StudyProposal(answer.params, identity, answer.reason, answer.expected)
+        return replace(read_answer(json.loads(text), parameters, objectives), id=identity)
 
     def _output_format(self, parameters: Sequence[Parameter], objectives: Sequence[StudyObjective]) -> OutputFormat:
         def read(content: Mapping[str, Any] | str) -> str:

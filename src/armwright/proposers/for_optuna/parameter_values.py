@@ -143,12 +143,12 @@ def _as_number(value: Any, whole: bool) -> int | float | None:
 def _closest_choice(value: Any, distribution: CategoricalDistribution) -> Any:
     """Return the only choice that a value may stand for, or the value itself."""
     choices = list(zip(distribution.choices, choice_texts(distribution), strict=True))
-    word = value.strip() if isinstance(value, str) else None
-    exact = [c for c, text in choices if text.strip() == word] or [c for c, _ in choices if _same(c, value)]
+    given = value.strip() if isinstance(value, str) else None
+    exact = [c for c, text in choices if text.strip() == given] or [c for c, _ in choices if _same(c, value)]
     if exact:
         return exact[0]
-    word = _folded(value if isinstance(value, str) else _json(value))
-    similar = [c for c, text in choices if word in (_folded(text), _folded(str(c)), _folded(repr(c)))]
+    folded = _folded(value if isinstance(value, str) else _json(value))
+    similar = [c for c, text in choices if folded in (_folded(text), _folded(str(c)), _folded(repr(c)))]
     if not similar and not isinstance(value, bool):
         number = _parsed(value) if isinstance(value, str) else value
         similar = [c for c, _ in choices if isinstance(c, (int, float)) and type(c) is not bool and c == number]

@@ -14,7 +14,7 @@ from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, estimated_tokens, fenced, rendered
 from armwright.proposers.for_optuna.parameter_values import value_text
 from armwright.proposers.for_optuna.parameters import Parameter, unique_keys
-from armwright.proposers.for_optuna.study_view import best_trials
+from armwright.proposers.for_optuna.study_view import best_trials, given_params
 
 FEWEST_PROPOSED = 1
 DIRECTIONS = {StudyDirection.MINIMIZE: "minimised", StudyDirection.MAXIMIZE: "maximised"}
@@ -68,7 +68,7 @@ def study_prompt(
         [_record(trial, parameters, objectives, {t.number for t in best}) for trial in group]
         for group in (*_sample(complete, best, seed, ranked=len(objectives) == 1), own)
     )
-    under_way = [_params(_given(trial), parameters) for trial in trials if _is_proposal_under_way(trial)]
+    under_way = [_params(given_params(trial), parameters) for trial in trials if _is_proposal_under_way(trial)]
     common = {
         "description": description.strip(),
         "parameters": parameters,
@@ -137,11 +137,6 @@ def _params(params: Mapping[str, Any], parameters: Sequence[Parameter]) -> str:
 
 def _values(values: Sequence[float], objectives: Sequence[StudyObjective]) -> str:
     return ", ".join(f"{o.key} = {value:.6g}" for o, value in zip(objectives, values, strict=True))
-
-
-def _given(trial: FrozenTrial) -> Mapping[str, Any]:
-    """Return the parameters of a trial, those that were enqueued with it included."""
-    return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
 
 
 def _is_proposal_under_way(trial: FrozenTrial) -> bool:

@@ -56,7 +56,7 @@ class StudyView:
         best = [i for i in _ascending(values[:, 0]) if complete[i].number in best_numbers]
         if len(best) < 2:  # rules need two parents: the best trial and the second best
             best = _ascending(penalised[:, 0])[:2] if len(complete) > 1 else []
-        tried = tuple({**t.system_attrs.get("fixed_params", {}), **t.params} for t in trials)
+        tried = tuple(given_params(trial) for trial in trials)
         return cls(space, tuple(complete), tuple(p for _, p in usable), penalised, tuple(best), tried, source)
 
     @cached_property
@@ -82,6 +82,11 @@ class StudyView:
     def number(self, index: int) -> int:
         """Return the study's number of a complete trial."""
         return self.complete[index].number
+
+
+def given_params(trial: FrozenTrial) -> Params:
+    """Return the parameters of a trial, including enqueued ones that it has not drawn yet."""
+    return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
 
 
 def params_in_space(params: Mapping[str, Any], space: Space) -> Params:
