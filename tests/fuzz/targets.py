@@ -277,10 +277,10 @@ def answer_seeds() -> list[bytes]:
 
 
 def run_answer(data: bytes) -> None:
-    from armwright.llm.answer import read_answers, read_text, without_words_around, written_answers
+    from armwright.llm.answer import last_json_object, read_answers, read_text, written_answers
 
     text = data.decode("utf-8", "surrogateescape")
-    without_words_around(text)
+    last_json_object(text)
     found: list[Callable[[], object]] = []
     for problem in (a_problem(), rich_problem()):
         for proposals in (1, 4):

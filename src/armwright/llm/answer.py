@@ -64,10 +64,7 @@ def read_answers(content: Mapping[str, Any], problem: Problem, proposals: int = 
     Raises:
         DesignError: A design is invalid.
     """
-    content = {key: value for key, value in content.items() if key != "reasoning"}
-    if "designs" not in content:
-        return [_read(content, problem)]
-    designs: Any = content["designs"]
+    designs: Any = content.get("designs", [{key: value for key, value in content.items() if key != "reasoning"}])
     if not isinstance(designs, list) or not designs:
         raise DesignError("designs: expected a list of objects, one per design")
     return _read_all(cast("list[Any]", designs)[:proposals], problem)
@@ -113,7 +110,7 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
     return _read_all([content for _, content in objects if "designs" not in content][-proposals:], problem)
 
 
-def without_words_around(text: str) -> str:
+def last_json_object(text: str) -> str:
     """Return the last JSON object of a text as it is written there, or the text if it holds none."""
     text = text[-LONGEST_ANSWER:]
     last, end = text, 0

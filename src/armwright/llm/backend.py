@@ -34,6 +34,11 @@ class Question:
     known: Count = 0
     hints: tuple[Hint, ...] = ()
 
+    @property
+    def trial(self) -> int:
+        """Number of the trial that the proposal is for."""
+        return int(self.proposal.rpartition("-")[2])
+
 
 CHECK = Question("", "check", "Answer with one word: ready")
 

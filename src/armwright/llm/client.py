@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from armwright.exceptions import MissingExtraError, SettingsError, UsageError
 from armwright.extras import requires_extra
 from armwright.files import replace_surrogates
-from armwright.llm.answer import without_words_around
+from armwright.llm.answer import last_json_object
 from armwright.llm.backend import (
     CHECK,
     MOST_REQUESTS,
@@ -275,9 +275,7 @@ def _model_on(server: Server) -> Model:
 
 def _json_alone(response: ModelResponse) -> ModelResponse:
     """Return the response without the text around its JSON; `_text` reads that from its metadata."""
-    parts = [
-        replace(p, content=without_words_around(p.content)) if isinstance(p, TextPart) else p for p in response.parts
-    ]
+    parts = [replace(p, content=last_json_object(p.content)) if isinstance(p, TextPart) else p for p in response.parts]
     return replace(response, parts=parts, metadata={**(response.metadata or {}), _WRITTEN: _text(response)})
 
 

@@ -3,7 +3,6 @@
 The schema is made from the models that load the files, so a key that is new there is known here.
 """
 
-from collections.abc import Mapping
 from typing import Any, cast
 
 from pydantic import BaseModel, Field
@@ -88,12 +87,6 @@ def _plain(schema: Any) -> Any:
 
 
 def _actuator_line(record: ActuatorRecord) -> str:
-    listed: Mapping[str, float | None] = {
-        "mass": record.mass,
-        "stall": record.stall_torque,
-        "rated": record.rated_torque,
-        "peak": record.peak_torque,
-        "price": record.price,
-    }
-    numbers = ", ".join(f"{name} {value:g}" for name, value in listed.items() if value is not None)
-    return f"- {record.name} ({record.maker}): {numbers}"
+    stated = {name: getattr(record, name) for name in ("mass", "stall_torque", "rated_torque", "peak_torque", "price")}
+    numbers = [f"{name.removesuffix('_torque')} {value:g}" for name, value in stated.items() if value is not None]
+    return f"- {record.name} ({record.maker}): {', '.join(numbers)}"

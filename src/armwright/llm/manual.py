@@ -51,7 +51,7 @@ class ManualBackend(LlmBackend):
     def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
         """Return the answer; one that is refused is moved aside with the reason."""
         started = time.perf_counter()
-        number = int(question.proposal.rpartition("-")[2])
+        number = question.trial
         prompt_file, _ = self.files(number)
         answers = self._answers(number)
         self._ask(prompt_file, answers, question.prompt)

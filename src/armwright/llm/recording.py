@@ -5,7 +5,7 @@ from pathlib import Path
 
 from armwright.exceptions import ReplayError
 from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply
-from armwright.llm.transcript import Call
+from armwright.llm.transcript import Call, last_call
 
 
 class ReplayBackend(LlmBackend):
@@ -34,11 +34,9 @@ class ReplayBackend(LlmBackend):
 
     def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
         """Return the recorded answer to this step of the proposal, in its stored form."""
-        place = question.proposal, question.step
-        calls = [call for call in self.calls if (call.proposal, call.step) == place]
-        if not calls:
+        call = last_call(self.calls, question.proposal, question.step)
+        if call is None:
             raise CallError("missing", f"{self.source} holds no {question.step} for {question.proposal}", Reply())
-        call = calls[-1]  # an interrupted run may have asked again; the last call counts
         if call.prompt != question.prompt:
             if self.strict:
                 raise ReplayError(

@@ -67,8 +67,7 @@ class Transcript:
 
     def answered(self, proposal: str, step: str) -> Call | None:
         """Return the call that answered this step of a proposal, if any."""
-        found = [c for c in self._calls if (c.proposal, c.step) == (proposal, step) and c.fault is None]
-        return found[-1] if found else None
+        return last_call([call for call in self._calls if call.fault is None], proposal, step)
 
 
 def used_hints(calls: Iterable[Call]) -> dict[Hint, str]:
@@ -93,8 +92,13 @@ def total_cost(calls: Iterable[Call]) -> float | None:
 
 def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
     """Return the hints in the latest prompt for a proposal."""
-    asked = (call for call in reversed(calls) if call.proposal == proposal and call.step in FIRST_STEPS)
-    return next((call.hints for call in asked), ())
+    call = last_call(calls, proposal, *FIRST_STEPS)
+    return () if call is None else call.hints
+
+
+def last_call(calls: Sequence[Call], proposal: str, *steps: str) -> Call | None:
+    """Return the last call for these steps of a proposal: an interrupted run may have repeated a question."""
+    return next((call for call in reversed(calls) if call.proposal == proposal and call.step in steps), None)
 
 
 def _append(file: FileIO, line: bytes) -> None:

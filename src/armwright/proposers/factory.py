@@ -73,14 +73,8 @@ def choose_proposer(name: str = "auto", options: ModelOptions | None = None) -> 
     _check_options(name, options, _USED[used])
     if configured is not None:
         return _language_model(configured)
-    if kind == "none":
-        return Choice(None, "proposer: none (black-box trials only)", options)
-    if kind == "replay":
-        return _replay(place, options)
-    if kind == "manual":
-        return _manual(place, options)
-    reason = "as asked" if kind == "rules" else "no language model is configured; --model names one"
-    return Choice(RulesProposer(), f"proposer: rules ({reason})", options)
+    proposer, description = _proposer(kind, place, options)
+    return Choice(proposer, f"proposer: {description}", options)
 
 
 def _check_options(name: str, options: ModelOptions, used: Collection[str]) -> None:
@@ -105,22 +99,23 @@ def _language_model(configured: ConfiguredModel) -> Choice:
     return Choice(LlmProposer(options), f"proposer: llm ({configured}; prompt {options.prompt})", options)
 
 
-def _replay(place: str, options: ModelOptions) -> Choice:
-    from armwright.proposers.replay import ReplayProposer
+def _proposer(kind: str, place: str, options: ModelOptions) -> tuple[Proposer | None, str]:
+    """Return a proposer that calls no model, and its description."""
+    if kind == "none":
+        return None, "none (black-box trials only)"
+    if kind == "replay":
+        from armwright.proposers.replay import ReplayProposer
 
-    proposer = ReplayProposer(place, options.replay_strict, options)
-    recording = proposer.recording
-    return Choice(
-        proposer,
-        f"proposer: {proposer.name}, replayed from {place} ({len(recording.calls)} recorded calls to "
-        f"{recording.model}, origin {recording.origin}; no network)",
-        options,
-    )
+        replayed = ReplayProposer(place, options.replay_strict, options)
+        recording = replayed.recording
+        return replayed, (
+            f"{replayed.name}, replayed from {place} ({len(recording.calls)} recorded calls to {recording.model}, "
+            f"origin {recording.origin}; no network)"
+        )
+    if kind == "manual":
+        from armwright.proposers.manual import ManualProposer
 
-
-def _manual(place: str, options: ModelOptions) -> Choice:
-    from armwright.proposers.manual import ManualProposer
-
-    proposer = ManualProposer(Path(place), options, wait=options.wait)
-    reason = f"proposer: manual (questions and answers in {place}/; prompt {options.prompt})"
-    return Choice(proposer, reason, options)
+        description = f"manual (questions and answers in {place}/; prompt {options.prompt})"
+        return ManualProposer(Path(place), options, wait=options.wait), description
+    reason = "as requested" if kind == "rules" else "no language model is configured; --model names one"
+    return RulesProposer(), f"rules ({reason})"

@@ -17,7 +17,7 @@ THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # of an answer, for estimates
 
 
 class LlmProposer(PromptedProposer):
-    """Ask a language model for each proposal, and record what was asked and answered.
+    """Ask a language model for each proposal, and record questions and answers.
 
     Args:
         options: Which model, what it is asked, how it is called, what it may spend; or a model's name.

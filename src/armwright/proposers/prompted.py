@@ -24,7 +24,7 @@ LAST_STEPS = ("parameters", "answer")  # the steps whose answers are designs
 
 
 class PromptedProposer(LlmSession, Proposer):
-    """Ask a backend for each proposal, and record what was asked and answered.
+    """Ask a backend for each proposal, and record questions and answers.
 
     Args:
         backend: Who answers.
@@ -63,15 +63,14 @@ class PromptedProposer(LlmSession, Proposer):
         self._begin(None if folder is None else folder / TRANSCRIPTS)
         self._hints = Hints(folder)
 
-    def look(self, folder: Path) -> None:
+    def open_read_only(self, folder: Path) -> None:
         """Open the transcript and hints of a run without changing them."""
         self._transcript = Transcript(folder / TRANSCRIPTS, read_only=True)
         self._hints = Hints(folder)
 
-    def asked(self) -> Mapping[int, int]:
-        """Return the requested trials, each with the number of finished trials known at the time."""
-        calls = [call for call in self._transcript.calls if call.proposal]
-        return {int(call.proposal.rpartition("-")[2]): call.known for call in calls}
+    def requested_trials(self) -> Mapping[int, int]:
+        """Return the trials with a proposal, each with the number of finished trials known when it was requested."""
+        return {call.trial: call.known for call in self._transcript.calls if call.proposal}
 
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return recorded designs of a killed run that no trial has used yet."""
@@ -81,7 +80,7 @@ class PromptedProposer(LlmSession, Proposer):
             if call.step in LAST_STEPS and call.fault is None:
                 with suppress(DesignError):  # a transcript edited by hand: asked again
                     answers = read_text(call.answer, history.problem, self.options.proposals)
-                    recorded.update({p.id: p for p in self._proposals(call.proposal, answers, call.known)})
+                    recorded.update({p.id: p for p in self._proposals(call, answers)})
         return [proposal for proposal in recorded.values() if proposal.id not in used]
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
@@ -95,7 +94,7 @@ class PromptedProposer(LlmSession, Proposer):
         finally:
             self._hints.give_back(question.hints)
         answers = read_text(text, problem, self.options.proposals)
-        return self._proposals(question.proposal, answers, question.known)
+        return self._proposals(question, answers)
 
     def question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
@@ -144,10 +143,10 @@ class PromptedProposer(LlmSession, Proposer):
 
         return OutputFormat(answer_schema(problem, self.options), read)
 
-    def _proposals(self, identity: str, answers: Sequence[Answer], known: int) -> list[Proposal]:
-        ids = [identity] if len(answers) == 1 else [f"{identity}.{i}" for i in range(1, len(answers) + 1)]
-        asked = int(identity.rpartition("-")[2])
+    def _proposals(self, question: Question, answers: Sequence[Answer]) -> list[Proposal]:
+        identity, n = question.proposal, len(answers)
+        ids = [identity] if n == 1 else [f"{identity}.{i}" for i in range(1, n + 1)]
         return [
-            Proposal(answer.design, id_, answer.reason, answer.expected, asked, known)
+            Proposal(answer.design, id_, answer.reason, answer.expected, question.trial, question.known)
             for id_, answer in zip(ids, answers, strict=True)
         ]

@@ -121,10 +121,8 @@ def adapted_joints(joints: str, space: DesignSpace) -> str:
 
 
 def _allowed(kind: str, space: DesignSpace) -> str:
-    for choice in (kind, kind.translate(SWAPPED_AXES)):
-        if choice in space.joint_types:
-            return choice
-    return space.joint_types[-1]
+    choices = (kind, kind.translate(SWAPPED_AXES))
+    return next((choice for choice in choices if choice in space.joint_types), space.joint_types[-1])
 
 
 def divided(links: tuple[float, ...], n: int) -> list[float]:

@@ -80,10 +80,10 @@ def preview_after(
     proposer = PromptedProposer(
         ReplayBackend((), run), asked, settings["name"] if "prompt" in settings else "llm", prompt=prompt
     )
-    proposer.look(run)
+    proposer.open_read_only(run)
     requests = ProposalRequests(proposer, config.seed)
     if number is not None:
-        past = _history_at(run, config, history, proposer.asked(), number)
+        past = _history_at(run, config, history, proposer.requested_trials(), number)
         text = proposer.prompt_for(past, requests.seed(number), proposer.past_hints(number))
         return _preview(proposer, history.problem, number, text)
     schedule = request_schedule(requests, config.study, lambda: history)

@@ -53,14 +53,16 @@ def read_answer(
     params: dict[str, Any] = {}
     for parameter in parameters:
         value = given.get(parameter.name)
-        if parameter.name not in given or _is_left_out(value, parameter):
-            if not parameter.conditional:
-                errors.append(f"{parameter.key} is missing: {parameter.description}")
-            continue
-        try:
-            params[parameter.name] = read_value(parameter.key, value, parameter.distribution)
-        except DesignError as error:
-            errors.append(str(error))
+        error = f"{parameter.key} is missing: {parameter.description}"
+        if parameter.name in given:
+            try:
+                params[parameter.name] = read_value(parameter.key, value, parameter.distribution)
+                continue
+            except DesignError as invalid:
+                error = str(invalid)
+        left_out = value is None or (isinstance(value, str) and value.strip().casefold() in LEFT_OUT)
+        if not (parameter.conditional and left_out):
+            errors.append(error)
     if not params and not errors:
         errors = ["no parameter is given"]
     if errors:
@@ -108,17 +110,6 @@ def _by_name(content: Mapping[str, Any], parameters: Sequence[Parameter]) -> tup
         elif given is not content or key not in OTHER_KEYS:
             unknown.append(key)
     return values, unknown
-
-
-def _is_left_out(value: Any, parameter: Parameter) -> bool:
-    """Return whether a value leaves a conditional parameter out; a choice called "none" does not."""
-    if not parameter.conditional:
-        return False
-    try:
-        read_value(parameter.key, value, parameter.distribution)
-    except DesignError:
-        return value is None or (isinstance(value, str) and value.strip().casefold() in LEFT_OUT)
-    return False
 
 
 def _expected(given: Any, objectives: Sequence[StudyObjective]) -> tuple[float, ...] | None:
