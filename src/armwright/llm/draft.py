@@ -130,7 +130,7 @@ class Drafter(LlmSession):
             self._transcript = Transcript(out / DRAFTS)
 
     def forecast(self, description: str) -> str:
-        """Return who is asked and about what that takes, in one line."""
+        """Return the model and the estimated tokens and cost, in one line."""
         from armwright.llm.client import describe_cost
 
         given, configured = _input_tokens(description), self.configured
@@ -159,7 +159,7 @@ class Drafter(LlmSession):
 
         def read(content: Mapping[str, Any] | str) -> str:
             assert not isinstance(content, str)  # models answer in JSON
-            drafts.append(self._read(map_text(content, visible), description))
+            drafts.append(self._read(map_text(content, visible)))
             return json.dumps(content, ensure_ascii=False)
 
         try:
@@ -169,7 +169,7 @@ class Drafter(LlmSession):
         draft = replace(drafts[-1], usage=self.summary())
         return draft if self.out is None else replace(draft, files=self._write(draft, description, self.out))
 
-    def _read(self, content: Mapping[str, Any], description: str) -> Draft:
+    def _read(self, content: Mapping[str, Any]) -> Draft:
         """Return the draft that an answer holds; UsageError refuses it."""
         task, task_yaml = _document(content.get("task"), Task, TaskError, "task")
         space, space_yaml = _document(content.get("space") or {}, DesignSpace, SpaceError, "space")

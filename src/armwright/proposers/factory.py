@@ -71,9 +71,8 @@ def choose_proposer(name: str = "auto", options: ModelOptions | None = None) -> 
         )
     used = "llm" if configured is not None else "rules" if kind == "auto" else kind
     _check_options(name, options, _USED[used])
-    if configured is not None:
-        return _language_model(configured)
-    proposer, description = _proposer(kind, place, options)
+    options = options if configured is None else configured.options
+    proposer, description = _proposer(kind, place, options, configured)
     return Choice(proposer, f"proposer: {description}", options)
 
 
@@ -92,15 +91,14 @@ def _check_options(name: str, options: ModelOptions, used: Collection[str]) -> N
         )
 
 
-def _language_model(configured: ConfiguredModel) -> Choice:
-    from armwright.proposers.llm import LlmProposer
+def _proposer(
+    kind: str, place: str, options: ModelOptions, configured: ConfiguredModel | None
+) -> tuple[Proposer | None, str]:
+    """Return a proposer, which is a language model if one is configured, and its description."""
+    if configured is not None:
+        from armwright.proposers.llm import LlmProposer
 
-    options = configured.options
-    return Choice(LlmProposer(options), f"proposer: llm ({configured}; prompt {options.prompt})", options)
-
-
-def _proposer(kind: str, place: str, options: ModelOptions) -> tuple[Proposer | None, str]:
-    """Return a proposer that calls no model, and its description."""
+        return LlmProposer(options), f"llm ({configured}; prompt {options.prompt})"
     if kind == "none":
         return None, "none (black-box trials only)"
     if kind == "replay":
