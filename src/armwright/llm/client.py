@@ -8,7 +8,7 @@ import threading
 import time
 import warnings
 from collections.abc import Coroutine, Mapping, Sequence
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import cache
 from typing import Any, TypeVar
@@ -173,25 +173,17 @@ class ModelClient(LlmBackend):
         started = time.perf_counter()
         settings = ModelSettings(**self._settings, request_timeout=seconds, max_retries=0)
         limits = UsageLimits(request_limit=most_requests)
-        fault: BaseException | None = None
         with capture_run_messages() as messages:
             try:
                 self._wait(agent.run(question.prompt, model_settings=settings, usage_limits=limits))
-            except (KeyboardInterrupt, CancelledError, *CALL_FAULTS) as error:
-                fault = error
-        reply = self._reply(messages, time.perf_counter() - started)
-        match fault:
-            case None:
-                return reply
-            case KeyboardInterrupt():
-                raise Interrupted(reply) from fault
-            case CancelledError():
-                raise CallError("cancelled", f"{self.model}: the call was cancelled", reply) from fault
-            case _:
-                reason = _one_line(describe_fault(fault))
-                raise CallError(kind_of_fault(fault), f"{self.model}: {reason}", reply) from fault
+            except KeyboardInterrupt as fault:
+                raise Interrupted(self._reply(messages, started)) from fault
+            except CALL_FAULTS as fault:
+                message = f"{self.model}: {_one_line(describe_fault(fault))}"
+                raise CallError(kind_of_fault(fault), message, self._reply(messages, started)) from fault
+        return self._reply(messages, started)
 
-    def _reply(self, messages: Sequence[ModelMessage], seconds: float) -> Reply:
+    def _reply(self, messages: Sequence[ModelMessage], started: float) -> Reply:
         responses = [message for message in messages if isinstance(message, ModelResponse)]
         costs = [_cost(response, self._server) for response in responses]
         return Reply(
@@ -200,7 +192,7 @@ class ModelClient(LlmBackend):
             input_tokens=sum(response.usage.input_tokens for response in responses),
             output_tokens=sum(response.usage.output_tokens for response in responses),
             cost_usd=sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
-            seconds=round(seconds, 3),
+            seconds=round(time.perf_counter() - started, 3),
         )
 
     def _wait(self, coroutine: Coroutine[Any, Any, Result]) -> Result:

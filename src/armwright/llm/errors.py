@@ -1,5 +1,6 @@
 """Classify and describe the errors of a call to a model."""
 
+from concurrent.futures import CancelledError
 from typing import Any, cast
 
 import httpx2
@@ -24,6 +25,7 @@ _KINDS: tuple[tuple[type[Exception], str], ...] = (
     (faults.UnexpectedModelBehavior, "answer"),
     (faults.UsageLimitExceeded, "limit"),
     (faults.RunCancelled, "cancelled"),
+    (CancelledError, "cancelled"),
     (httpx2.TransportError, "connection"),
 )
 
@@ -41,7 +43,7 @@ _MALFORMED = (
 )
 
 # Every exception of a failed call.
-CALL_FAULTS = (faults.AgentRunError, faults.UserError, httpx2.TransportError, *_MALFORMED)
+CALL_FAULTS = (faults.AgentRunError, faults.UserError, httpx2.TransportError, CancelledError, *_MALFORMED)
 
 # Faults that may pass: the request is repeated.
 PASSING = (
@@ -65,6 +67,8 @@ def describe_fault(fault: Exception) -> str:
     """Describe an error by the server's own message, or else by its cause."""
     if _key_cannot_be_sent(fault):
         return "its key cannot be sent: it contains a line break or a character outside ASCII"
+    if isinstance(fault, CancelledError):
+        return "the call was cancelled"
     if isinstance(fault, faults.ModelHTTPError):
         message = _message(fault.body)
         return f"{message} (HTTP {fault.status_code})" if message else str(fault)
