@@ -30,7 +30,7 @@ from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from armwright.tasks.task_template import task_template
 from armwright.yaml_documents import MAX_BYTES
-from tests.fuzz.targets import a_run, looked_at
+from tests.fuzz.run_targets import a_run, looked_at
 
 
 @pytest.mark.parametrize(

@@ -39,12 +39,12 @@ INPUTS = {
 
 
 class TooSlowError(BaseException):
-    """An input that takes too long; no `except Exception` hides it."""
+    """An input takes too long; not an Exception, so that no handler hides it."""
 
 
 @contextmanager
 def limited() -> Iterator[None]:
-    """TooSlowError after LONGEST seconds of work, by all threads together; a busy machine changes nothing."""
+    """Raise TooSlowError after LONGEST CPU seconds of all threads, however busy the machine is."""
 
     def end(*_: object) -> None:
         raise TooSlowError(f"more than {LONGEST} s")
@@ -59,11 +59,12 @@ def limited() -> Iterator[None]:
 
 
 def with_hypothesis(name: str, inputs: int, seed: int) -> dict[str, Any]:
-    """Gives a target so many inputs, in this process."""
+    """Fuzz a target with a number of inputs, in this process."""
     import hypothesis
     from hypothesis import strategies
 
-    from tests.fuzz.targets import TARGETS, check, seeds_of
+    from tests.fuzz.target import check, seeds_of
+    from tests.fuzz.targets import TARGETS
 
     target = TARGETS[name]
     seeds_of(target)
@@ -96,12 +97,13 @@ def with_hypothesis(name: str, inputs: int, seed: int) -> dict[str, Any]:
 
 
 def with_atheris(name: str, inputs: int, seed: int) -> None:
-    """The same led by coverage; this process ends with it."""
+    """Fuzz a target guided by coverage; the process ends with it."""
     import atheris
 
     with atheris.instrument_imports(include=["armwright"], enable_loader_override=False):
         from tests.fuzz.mutation import changed
-        from tests.fuzz.targets import TARGETS, check, seeds_of
+        from tests.fuzz.target import check, seeds_of
+        from tests.fuzz.targets import TARGETS
 
         target = TARGETS[name]
         for one in seeds_of(target):  # what a door needs is imported here
@@ -135,7 +137,7 @@ def with_atheris(name: str, inputs: int, seed: int) -> None:
 
 
 def in_process(name: str, engine: str, inputs: int, seed: int) -> dict[str, Any]:
-    """Fuzzes a target in a process of its own; what came of it."""
+    """Fuzz a target in another process and return its counts."""
     command = [sys.executable, "-m", "tests.fuzz", "--alone", "--engine", engine, "--target", name]
     with tempfile.TemporaryDirectory() as home:
         count = Path(home) / "count.json"
@@ -169,7 +171,8 @@ def main() -> None:
     asked = parser.parse_args()
     names = asked.target or list(INPUTS)
     if asked.input is not None:
-        from tests.fuzz.targets import TARGETS, check
+        from tests.fuzz.target import check
+        from tests.fuzz.targets import TARGETS
 
         with limited():
             print("passed" if check(TARGETS[names[0]], asked.input.read_bytes()) else "refused")
@@ -197,7 +200,7 @@ def main() -> None:
 
 
 def alone(name: str, engine: str, inputs: int, seed: int) -> None:
-    """In a process of its own, whose memory is bounded."""
+    """Fuzz a target in this process and check its peak memory."""
     if engine == "atheris":
         with_atheris(name, inputs, seed)
         return

@@ -1,4 +1,4 @@
-"""Documents changed at random: the short form of `make fuzz`."""
+"""Mutated documents: the short form of `make fuzz`."""
 
 from random import Random
 
@@ -7,11 +7,12 @@ import pytest
 from hypothesis import strategies
 
 from tests.fuzz.__main__ import limited
-from tests.fuzz.targets import TARGETS, check, seeds_of
+from tests.fuzz.target import check, seeds_of
+from tests.fuzz.targets import TARGETS
 
 
 def inputs(name: str) -> int:
-    """As many inputs as take about half a second."""
+    """Return a number of inputs that takes about half a second."""
     if name.startswith("run ") or name == "draft":
         return 4
     return 20 if TARGETS[name].heavy else 100
@@ -35,7 +36,7 @@ def test_mutated_documents_are_read_or_refused(name: str) -> None:
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_seed_documents_are_valid(name: str) -> None:
-    """Or the fuzzer would reach little. Some command lines are wrong on purpose."""
+    """Otherwise the fuzzer would reach little code. Some command lines are wrong on purpose."""
     seeds = seeds_of(TARGETS[name])
     passed = [check(TARGETS[name], one) for one in seeds]
     assert sum(passed) >= 0.7 * len(seeds)

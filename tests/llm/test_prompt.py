@@ -492,7 +492,7 @@ def test_longest_prompt_is_bounded() -> None:
         assert "理由" in text
 
 
-def test_overlong_template_is_rendered_once() -> None:
+def test_shortening_an_overlong_template_terminates() -> None:
     own = Prompt(
         "own", '{% extends "proposal.md.j2" %}{% block role %}' + "word " * (2 * MOST_TOKENS) + "{% endblock %}"
     )
@@ -552,7 +552,7 @@ def numbers(text: str) -> list[float]:
     return [float(number) for number in re.findall(r"-?\d+\.\d+", text)]
 
 
-def test_massless_arm_has_no_torques_in_the_prompt() -> None:
+def test_prompt_of_a_massless_arm_states_no_torque() -> None:
     space = paper_space().model_copy(update={"mass": MassPerLink(kind="per_link", kg=0.0)})
     text = rendered(fixed_history(FixedProblem(load_task("target-1"), space)))
     assert "LOAD: no torque at any joint" in text

@@ -20,7 +20,7 @@ import armwright as aw
 from armwright.report.live_app import HEADERS
 from armwright.report.page import write_report
 from armwright.runs.control import read_control
-from tests.fuzz.targets import a_server
+from tests.fuzz.request_targets import a_server
 from tests.support.browser import FLAGS, Tab, program
 from tests.support.command_line import PATIENCE
 from tests.support.live_server import ask, post_control, served

@@ -82,7 +82,7 @@ def test_actuator_masses_agree_with_pinocchio_and_mujoco() -> None:
         assert state.qfrc_inverse == pytest.approx(expected, abs=1e-8)
 
 
-def test_first_actuator_rests_on_the_base() -> None:
+def test_first_actuator_adds_mass_but_no_torque() -> None:
     design = SPACE.sample(1, 0)[0]
     swapped = [SPACE.design({**design.params, "motor_1": name}) for name in ("big", "mid", "small")]
     objectives = named_objectives(["peak_torque", "mass", "price"])

@@ -114,7 +114,7 @@ def test_prompt_after_a_run_without_a_model(in_folder: Path) -> None:
     assert shown("--after", "run", "--number", "4")[0] != told
 
 
-def test_preview_names_missing_parts(chat_server: ChatServer, in_folder: Path) -> None:
+def test_preview_counts_trials_still_to_come(chat_server: ChatServer, in_folder: Path) -> None:
     run(in_folder / "run", 2, llm_proposer(chat_server.url))
     assert shown("--after", "run")[1].endswith("for trial 7; 1 trial comes before it, and will be in it\n")
     designs = [json.loads(json.dumps(dict(design.params))) for design in PROBLEM.space.sample(3, 1)]

@@ -1,0 +1,126 @@
+"""Fuzz answers of models and people, as designs and as drafts."""
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from typing import Any
+
+import yaml
+
+import armwright as aw
+from armwright.problem.problem import Problem
+from tests import ROOT
+from tests.fuzz.problem_targets import MOST_POSTURES, RICH_SPACE, RICH_TASK, a_problem, n_postures, rich_problem
+from tests.fuzz.target import DefectError, any_of, folder
+
+
+def answer_seeds() -> list[bytes]:
+    plain, rich = a_problem(), rich_problem()
+    found: list[str] = []
+    for problem in (plain, rich):
+        designs = [dict(design.params) for design in problem.space.sample(3, 2)]
+        found += [json.dumps(design) for design in designs]
+        found.append(json.dumps({"reasoning": "so", "designs": [{**design, "reason": "why"} for design in designs]}))
+        found.append(f"I think so.\n```json\n{json.dumps(designs[0], indent=2)}\n```\nThat is it.")
+    found.append(
+        "<think>hm</think>\nORIGIN: (0.1, -0.2, 0.0) m\nJOINTS: Y, P, R, P\nLINKS: 0.1 0.2 0.3 0.1 m\nREASON: x"
+    )
+    found.append("**ORIGIN** = [0, 0, 0]; JOINTS = YPRP; LINKS = L1 = 0.1, L2 = 0.1, L3: .2, L4: 0.25\nEXPECTED: 1, 2")
+    found.append('{"origin": [0, 0.1, 0], "joints": "YPRP", "links": ["0.1 m", 0.2, "0.3", 0.1], "expected": [1, 2]}')
+    return [text.encode() for text in found]
+
+
+def run_answer(data: bytes) -> None:
+    from armwright.llm.answer import last_json_object, read_answers, read_text, written_answers
+
+    text = data.decode("utf-8", "surrogateescape")
+    last_json_object(text)
+    found: list[Callable[[], object]] = []
+    for problem in (a_problem(), rich_problem()):
+        for proposals in (1, 4):
+
+            def read(problem: Problem = problem, proposals: int = proposals) -> None:
+                answers = read_text(text, problem, proposals)
+                if read_text(written_answers(answers, problem), problem, proposals) != answers:
+                    raise DefectError(f"answers that are read back as others: {answers}")
+
+            found.append(read)
+        with suppress(ValueError, RecursionError):
+            content = json.loads(text)
+            if isinstance(content, dict):
+                found.append(lambda problem=problem, content=content: read_answers(content, problem))
+    any_of(found)
+
+
+def draft_seeds() -> list[bytes]:
+    rich = {"task": yaml.safe_load(RICH_TASK), "space": yaml.safe_load(RICH_SPACE)}
+    names = ("task", "space")
+    plain = {name: yaml.safe_load((ROOT / "examples" / f"2-assembly-{name}.yaml").read_text()) for name in names}
+    small = {"name": "drafted", "targets": [[0.4, 0, 0.1], [0.4, 0.2, 0.1]], "provenance": "made up"}
+    answers = [
+        {**rich, "assumptions": ["one", "two"], "questions": ["three"]},
+        {"reasoning": "so", **plain},
+        {"task": small, "space": None, "assumptions": "all"},
+        {"task": small},
+    ]
+    return [json.dumps(answer).encode() for answer in answers]
+
+
+class _Answered:
+    """A model that gives one answer."""
+
+    model, origin = "stand-in", "scripted"
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def begin(self) -> None: ...
+
+    def cancel(self) -> None: ...
+
+    def ask(self, question: Any, output: Any = None, most_requests: Any = None) -> Any:
+        from armwright.llm.backend import CallError, Reply
+
+        try:
+            content = json.loads(self.text)
+        except (ValueError, RecursionError):
+            content = None
+        if not isinstance(content, dict):
+            raise CallError("answer", "no object", Reply(self.text, requests=1))
+        return Reply(output.read(content), requests=1)
+
+
+@cache
+def drafter(written: bool) -> tuple[Any, _Answered]:
+    from armwright.llm.configuration import ConfiguredModel
+    from armwright.llm.draft import Drafter
+
+    options = aw.ModelOptions(model="openai-chat:stand-in", base_url="http://127.0.0.1:9/v1", origin="scripted")
+    made = Drafter(ConfiguredModel(options, "--model"), folder() / "drafts" / "in" if written else None, force=True)
+    answers = _Answered()
+    made.backend = answers  # type: ignore[assignment]
+    return made, answers
+
+
+def run_draft(data: bytes) -> None:
+    from armwright.llm.transcript import Transcript
+
+    text = data.decode("utf-8", "replace")
+    is_written = len(data) % 8 == 0
+    made, answers = drafter(is_written)
+    made._transcript = Transcript(None)
+    answers.text = text
+    try:
+        draft = made.draft("put it down there")
+    finally:
+        if is_written:
+            outside = [path for path in (folder() / "drafts").iterdir() if path.name != "in"]
+            inside = sorted((folder() / "drafts" / "in").iterdir())
+            for path in inside:
+                path.unlink()
+            if outside or len(inside) > 2:
+                raise DefectError(f"written elsewhere: {outside} {inside}")
+    if n_postures(draft.problem) <= MOST_POSTURES:
+        draft.problem.evaluate(draft.problem.space.sample(1, 0))
+    json.dumps(draft.record(), allow_nan=False)

@@ -1,0 +1,173 @@
+"""Fuzz task, space, experiment and design files."""
+
+import json
+from functools import cache
+
+import yaml
+
+from armwright.problem.problem import Problem
+from armwright.runs.history import History
+from armwright.spaces.design_space import DesignSpace, load_space
+from armwright.tasks.catalogue import load_task
+from armwright.tasks.task import Task
+from tests.fuzz.target import DefectError, file_of, folder
+
+MOST_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and is no other code
+
+
+RICH_TASK = b"""\
+name: rich
+targets:
+  - {position: [0.4, 0.0, 0.1], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}
+  - {position: [0.4, 0.2, 0.1], orientation: [3.1416, 0, 1.5708]}
+  - [0.1, 0.35, 0.5]
+payload: [0.5, 0.5, 0.0]
+payload_factors: [0.0, 1.2]
+target_noise: 0.005
+restarts: 2
+obstacles:
+  - {kind: ground, name: table, z: -0.2}
+  - {kind: box, name: shelf, center: [0.4, 0.0, 0.3], size: [0.2, 0.6, 0.02], yaw: 0.1}
+  - {kind: box, center: [0.4, 0.0, 0.3], size: [0.2, 0.6, 0.02], rpy: [0.1, 0.2, 0.3]}
+  - {kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}
+  - {kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: [1, 0, 1]}
+moves: [[1, 2], [2, 3]]
+move_step: 0.05
+move_time: [1.5, 2]
+workspace: {low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 20}
+objectives: [worst_error, torque, collision, path_error, dynamic_torque]
+constraints: [mass <= 3, length >= 0.2, uncovered_fraction <= 0.9]
+reference_point: [1.0, 5.0, 2.0, 3.0, 4.0]
+description: What the arm has to do there.
+provenance: Measured.
+"""
+
+
+RICH_SPACE = b"""\
+name: rich
+joints: [2, 5]
+joint_types: [R, P, Y, O, X, F]
+joint_range: [-2.8, 2.8]
+limit: [0.5, 2.5]
+stroke: [0.1, 0.4]
+travel: 0.02
+origin_x: [-0.5, 0.5]
+origin_z: [0.0, 0.0]
+mount: [floor, ceiling, wall+x]
+link: [0.05, 0.40]
+link_directions: [+z, +x, -y]
+link_radius: 0.02
+tool: [0.0, 0.0, 0.1]
+mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}
+actuators:
+  - XM540-W270
+  - XL430-W250
+  - {name: mine, maker: me, kind: servo, voltage: 12, mass: 0.3, stall_torque: 6.0, speed: 5.0, price: 120, source: me}
+actuator_torque: stall
+safety_factor: 2.0
+restrict: {joint_1: [R, P], origin_y: 0.0, link_3: [0.1, 0.2]}
+grid: {link: 0.005, origin_x: 0.1}
+tie: {link_2: link_1}
+"""
+
+
+def n_postures(problem: Problem) -> int:
+    task = problem.task
+    moves = sum(task.straight_moves.steps(task.target_positions)) + len(task.straight_moves)
+    parts = len(task.targets) * (1 + task.restarts) + moves + sum(region.points for region in task.workspace)
+    return parts * len(task.cases)
+
+
+def used(problem: Problem) -> None:
+    """Sample, evaluate, export and prompt as every run does."""
+    from armwright.llm.prompt import load_prompt
+    from armwright.robot.urdf_writer import to_urdf
+
+    designs = problem.space.sample(2, 0)
+    arms = [problem.arm(design) for design in designs]
+    to_urdf(arms[0])
+    for design in designs:
+        if problem.space.design(design.params) != design:
+            raise DefectError(f"a design that is not in its space: {design.params}")
+    if n_postures(problem) <= MOST_POSTURES:
+        problem.evaluate(designs)
+    load_prompt("plus").render(History(problem, [], 1, problem.reference_point), 0)
+
+
+def same_when_kept(value: Task | DesignSpace) -> None:
+    """Check that a value is read back unchanged from a run's settings."""
+    from armwright.yaml_documents import dump_document
+
+    content = value.model_dump(mode="json")
+    json.dumps(content, allow_nan=False)
+    text = dump_document(content)
+    path = folder() / "kept.yaml"
+    path.write_text(text, encoding="utf-8")
+    again = load_task(path) if isinstance(value, Task) else load_space(path)
+    if again != value:
+        raise DefectError(f"{value!r} is read back as {again!r}")
+
+
+def run_task(data: bytes) -> None:
+    task = load_task(file_of(data, "task.yaml"))
+    same_when_kept(task)
+    used(Problem(task, rich_problem().space))
+
+
+def run_space(data: bytes) -> None:
+    space = load_space(file_of(data, "space.yaml"))
+    same_when_kept(space)
+    used(Problem(load_task("target-1"), space))
+
+
+def run_experiment(data: bytes) -> None:
+    from armwright.experiments.cells import MAX_CELLS, plan_cells
+    from armwright.experiments.plan import load_experiment
+
+    out = folder() / "out"
+    plan, beside = load_experiment(str(file_of(data, "experiment.yaml")))
+    if 2000 < len(plan.task_list) * len(plan.seed_list) * len(plan.methods) <= MAX_CELLS:
+        return
+    cells, skipped = plan_cells(plan, beside, out)
+    for cell in [*cells, *(one.cell for one in skipped)]:
+        if not cell.folder.is_relative_to(out.resolve()) or ".." in cell.folder.parts:
+            raise DefectError(f"{cell.folder} is not in {out}")
+        if not cell.command.isprintable() and plan.space is None:
+            raise DefectError(f"no command of one line: {cell.command!r}")
+
+
+def run_start(data: bytes) -> None:
+    from armwright.spaces.design_file import read_design
+
+    space = a_problem().space
+    design = read_design(file_of(data, "design.json"), space)
+    space.arm(design)
+
+
+@cache
+def a_problem() -> Problem:
+    return Problem(load_task("target-1"))
+
+
+@cache
+def rich_problem() -> Problem:
+    (folder() / "rich-space.yaml").write_bytes(RICH_SPACE)
+    return Problem(load_task("target-1"), load_space(folder() / "rich-space.yaml"))
+
+
+def start_seeds() -> list[bytes]:
+    space = a_problem().space
+    designs = [dict(design.params) for design in space.sample(3, 1)]
+    full = {"number": 3, "source": "black box", "objectives": {"torque": 2.0}, "params": designs[0]}
+    return [json.dumps({"params": design}).encode() for design in designs] + [json.dumps(full).encode()]
+
+
+def actuator_seeds() -> list[bytes]:
+    record = {"name": "mine", "maker": "me", "kind": "servo", "voltage": 12.0, "mass": 0.3, "stall_torque": 6.0,
+              "rated_torque": 2.0, "peak_torque": 7.0, "speed": 5.0, "width": 0.03, "height": 0.05, "depth": 0.04,
+              "price": 120.0, "source": "https://example.org", "note": "so"}  # fmt: skip
+    spaces = [
+        {"name": "a", "actuators": [record], "actuator_torque": kind, "safety_factor": 2.0}
+        for kind in ("stall", "rated", "peak")
+    ]
+    return [yaml.safe_dump(space).encode() for space in spaces]

@@ -1,0 +1,112 @@
+"""A target of the fuzzer: an entry point for documents from outside, with valid documents to mutate.
+
+A target is given bytes. It may raise ArmwrightError and nothing else. Accepted documents are used as a command would
+use them.
+"""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from random import Random
+
+from armwright.exceptions import ArmwrightError
+from tests import ROOT
+from tests.fuzz.mutation import changed
+
+LONGEST_REFUSAL = 3000  # characters
+
+
+class DefectError(AssertionError):
+    """A document was accepted or refused in the wrong way."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """An entry point for documents.
+
+    Attributes:
+        form: Format of the documents: yaml, json, jsonl or text.
+        seeds: Returns valid documents.
+        run: Reads and uses a document.
+        heavy: Whether an accepted document takes milliseconds rather than a fraction of one.
+    """
+
+    form: str
+    seeds: Callable[[], list[bytes]]
+    run: Callable[[bytes], None]
+    heavy: bool = False
+
+    def make(self, rng: Random) -> bytes:
+        """Return a mutated valid document."""
+        return changed(rng.choice(seeds_of(self)), self.form, rng)
+
+
+def check(target: Target, data: bytes) -> bool:
+    """Return whether a document was accepted; any exception raised here is a defect."""
+    try:
+        target.run(data)
+    except ArmwrightError as refusal:
+        check_words(refusal)
+        return False
+    return True
+
+
+def check_words(refusal: ArmwrightError) -> None:
+    words = str(refusal)
+    if len(words) > LONGEST_REFUSAL:
+        raise DefectError(f"a refusal of {len(words)} characters: {words[:200]!r}") from refusal
+    if not words or not words.isprintable():
+        raise DefectError(f"a refusal that is no line: {words[:500]!r}") from refusal
+
+
+@cache
+def seeds_of(target: Target) -> list[bytes]:
+    """Return the valid documents of a target."""
+    return target.seeds()
+
+
+@cache
+def folder() -> Path:
+    """Return this process's folder for input files, in memory if possible."""
+    place = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+    made = Path(tempfile.mkdtemp(prefix="armwright-fuzz-", dir=place))
+    import atexit
+
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    return made
+
+
+def file_of(data: bytes, name: str) -> Path:
+    path = folder() / name
+    path.write_bytes(data)
+    return path
+
+
+def shipped(place: str) -> list[bytes]:
+    """Return YAML files of the package."""
+    found = (resources.files("armwright") / place).iterdir()
+    return [file.read_bytes() for file in sorted(found, key=lambda file: file.name) if file.name.endswith(".yaml")]
+
+
+def of_examples(part: str) -> list[bytes]:
+    return [file.read_bytes() for file in sorted((ROOT / "examples").glob(f"*{part}*.yaml"))]
+
+
+def any_of(reads: Iterable[Callable[[], object]]) -> None:
+    """Call all readers and raise the first refusal if none accepts."""
+    refusals: list[ArmwrightError] = []
+    passed = False
+    for read in reads:
+        try:
+            read()
+            passed = True
+        except ArmwrightError as refusal:
+            check_words(refusal)
+            refusals.append(refusal)
+    if refusals and not passed:
+        raise refusals[0]
