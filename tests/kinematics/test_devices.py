@@ -104,11 +104,10 @@ COMPILE_FOR_CUDA = """
 import sys
 import warp as wp
 from armwright.kinematics.clearance_kernels import clearance_kernels
-from armwright.kinematics.pose_kernels import pose_kernels
-from armwright.kinematics.position_kernels import position_kernels
-variants = [position_kernels("float32", 1, motions) for motions in ("revolute", "any")]
-variants.append(pose_kernels("float32", 1, "any"))
-solving = [k for v in variants for k in (v.solve_ik, v.keep_pose, v.static_torque) if k is not None]
+from armwright.kinematics.ik_kernels import ik_kernels
+variants = [ik_kernels("float32", 1, motions, "position") for motions in ("revolute", "any")]
+variants.append(ik_kernels("float32", 1, "any", "pose"))
+solving = [kernel for variant in variants for kernel in (variant.solve_ik, variant.static_torque)]
 measuring = clearance_kernels("float32")
 measuring = [measuring.link_axes, measuring.self_clearance, measuring.obstacle_clearance]
 kernels = {kernel.module.name: kernel for kernel in (*solving, *measuring)}

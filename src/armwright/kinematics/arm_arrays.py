@@ -21,9 +21,8 @@ TargetKind = Literal["position", "pose"]  # points alone, or some with an axis o
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
 
-TOOL = ("tool_axis", "tool_side")  # fields of `ArmArrays` that only pose targets need
-ARRAYS = ("base", "lower", "upper", "offset", "com", "mass", "motion")  # fields that all IK kernels read
-FLOATS = (*ARRAYS[:-1], *TOOL)
+FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side")
+ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
 
 
 @dataclass(frozen=True)

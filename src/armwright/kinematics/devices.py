@@ -73,14 +73,11 @@ def _warp() -> Any:
 @cache
 def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, device: Device) -> Any:
     with _report_cache_errors():
-        from armwright.kinematics.pose_kernels import pose_kernels
-        from armwright.kinematics.position_kernels import position_kernels
+        from armwright.kinematics.ik_kernels import ik_kernels
 
-        make = {"position": position_kernels, "pose": pose_kernels}[kind]
-        kernels = make(precision, lanes, motions)
-        for kernel in (kernels.solve_ik, kernels.keep_pose, kernels.static_torque):
-            if kernel is not None:
-                kernel.module.load(device)
+        kernels = ik_kernels(precision, lanes, motions, kind)
+        for kernel in (kernels.solve_ik, kernels.static_torque):
+            kernel.module.load(device)
     return kernels
 
 

@@ -1,7 +1,7 @@
 """Inverse kinematics and static torque of many arms at many targets: numpy in, numpy out.
 
 The kernels behind it implement the weighted least-norm solution of Chan & Dubey (1995) with the steps of Sugiura et al.
-(2007); `position_kernels` names the source of each formula, docs/method.md §2 states them all.
+(2007); `ik_kernels` names the source of each formula, docs/method.md §2 states them all.
 
 Arms are solved in chunks, so memory holds arms, results and the arrays of a few chunks only.
 """
@@ -19,7 +19,6 @@ from armwright.kinematics.arm_arrays import (
     ARRAYS,
     FIXED,
     FLOATS,
-    TOOL,
     ArmArrays,
     Floats,
     Precision,
@@ -195,12 +194,11 @@ class _Buffers:
     def __init__(self, arms: ArmArrays, columns: NDArray[Any], updates: int, kind: TargetKind, lanes: int) -> None:
         wp, kernels = load(arms.precision, lanes, arms.motions, kind, "cpu")
         n, groups, dof = _buffered_arms(arms, len(columns), lanes), len(columns), arms.dof
-        read = {name: getattr(arms, name) for name in (ARRAYS if kind == "position" else (*ARRAYS, *TOOL))}
+        read = {name: getattr(arms, name) for name in ARRAYS}
         self._arms = {name: np.zeros((n, *values.shape[1:]), dtype=values.dtype) for name, values in read.items()}
         self._columns = np.zeros(columns.shape, dtype=arms.precision)
         self._q_last, self._h_last, *self._results = (
-            np.zeros((n, groups, size, lanes), dtype=arms.precision)
-            for size in (dof, dof, *_result_sizes(dof, kernels))
+            np.zeros((n, groups, size, lanes), dtype=arms.precision) for size in (dof, dof, *_result_sizes(dof))
         )
         columns_, q_last, h_last, *results = (
             wp.array(values, dtype=kernels.Lane, shape=values.shape[:-1], device="cpu", copy=False)
@@ -252,15 +250,15 @@ def _launch(arms: ArmArrays, columns: Any, updates: int, q_last: Any, h_last: An
     columns: (G, C) targets in lanes.  q_last, h_last: (N, G, D) in lanes, updated in place.
     """
     device, dim = q_last.device, (len(arms), len(columns))
-    results = [wp.empty((*dim, n), dtype=kernels.Lane, device=device) for n in _result_sizes(arms.dof, kernels)]
+    results = [wp.empty((*dim, n), dtype=kernels.Lane, device=device) for n in _result_sizes(arms.dof)]
     for kernel, inputs in _steps(arms, columns, updates, q_last, h_last, results, wp, kernels):
         wp.launch(kernel, dim, inputs=inputs, device=device)
     return results
 
 
-def _result_sizes(dof: int, kernels: Any) -> tuple[int, ...]:
-    """Return the sizes of the results: joint angles, tip position, torques and, for poses, angle error."""
-    return (dof, 3, dof) if kernels.keep_pose is None else (dof, 3, dof, 1)
+def _result_sizes(dof: int) -> tuple[int, ...]:
+    """Return the sizes of the results: joint angles, tip position, torques and angle error."""
+    return (dof, 3, dof, 1)
 
 
 def _steps(
@@ -268,18 +266,9 @@ def _steps(
 ) -> tuple[tuple[Any, list[Any]], ...]:
     """Return the kernels in their order, each with its inputs; results: of the sizes `_result_sizes`."""
     on_device = _on_device(arms, wp, kernels, q_last.device)
-    kept, *tip_and_torque = results[:3]
-    if kernels.keep_pose is None:
-        return (
-            (kernels.solve_ik, [on_device, columns, updates, q_last, h_last, kept]),
-            (kernels.static_torque, [on_device, columns, q_last, kept, *tip_and_torque]),
-        )
-    vector = kernels.Arms.vars["base"].type.dtype
-    tool = [wp.array(getattr(arms, name), dtype=vector, device=q_last.device, copy=False) for name in TOOL]
     return (
-        (kernels.solve_ik, [on_device, *tool, columns, updates, q_last, h_last, kept]),
-        (kernels.keep_pose, [on_device, *tool, columns, q_last, kept, results[3]]),
-        (kernels.static_torque, [on_device, columns, kept, kept, *tip_and_torque]),
+        (kernels.solve_ik, [on_device, columns, updates, q_last, h_last, results[0]]),
+        (kernels.static_torque, [on_device, columns, q_last, *results]),
     )
 
 

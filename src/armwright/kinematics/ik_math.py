@@ -33,6 +33,8 @@ class IkMath:
     Lane: Any  # a vector of one number for each lane
     Wide: Any  # likewise in float64
     Joints: Any  # a matrix whose row j is joint j in all lanes
+    Vectors: Any  # a matrix whose row i is component i in all lanes
+    Frame: Any  # likewise: components of the local axes x, y and z in the world, then of the place
     Arms: Any  # `ArmArrays` on the device, a Warp struct
     roots: Any
     at_least: Any
@@ -54,6 +56,8 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
     Lane = wp.types.vector(length=lanes, dtype=real)
     Wide = wp.types.vector(length=lanes, dtype=wp.float64)
     Joints = wp.types.matrix(shape=(MAX_JOINTS, lanes), dtype=real)
+    Vectors = wp.types.matrix(shape=(3, lanes), dtype=real)
+    Frame = wp.types.matrix(shape=(12, lanes), dtype=real)
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
     least_manipulability = real(0.1)  # below it the update is damped
@@ -72,6 +76,8 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
         offset: wp.array2d(dtype=Vector3)  # (N, D)
         com: wp.array2d(dtype=Vector3)  # (N, D)
         mass: wp.array2d(dtype=real)  # (N, D)
+        tool_axis: wp.array(dtype=Vector3)  # (N,)
+        tool_side: wp.array(dtype=Vector3)  # (N,)
 
     @wp.func
     def roots(x: Lane):
@@ -238,6 +244,6 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
         return wp.cw_mul(x, x) + wp.cw_mul(y, y) + wp.cw_mul(z, z)
 
     return IkMath(
-        real, Vector3, Lane, Wide, Joints, Arms,
+        real, Vector3, Lane, Wide, Joints, Vectors, Frame, Arms,
         roots, at_least, select, advance, column, limit, damping, norm_squared,
     )  # fmt: skip

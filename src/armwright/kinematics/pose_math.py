@@ -1,4 +1,4 @@
-"""Warp functions for targets with an axis or an orientation: rotations between frames and the 6 x 6 system."""
+"""Warp functions for targets with an axis or an orientation: rotations between frames."""
 
 # Warp compiles these functions from their source: names are bound as Warp binds them, not as Python does.
 
@@ -20,22 +20,19 @@ class PoseMath:
     dot: Any
     angular: Any
     error_rotation: Any
-    factor_6x6: Any
-    solve_6x6: Any
 
 
 @cache
 def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
     """Return the functions for a precision, a number of lanes and joint motions, as in `ik_math`."""
     base = ik_math(precision, lanes, motions)
-    real, Vector3, Lane, Wide = base.real, base.Vector3, base.Lane, base.Wide
+    real, Vector3, Lane = base.real, base.Vector3, base.Lane
     roots, at_least, select, norm_squared = base.roots, base.at_least, base.select, base.norm_squared
 
     zero, one, two = real(0.0), real(1.0), real(2.0)
     max_rotation = real(0.5)  # [rad] of the error that one update tries to close
     least_length, nothing = real(1e-30), real(1e-12)
     quarter = real(math.pi / 2)
-    ones, least = Wide(wp.float64(1.0)), Wide(wp.float64(1e-18))
 
     @wp.func
     def library_arctangent(y: Lane, x: Lane):
@@ -86,19 +83,24 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         return wp.cw_mul(ax, bx) + wp.cw_mul(ay, by) + wp.cw_mul(az, bz)
 
     @wp.func
+    def larger_row(
+        most: Lane, diagonal: Lane, w: Lane, x: Lane, y: Lane, z: Lane, a: Lane, b: Lane, c: Lane, d: Lane
+    ):  # fmt: skip
+        """Return the larger diagonal, and its row: w, x, y, z of the diagonal `most`, or a, b, c, d."""
+        larger = Lane(one) - at_least(most, diagonal)
+        return (
+            wp.max(most, diagonal),
+            select(larger, a, w),
+            select(larger, b, x),
+            select(larger, c, y),
+            select(larger, d, z),
+        )
+
+    @wp.func
     def rotation_between(
-        xx: Lane,
-        xy: Lane,
-        xz: Lane,
-        yx: Lane,
-        yy: Lane,
-        yz: Lane,
-        zx: Lane,
-        zy: Lane,
-        zz: Lane,
-        has_axis: Lane,
-        has_frame: Lane,
-    ):
+        xx: Lane, xy: Lane, xz: Lane, yx: Lane, yy: Lane, yz: Lane, zx: Lane, zy: Lane, zz: Lane,
+        has_axis: Lane, has_frame: Lane,
+    ):  # fmt: skip
         """Return the angle between tool and target [rad], and the shortened rotation vector about the tool's x, y, z.
 
         xx to zz: the target's axes x, y, z in the frame of the tool, by component (xy: of the target's y along the
@@ -109,24 +111,11 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         """
         # 4 q qᵀ of the rotation with these entries: the row with the largest diagonal is q, times a number above 0.
         w, x, y, z = Lane(one) + xx + yy + zz, zy - yz, xz - zx, yx - xy
-        most = w
-        xs = Lane(one) + xx - yy - zz
-        larger = Lane(one) - at_least(most, xs)
-        w, x, y, z = (
-            select(larger, zy - yz, w), select(larger, xs, x), select(larger, xy + yx, y), select(larger, xz + zx, z)
-        )  # fmt: skip
-        most = wp.max(most, xs)
-        ys = Lane(one) - xx + yy - zz
-        larger = Lane(one) - at_least(most, ys)
-        w, x, y, z = (
-            select(larger, xz - zx, w), select(larger, xy + yx, x), select(larger, ys, y), select(larger, yz + zy, z)
-        )  # fmt: skip
-        most = wp.max(most, ys)
-        zs = Lane(one) - xx - yy + zz
-        larger = Lane(one) - at_least(most, zs)
-        w, x, y, z = (
-            select(larger, yx - xy, w), select(larger, xz + zx, x), select(larger, yz + zy, y), select(larger, zs, z)
-        )  # fmt: skip
+        wx, wy, wz, xy2, xz2, yz2 = x, y, z, xy + yx, xz + zx, yz + zy
+        x2, y2, z2 = Lane(one) + xx - yy - zz, Lane(one) - xx + yy - zz, Lane(one) - xx - yy + zz
+        most, w, x, y, z = larger_row(w, x2, w, x, y, z, wx, x2, xy2, xz2)
+        most, w, x, y, z = larger_row(most, y2, w, x, y, z, wy, xy2, y2, yz2)
+        _most, w, x, y, z = larger_row(most, z2, w, x, y, z, wz, xz2, yz2, z2)
         side = two * at_least(w, Lane(zero)) - Lane(one)  # q and -q are one rotation: the one by half a turn at most
 
         # The shortest rotation from the tool's z to the target's.
@@ -170,133 +159,4 @@ def pose_math(precision: Precision, lanes: int, motions: Motions) -> PoseMath:
         )
         return sx, sy, sz, tx, ty, tz, fx, fy, fz, angle, rx, ry, rz
 
-    @wp.func
-    def factor_6x6(
-        a11: Wide,
-        a21: Wide, a22: Wide,
-        a31: Wide, a32: Wide, a33: Wide,
-        a41: Wide, a42: Wide, a43: Wide, a44: Wide,
-        a51: Wide, a52: Wide, a53: Wide, a54: Wide, a55: Wide,
-        a61: Wide, a62: Wide, a63: Wide, a64: Wide, a65: Wide, a66: Wide,
-    ):  # fmt: skip
-        """Factor a symmetric 6 x 6 matrix, given by its lower triangle, as L D Lᵀ: L below its diagonal, then D."""
-        d1 = wp.max(a11, least)
-        i1 = wp.cw_div(ones, d1)
-        l21 = wp.cw_mul(a21, i1)
-        l31 = wp.cw_mul(a31, i1)
-        l41 = wp.cw_mul(a41, i1)
-        l51 = wp.cw_mul(a51, i1)
-        l61 = wp.cw_mul(a61, i1)
-        a22 -= wp.cw_mul(l21, a21)
-        a32 -= wp.cw_mul(l31, a21)
-        a33 -= wp.cw_mul(l31, a31)
-        a42 -= wp.cw_mul(l41, a21)
-        a43 -= wp.cw_mul(l41, a31)
-        a44 -= wp.cw_mul(l41, a41)
-        a52 -= wp.cw_mul(l51, a21)
-        a53 -= wp.cw_mul(l51, a31)
-        a54 -= wp.cw_mul(l51, a41)
-        a55 -= wp.cw_mul(l51, a51)
-        a62 -= wp.cw_mul(l61, a21)
-        a63 -= wp.cw_mul(l61, a31)
-        a64 -= wp.cw_mul(l61, a41)
-        a65 -= wp.cw_mul(l61, a51)
-        a66 -= wp.cw_mul(l61, a61)
-        d2 = wp.max(a22, least)
-        i2 = wp.cw_div(ones, d2)
-        l32 = wp.cw_mul(a32, i2)
-        l42 = wp.cw_mul(a42, i2)
-        l52 = wp.cw_mul(a52, i2)
-        l62 = wp.cw_mul(a62, i2)
-        a33 -= wp.cw_mul(l32, a32)
-        a43 -= wp.cw_mul(l42, a32)
-        a44 -= wp.cw_mul(l42, a42)
-        a53 -= wp.cw_mul(l52, a32)
-        a54 -= wp.cw_mul(l52, a42)
-        a55 -= wp.cw_mul(l52, a52)
-        a63 -= wp.cw_mul(l62, a32)
-        a64 -= wp.cw_mul(l62, a42)
-        a65 -= wp.cw_mul(l62, a52)
-        a66 -= wp.cw_mul(l62, a62)
-        d3 = wp.max(a33, least)
-        i3 = wp.cw_div(ones, d3)
-        l43 = wp.cw_mul(a43, i3)
-        l53 = wp.cw_mul(a53, i3)
-        l63 = wp.cw_mul(a63, i3)
-        a44 -= wp.cw_mul(l43, a43)
-        a54 -= wp.cw_mul(l53, a43)
-        a55 -= wp.cw_mul(l53, a53)
-        a64 -= wp.cw_mul(l63, a43)
-        a65 -= wp.cw_mul(l63, a53)
-        a66 -= wp.cw_mul(l63, a63)
-        d4 = wp.max(a44, least)
-        i4 = wp.cw_div(ones, d4)
-        l54 = wp.cw_mul(a54, i4)
-        l64 = wp.cw_mul(a64, i4)
-        a55 -= wp.cw_mul(l54, a54)
-        a65 -= wp.cw_mul(l64, a54)
-        a66 -= wp.cw_mul(l64, a64)
-        d5 = wp.max(a55, least)
-        i5 = wp.cw_div(ones, d5)
-        l65 = wp.cw_mul(a65, i5)
-        a66 -= wp.cw_mul(l65, a65)
-        d6 = wp.max(a66, least)
-        return (
-            l21,
-            l31, l32,
-            l41, l42, l43,
-            l51, l52, l53, l54,
-            l61, l62, l63, l64, l65,
-            d1, d2, d3, d4, d5, d6,
-        )  # fmt: skip
-
-    @wp.func
-    def solve_6x6(
-        l21: Wide,
-        l31: Wide, l32: Wide,
-        l41: Wide, l42: Wide, l43: Wide,
-        l51: Wide, l52: Wide, l53: Wide, l54: Wide,
-        l61: Wide, l62: Wide, l63: Wide, l64: Wide, l65: Wide,
-        d1: Wide, d2: Wide, d3: Wide, d4: Wide, d5: Wide, d6: Wide,
-        x1: Wide, x2: Wide, x3: Wide, x4: Wide, x5: Wide, x6: Wide,
-    ):  # fmt: skip
-        """Solve the factored system."""
-        x2 -= wp.cw_mul(l21, x1)
-        x3 -= wp.cw_mul(l31, x1)
-        x3 -= wp.cw_mul(l32, x2)
-        x4 -= wp.cw_mul(l41, x1)
-        x4 -= wp.cw_mul(l42, x2)
-        x4 -= wp.cw_mul(l43, x3)
-        x5 -= wp.cw_mul(l51, x1)
-        x5 -= wp.cw_mul(l52, x2)
-        x5 -= wp.cw_mul(l53, x3)
-        x5 -= wp.cw_mul(l54, x4)
-        x6 -= wp.cw_mul(l61, x1)
-        x6 -= wp.cw_mul(l62, x2)
-        x6 -= wp.cw_mul(l63, x3)
-        x6 -= wp.cw_mul(l64, x4)
-        x6 -= wp.cw_mul(l65, x5)
-        x1 = wp.cw_div(x1, d1)
-        x2 = wp.cw_div(x2, d2)
-        x3 = wp.cw_div(x3, d3)
-        x4 = wp.cw_div(x4, d4)
-        x5 = wp.cw_div(x5, d5)
-        x6 = wp.cw_div(x6, d6)
-        x5 -= wp.cw_mul(l65, x6)
-        x4 -= wp.cw_mul(l64, x6)
-        x4 -= wp.cw_mul(l54, x5)
-        x3 -= wp.cw_mul(l63, x6)
-        x3 -= wp.cw_mul(l53, x5)
-        x3 -= wp.cw_mul(l43, x4)
-        x2 -= wp.cw_mul(l62, x6)
-        x2 -= wp.cw_mul(l52, x5)
-        x2 -= wp.cw_mul(l42, x4)
-        x2 -= wp.cw_mul(l32, x3)
-        x1 -= wp.cw_mul(l61, x6)
-        x1 -= wp.cw_mul(l51, x5)
-        x1 -= wp.cw_mul(l41, x4)
-        x1 -= wp.cw_mul(l31, x3)
-        x1 -= wp.cw_mul(l21, x2)
-        return Lane(x1), Lane(x2), Lane(x3), Lane(x4), Lane(x5), Lane(x6)
-
-    return PoseMath(dot, angular, error_rotation, factor_6x6, solve_6x6)
+    return PoseMath(dot, angular, error_rotation)
