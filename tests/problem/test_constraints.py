@@ -157,7 +157,7 @@ def test_nonfinite_constraint_value_is_refused() -> None:
     problem = Problem(task("mass <= 3"))
     lost = replace(problem.constraints[0].quantity, each=lambda evaluation: np.full(len(evaluation), np.nan))  # type: ignore[type-var]
     object.__setattr__(problem, "constraints", (Constraint(lost, "<=", 3.0),))
-    with pytest.raises(SettingsError, match=r"mass <= 3.* of a design is nan"):
+    with pytest.raises(SettingsError, match=r"mass <= 3.*expected a finite number for every design, got nan"):
         problem.evaluate(SPACE.sample(1, 0))
 
 

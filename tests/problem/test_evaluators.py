@@ -121,7 +121,7 @@ def test_failed_evaluation_counts_as_the_stated_worst() -> None:
         (lambda: aw.evaluator("energy [J]", worst=[math.inf]), "finite"),
         (lambda: aw.evaluator("Energy")(len), "lowercase letters"),
         (lambda: aw.evaluator("torque")(len), "is built in"),
-        (lambda: aw.Problem(TASK, SPACE, tolerance=0.001, evaluator=measured), "a tolerance does not go with"),
+        (lambda: aw.Problem(TASK, SPACE, tolerance=0.001, evaluator=measured), "a tolerance or an evaluator, got both"),
         (
             lambda: aw.optimize(aw.Problem(WHOLE, SPACE, evaluator=measured), refine_every=5),
             "--refine-every does not go with an evaluator",

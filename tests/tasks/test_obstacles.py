@@ -82,7 +82,7 @@ def test_valid_obstacles_are_accepted() -> None:
         ([{**RECORDS[3], "axis": [0, 0, 0]}], "axis = (0, 0, 0) has no direction; try x, y, z or a vector"),
         ([{**RECORDS[0], "name": "a\nb"}], "name"),
         ([{**RECORDS[0], "name": "{{ evil }}"}], "name"),
-        ([RECORDS[0]] * 101, "obstacles: expected at most 100 records, got 101"),
+        ([RECORDS[0]] * 101, "obstacles: Tuple should have at most 100 items after validation, not 101"),
         ([3], "obstacles[0]"),
     ],
 )

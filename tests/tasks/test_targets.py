@@ -108,7 +108,7 @@ def test_restarts_are_bounded() -> None:
 
 def test_orientation_counts_only_for_oriented_targets() -> None:
     assert [o.name for o in Problem(task()).objectives] == ["position_error", "torque", "orientation_error"]
-    with pytest.raises(SettingsError, match=r"orientation_error would be 0 .* no target of task a has"):
+    with pytest.raises(SettingsError, match=r"orientation_error needs a target with an axis .* task a has none"):
         Problem(task("name: a\ntargets: [[0, 0, 1]]"), objectives=named_objectives(["orientation_error"]))
 
 

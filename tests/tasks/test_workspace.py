@@ -191,7 +191,7 @@ def test_invalid_workspaces_are_refused_in_one_line(written: str, targets: str) 
 
 
 def test_too_many_boxes_are_refused() -> None:
-    with pytest.raises(ValueError, match="workspace: expected at most 20 boxes, got 21"):
+    with pytest.raises(ValueError, match="should have at most 20 items after validation, not 21"):
         task(workspace=[CUBE] * 21)
 
 

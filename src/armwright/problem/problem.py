@@ -33,7 +33,7 @@ class Outcome:
     Attributes:
         values: the M objectives, minimised.
         violations: of the C constraints; satisfied at <= 0.
-        failure: why the evaluator gave no values, so that its worst ones stand here; empty if it gave some.
+        failure: why the evaluator failed, so that the values are its worst ones; empty if it did not.
     """
 
     values: tuple[float, ...]
@@ -48,7 +48,7 @@ class Outcomes:
     Attributes:
         values: (N, M) objectives, minimised.
         violations: (N, C) constraint violations; satisfied at <= 0.
-        failures: why the evaluator gave no values, by row.
+        failures: why the evaluator failed, by row.
     """
 
     values: Array
@@ -122,14 +122,12 @@ class Problem:
         if not self.objectives:
             object.__setattr__(self, "objectives", self._default_objectives())
         if self.evaluator is not None and self.tolerance > 0.0:
-            raise SettingsError(
-                f"a tolerance does not go with the evaluator {self.evaluator.name}, which measures an arm as it is"
-            )
+            raise SettingsError(f"expected a tolerance or an evaluator, got both ({self.evaluator.name})")
         for objective in self.objectives:
             if objective in ORIENTATION_QUANTITIES and not self.task.target_arrays.oriented:
                 raise SettingsError(
-                    f"objective {objective.name} would be 0 for every design: no target of task {self.task.name} has "
-                    "an axis or an orientation. Give one to a target, or take another objective"
+                    f"objective {objective.name} needs a target with an axis or an orientation; task {self.task.name} "
+                    "has none"
                 )
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
@@ -145,11 +143,9 @@ class Problem:
     def _check_reference_point(self) -> None:
         point, names = self.reference_point, [objective.name for objective in self.objectives]
         if point is not None and len(point) != len(names):
-            given = ", ".join(f"{value:g}" for value in point)
             raise TaskError(
-                f"task {self.task.name} has a reference_point of {len(point)} values ({given}); the problem minimises "
-                f"{len(names)}: {', '.join(names)}. Give one value each, or none: then it is found from the first "
-                "random trials"
+                f"task {self.task.name}: reference_point: expected {len(names)} values ({', '.join(names)}), got "
+                f"{len(point)}; without reference_point it is found from the first random trials"
             )
 
     @property
@@ -269,7 +265,7 @@ def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:
     if not np.all(np.isfinite(table)):
         row, column = np.argwhere(~np.isfinite(table))[0]
         raise SettingsError(
-            f"{names[column]} of a design is {table[row, column]}; expected a finite number for every design, a large "
-            "one for a bad design"
+            f"{names[column]}: expected a finite number for every design, got {table[row, column]}; try a large one "
+            "for a bad design"
         )
     return table

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self, cast
 import numpy as np
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     Field,
     ModelWrapValidatorHandler,
     PrivateAttr,
@@ -36,6 +37,15 @@ MAX_RESTARTS = 100
 IN_ORDER = "in_order"  # of moves: from each target to the next
 
 
+def _listed(workspace: Any) -> list[Any]:
+    """Return a box, or a list of them, as a list."""
+    if isinstance(workspace, (dict, Region)):
+        return [workspace]
+    if isinstance(workspace, (list, tuple)):
+        return list(cast("list[Any]", workspace))
+    raise ValueError("workspace: expected {low: [x, y, z], high: [x, y, z], points: 200} [m], or a list of such boxes")
+
+
 class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Points that the tip should reach, and what else the arm has to do.
 
@@ -56,18 +66,18 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # also names run folders
-    targets: tuple[Point, ...]
+    targets: tuple[Point, ...] = Field(max_length=MAX_TARGETS)
     payload: float | tuple[float, ...] = 0.0
     payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MAX_PAYLOAD_FACTOR)], ...] = Field(
         default=(), max_length=10
     )
     target_noise: float = Field(default=0.0, ge=0.0, le=MAX_NOISE)
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Obstacle, ...] = Field(default=(), max_length=MAX_OBSTACLES)
     restarts: int = Field(default=0, ge=0, le=MAX_RESTARTS)
     moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
     move_step: Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)] = MOVE_STEP
     move_time: float | tuple[float, ...] | None = None
-    workspace: tuple[Region, ...] = ()
+    workspace: Annotated[tuple[Region, ...], BeforeValidator(_listed)] = Field(default=(), max_length=MAX_REGIONS)
     objectives: tuple[str, ...] | None = None
     constraints: tuple[str, ...] = ()
     # One value per objective; for the paper's two: position error [m], torque [N m] times 40.
@@ -107,8 +117,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if not isinstance(value, (list, tuple)):
             raise ValueError("obstacles: expected a list of records, such as {kind: ground, z: 0.0}")
         records = cast("list[Any]", value)
-        if len(records) > MAX_OBSTACLES:
-            raise ValueError(f"obstacles: expected at most {MAX_OBSTACLES} records, got {len(records)}")
         return [read_obstacle(record, number) for number, record in enumerate(records, start=1)]
 
     @model_validator(mode="before")
@@ -124,14 +132,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             corners = tuple(dict.fromkeys(corner for region in regions for corner in region.corners))
         return {**cast("dict[str, Any]", content), "targets": corners}
 
-    @field_validator("workspace", mode="before")
-    @classmethod
-    def _check_workspace(cls, value: Any) -> Any:
-        regions = _listed(value)
-        if len(regions) > MAX_REGIONS:
-            raise ValueError(f"workspace: expected at most {MAX_REGIONS} boxes, got {len(regions)}")
-        return regions
-
     @field_validator("moves", mode="before")
     @classmethod
     def _check_moves(cls, value: Any) -> Any:
@@ -146,8 +146,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def _check_numbers(self) -> Self:
         if not self.targets:
             raise ValueError("targets is empty: give at least one point [x, y, z] in metres")
-        if len(self.targets) > MAX_TARGETS:
-            raise ValueError(f"targets: expected at most {MAX_TARGETS} points, got {len(self.targets)}")
         for number, point in enumerate(self.targets, start=1):
             if max(abs(c) for c in point) > MAX_COORDINATE:
                 raise ValueError(
@@ -225,15 +223,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             pairs = tuple((start - 1, end - 1) for start, end in self.moves)
         times = () if self.move_time is None else self.move_time
         return Moves(pairs, self.move_step, times if isinstance(times, tuple) else (times,) * len(pairs))
-
-
-def _listed(workspace: Any) -> list[Any]:
-    """Return a box, or a list of them, as a list."""
-    if isinstance(workspace, (dict, Region)):
-        return [workspace]
-    if isinstance(workspace, (list, tuple)):
-        return list(cast("list[Any]", workspace))
-    raise ValueError("workspace: expected {low: [x, y, z], high: [x, y, z], points: 200} [m], or a list of such boxes")
 
 
 def _read_target(entry: Any, number: int) -> Target | None:
