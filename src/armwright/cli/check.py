@@ -99,27 +99,24 @@ def geometry_warnings(problem: Problem) -> list[str]:
 def contains(obstacle: Obstacle, point: Point) -> bool:
     """Return whether a point [m] is inside an obstacle."""
     solid = obstacle.solid
-    x, y, z = solid.rotation.T @ (np.array(point) - solid.centre)
-    a, b, c = solid.half
+    local = solid.rotation.T @ (np.array(point) - solid.centre)
+    radius, half_height = solid.half[0], solid.half[2]
     match solid.shape:
         case "box":
-            return abs(x) < a and abs(y) < b and abs(z) < c
+            return bool(np.all(np.abs(local) < solid.half))
         case "sphere":
-            return math.hypot(x, y, z) < a
+            return math.hypot(*local) < radius
         case "cylinder":
-            return math.hypot(x, y) < a and abs(z) < c
+            return math.hypot(*local[:2]) < radius and abs(local[2]) < half_height
         case "ground":
-            return z < 0.0
+            return bool(local[2] < 0.0)
 
 
 def _distance_to_bases(space: DesignSpace, point: Point) -> float:
     """Return the distance of a point from the box of allowed bases [m]."""
     ranges = {p.name: (p.low, p.high) for p in space.parameters if isinstance(p, FloatParameter)}
-    gaps = (
-        max(ranges[f"origin_{axis}"][0] - value, value - ranges[f"origin_{axis}"][1], 0.0)
-        for axis, value in zip("xyz", point, strict=True)
-    )
-    return math.hypot(*gaps)
+    low, high = np.array([ranges[f"origin_{axis}"] for axis in "xyz"]).T
+    return math.dist(point, np.clip(point, low, high))
 
 
 def _is_fixed(parameter: Parameter) -> bool:

@@ -32,7 +32,7 @@ class Finding:
 
     mark: str
     subject: str
-    words: str
+    message: str
 
 
 def examine(options: ModelOptions | None = None) -> Iterator[Finding]:
@@ -97,25 +97,20 @@ def _vendors() -> Iterator[Finding]:
         if unset:
             yield Finding(MISSING, vendor, f"{', '.join(unset)} not set in the environment")
         else:
-            words = f"{', '.join(map(str, found.values()))} set" if found else "needs no key; its server must run"
-            yield Finding(OK, vendor, words)
+            message = f"{', '.join(map(str, found.values()))} set" if found else "needs no key; its server must run"
+            yield Finding(OK, vendor, message)
 
 
 def _configured(options: ModelOptions | None) -> Finding:
+    configured = None
     try:
         configured = configured_model(options)
-    except ArmwrightError as fault:
-        return Finding(WRONG, "model", str(fault))
-    if configured is None:
-        return Finding(
-            MISSING,
-            "model",
-            f"none is configured (--model, ARMWRIGHT_MODEL, {configuration_path()}); the rules propose",
-        )
-    try:
+        if configured is None:
+            places = f"--model, ARMWRIGHT_MODEL, {configuration_path()}"
+            return Finding(MISSING, "model", f"none is configured ({places}); the rules propose")
         from armwright.llm.client import ModelClient
 
         ModelClient(configured.options)
     except ArmwrightError as fault:
-        return Finding(WRONG, "model", f"{configured}: {fault}")
+        return Finding(WRONG, "model", f"{configured}: {fault}" if configured else str(fault))
     return Finding(OK, "model", f"{configured}; --call tries it")

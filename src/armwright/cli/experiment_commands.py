@@ -16,7 +16,7 @@ from armwright.cli.options import (
     TaskName,
     select_workers,
 )
-from armwright.cli.streams import exit_interrupted, print_json, stderr_console, stdout_console
+from armwright.cli.streams import exit_interrupted, open_console, print_json
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -45,7 +45,7 @@ def experiment(
     print_: Annotated[bool, typer.Option("--print", help="Print the file of a built-in experiment, and exit.")] = False,
     figures: Figures = True,
     out: Annotated[Path | None, typer.Option(help="Folder.", show_default="experiments/NAME")] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print a summary as JSON alone to stdout.")] = False,
+    json_: Json = False,
 ) -> None:
     """Run methods on tasks with several seeds, and compare them.
 
@@ -62,7 +62,7 @@ def experiment(
     if print_:
         print(plan.builtin_text(name), end="")
         return
-    console = stderr_console() if json_ or print_commands else stdout_console()
+    console = open_console(json_ or print_commands)
     whole, beside = plan.load_experiment(name)
     chosen = plan.with_model(
         plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds),
@@ -119,7 +119,7 @@ def compare(
     from armwright.experiments.run_list import read_finished_runs
     from armwright.report.tables import markdown, write_tables
 
-    console = stdout_console()
+    console = open_console()
     finished, unfinished = read_finished_runs(folders)
     notes = [f"{folder} is not finished and is left out" for folder in unfinished]
     comparison = compare_summaries(finished, baseline)
@@ -186,7 +186,7 @@ def compare_arms(
     if json_:
         print_json(comparison_record(compared))
     else:
-        show_arms(stdout_console(), compared, drawn)
+        show_arms(open_console(), compared, drawn)
 
 
 def _parse_point(text: str) -> tuple[float, float, float]:
@@ -210,4 +210,4 @@ def runs(
     if json_:
         print_json(listed)
     else:
-        show_runs(stdout_console(), listed)
+        show_runs(open_console(), listed)

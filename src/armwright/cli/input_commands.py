@@ -20,7 +20,7 @@ from armwright.cli.options import (
     load_problem,
 )
 from armwright.cli.signals import INTERRUPTED
-from armwright.cli.streams import print_json, stderr_console, stdout_console
+from armwright.cli.streams import open_console, print_json
 from armwright.exceptions import FailureError, TaskError
 
 
@@ -69,7 +69,7 @@ def check(
     if json_:
         print_json(check_problem(problem))
     else:
-        show_check(stdout_console(), problem)
+        show_check(open_console(), problem)
 
 
 def tasks(
@@ -94,7 +94,7 @@ def tasks(
             ]
         )
         return
-    console = stdout_console()
+    console = open_console()
     if not names:
         show_tasks(console, listed)
     for task in listed if names else ():
@@ -110,7 +110,7 @@ def actuators(json_: Json = False) -> None:
     if json_:
         print_json([record.model_dump(exclude_none=True) for record in records])
     else:
-        show_actuators(stdout_console(), records)
+        show_actuators(open_console(), records)
 
 
 def draft(
@@ -125,7 +125,7 @@ def draft(
     print_prompt: Annotated[
         bool, typer.Option("--print-prompt", help="Print the prompt and the schema that would be sent, and exit.")
     ] = False,
-    json_: Annotated[bool, typer.Option("--json", help="Print only a JSON record to stdout.")] = False,
+    json_: Json = False,
 ) -> None:
     """Have a language model draft a task file, and a space file if needed, from DESCRIPTION.
 
@@ -141,7 +141,7 @@ def draft(
         print(draft_prompt(request))
         print_json(draft_schema())
         return
-    console = stderr_console() if json_ else stdout_console()
+    console = open_console(json_)
     options = load_model_options(model_options, model=model, max_cost=max_cost)
     drafter = Drafter(drafting_model(options), out, force)
     console.print(drafter.forecast(request))

@@ -72,7 +72,7 @@ Figures = Annotated[
     ),
 ]
 SummaryJson = Annotated[bool, typer.Option("--json", help="Print only summary.json to stdout.", rich_help_panel=OUTPUT)]
-Json = Annotated[bool, typer.Option("--json", help="Print as JSON.", rich_help_panel=OUTPUT)]
+Json = Annotated[bool, typer.Option("--json", help="Print only JSON to stdout.", rich_help_panel=OUTPUT)]
 Scheduler = Annotated[
     str | None,
     typer.Option(

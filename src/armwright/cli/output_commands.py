@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from armwright.cli.options import Json, ModelName, ModelOptionsFile, SpaceFile, load_problem
-from armwright.cli.streams import print_json, stdout_console
+from armwright.cli.streams import open_console, print_json
 from armwright.exceptions import FailureError, SettingsError
 
 
@@ -44,7 +44,7 @@ def pick(
             ]
         )
         return
-    show_picked(stdout_console(), run, history, picked, n)
+    show_picked(open_console(), run, history, picked, n)
 
 
 def export(
@@ -195,11 +195,11 @@ def doctor(
     from armwright.cli.doctor import WRONG, examine, try_model
     from armwright.llm.configuration import load_model_options
 
-    console = stdout_console()
+    console = open_console()
     options = load_model_options(model_options, model=model)
     wrong = False
     for finding in examine(options):
-        console.print(f"{finding.mark} {finding.subject}: {finding.words}")
+        console.print(f"{finding.mark} {finding.subject}: {finding.message}")
         wrong = wrong or finding.mark == WRONG
     if wrong:
         sys.exit(FailureError.exit_code)

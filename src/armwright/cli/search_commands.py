@@ -26,7 +26,7 @@ from armwright.cli.options import (
     load_problem,
     select_workers,
 )
-from armwright.cli.streams import exit_interrupted, print_json, repeat_command, stderr_console, stdout_console
+from armwright.cli.streams import exit_interrupted, open_console, print_json, repeat_command
 from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 
 
@@ -62,7 +62,7 @@ def design(
 
     if from_ is not None and proposer is not None:
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
-    console = stderr_console() if json_ else stdout_console()
+    console = open_console(json_)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
     choice = None if proposer is None else choose_proposer(proposer)
     if choice is not None:
@@ -175,7 +175,7 @@ def optimize(
     from armwright.spaces.design_file import read_design
     from armwright.study.study import optimize as run_study
 
-    console = stderr_console() if json_ else stdout_console()
+    console = open_console(json_)
     problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     choice = choose_proposer(proposer, load_model_options(model_options, model=model, prompt=prompt, max_cost=max_cost))
@@ -243,7 +243,7 @@ def refine(
     if json_:
         print_json({"folder": run, **refined.summary})
         return
-    show_refined(stdout_console(), refined)
+    show_refined(open_console(), refined)
 
 
 def _draw(folder: Path) -> list[Path]:

@@ -56,35 +56,31 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
         stored: Its baselines.
     """
     reference = task.reference_point
-    described = "chosen from the first random trials" if reference is None else format_point(reference)
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
     console.print(f"  {len(task.targets)} targets [m]: " + " ".join(format_point(target) for target in task.targets))
     for line in describe_targets(task.target_specs):
-        console.print(Text(f"  {line}"))
+        console.print(f"  {line}")
     if task.restarts:
         console.print(f"  {task.restarts + 1} initial postures of the inverse kinematics per target")
-    if task.objectives is not None:
-        console.print(f"  objectives: {', '.join(task.objectives)}")
-    if task.constraints:
-        console.print(f"  constraints: {', '.join(task.constraints)}")
-    if task.payloads.any():
-        console.print(f"  payload [kg]: {', '.join(f'{kg:g}' for kg in np.atleast_1d(task.payload))}")
-    if task.cases_description:
-        console.print(f"  evaluated by the worst case of these, {task.cases_description}")
-    for obstacle in task.obstacles:
-        console.print(f"  obstacle: {obstacle.describe()}")
-    if task.straight_moves:
-        listed = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.straight_moves.pairs)
-        timed = ""
-        if task.move_time is not None:
-            timed = f"; durations {', '.join(f'{time:g}' for time in np.atleast_1d(task.move_time))} s"
-        console.print(f"  straight moves between targets: {listed}; in steps of {1e3 * task.move_step:g} mm{timed}")
-    for region in task.workspace:
-        console.print(f"  workspace: {region.describe()}")
-    console.print(f"  reference point: {described}")
-    console.print(f"  provenance: {task.provenance}")
-    if best_known is not None:
-        console.print(f"  best known hypervolume: {best_known:.2f}")
+    moves = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.straight_moves.pairs)
+    step = f"in steps of {1e3 * task.move_step:g} mm"
+    if task.move_time is not None:
+        step += f"; durations {', '.join(f'{time:g}' for time in np.atleast_1d(task.move_time))} s"
+    payloads = ", ".join(f"{kg:g}" for kg in np.atleast_1d(task.payload))
+    for name, value in (
+        ("objectives", ", ".join(task.objectives or ())),
+        ("constraints", ", ".join(task.constraints)),
+        ("payload [kg]", payloads if task.payloads.any() else ""),
+        ("evaluated by the worst case, also", task.cases_description),
+        *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
+        ("straight moves between targets", moves and f"{moves}; {step}"),
+        *(("workspace", region.describe()) for region in task.workspace),
+        ("reference point", "chosen from the first random trials" if reference is None else format_point(reference)),
+        ("provenance", task.provenance),
+        ("best known hypervolume", "" if best_known is None else f"{best_known:.2f}"),
+    ):
+        if value:
+            console.print(f"  {name}: {value}")
     for baseline in stored:
         console.print(
             f"  {baseline.method}, {baseline.runs} runs of 200 counted trials: E_hv {baseline.e_hv:.2f} (σ_hv "

@@ -21,14 +21,9 @@ class _Console(Console):
         raise BrokenPipeError
 
 
-def stdout_console() -> Console:
-    """Return a console on stdout, in plain text unless stdout is a terminal."""
-    return _Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
-
-
-def stderr_console() -> Console:
-    """Return a console on stderr, for commands whose stdout another program reads."""
-    return _Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+def open_console(is_json: bool = False) -> Console:
+    """Return a console on stdout, or on stderr if another program reads stdout; plain text unless it is a terminal."""
+    return _Console(stderr=is_json, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 def print_json(content: Any) -> None:
