@@ -13,10 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from armwright.llm.redaction import redacted, without_keys
+from armwright.llm.redaction import redacted
 from armwright.problem.problem import Problem
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
+from armwright.text import map_text
 from tests.support import wire_formats as wires
 from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, Response, wants_design
 from tests.support.command_line import armwright
@@ -233,7 +234,7 @@ def test_only_text_values_of_an_answer_are_redacted(monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("MY_API_KEY", "origin_x")
     monkeypatch.setenv("A_TOKEN", "12345678901234567890")
     content = {"origin_x": 12345678901234567890, "why": ["origin_x", None, True, {"origin_x": "is origin_x"}]}
-    assert without_keys(content) == {
+    assert map_text(content, redacted) == {
         "origin_x": 12345678901234567890,
         "why": ["<MY_API_KEY>", None, True, {"origin_x": "is <MY_API_KEY>"}],
     }

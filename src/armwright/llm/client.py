@@ -28,9 +28,9 @@ from armwright.llm.backend import (
     Reply,
 )
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
-from armwright.llm.redaction import WithoutKeys, redacted, without_keys
+from armwright.llm.redaction import WithoutKeys, redacted
 from armwright.llm.servers import Server, server_of
-from armwright.text import one_line
+from armwright.text import map_text, one_line
 
 with requires_extra("llm", "a language model"):
     from genai_prices import Usage, calc_price
@@ -145,7 +145,7 @@ class ModelClient(LlmBackend):
         def accept(answer: dict[str, Any]) -> dict[str, Any]:
             try:
                 # Keys are redacted before reading, so that the recorded text can be read again.
-                accepted.append(replace_surrogates(output.read(without_keys(answer))))
+                accepted.append(replace_surrogates(output.read(map_text(answer, redacted))))
             except UsageError as refusal:
                 refusals.append(str(refusal))
                 raise ModelRetry(str(refusal)) from refusal

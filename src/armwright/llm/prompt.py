@@ -95,7 +95,7 @@ class Prompt:
         feedback = Feedback(history, seed)
         common = common_values(history, options) | {
             "n_proposed": len(proposed),
-            "hints": _visible_hints(hints),
+            "hints": [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))],  # visible ones
         }
         most = MOST_TARGETS, max(len(feedback.front), len(feedback.others)), MOST_PROPOSED
         while True:
@@ -204,11 +204,6 @@ def rendered(name: str, values: Mapping[str, Any]) -> str:
 def estimated_tokens(text: str) -> int:
     """Estimate the tokens of a text: one per 5 letters of a word, or 3 digits of a number."""
     return len(re.findall(r"[0-9]{1,3}|[A-Za-z]{1,5}|\S", text))
-
-
-def _visible_hints(hints: Sequence[str]) -> list[str]:
-    """Return each hint on one line, without those that have no visible characters."""
-    return [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))]
 
 
 def _fewer(targets: int, designs: int, proposed: int) -> tuple[int, int, int]:

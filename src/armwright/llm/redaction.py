@@ -4,9 +4,6 @@ import logging
 import os
 import re
 from collections.abc import Iterator
-from typing import Any
-
-from armwright.text import map_text
 
 _NAMES = re.compile(r"(^|_)(KEY|TOKEN|SECRET|PASSWORD)$")
 _SENT = re.compile(r"(^|_)API_(KEY|TOKEN)$")  # read and sent by vendors' clients
@@ -38,11 +35,6 @@ def redacted(text: str) -> str:
                 text = text.replace(key[:shown], blot).replace(key[-shown:], blot)
         text = _MASKED.sub(lambda masked, key=key, blot=blot: blot if _is_of(key, masked) else masked[0], text)
     return text
-
-
-def without_keys(content: Any) -> Any:
-    """Return JSON content with the keys of the environment redacted in every text."""
-    return map_text(content, redacted)
 
 
 def _keys() -> Iterator[tuple[str, str]]:
