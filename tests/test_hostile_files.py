@@ -150,17 +150,23 @@ def test_damaged_summary_is_made_again(run: Path, place: tuple[str, ...], value:
     looked_at(run)
 
 
-@pytest.mark.parametrize("field", ["proposals", "memory", "answer", "name", "prompt"])
-def test_config_without_a_proposer_setting_is_refused(run: Path, field: str) -> None:
+def remove_setting(run: Path, field: str) -> None:
     text = (run / "config.yaml").read_text()
     assert f"    {field}: " in text
     lines = [line for line in text.splitlines() if not line.startswith(f"    {field}: ")]
     (run / "config.yaml").write_text("\n".join(lines))
-    if field == "prompt":
-        assert read_config(run).study.proposer is not None
-    else:
-        with pytest.raises(RunFolderError, match=field):
-            read_config(run)
+
+
+@pytest.mark.parametrize("field", ["proposals", "memory", "answer", "name"])
+def test_config_without_a_proposer_setting_is_refused(run: Path, field: str) -> None:
+    remove_setting(run, field)
+    with pytest.raises(RunFolderError, match=field):
+        read_config(run)
+
+
+def test_config_without_a_prompt_is_read(run: Path) -> None:
+    remove_setting(run, "prompt")
+    assert read_config(run).study.proposer is not None
 
 
 @pytest.mark.parametrize("values", [[], [1.0], [1.0, 2.0, 3.0], [float("nan"), 1.0]], ids=str)

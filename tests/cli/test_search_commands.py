@@ -9,16 +9,17 @@ from tests.cli.test_cli import SHORT
 from tests.support.command_line import armwright, refused
 
 
+@pytest.mark.slow
 def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> None:
-    done = armwright("design", "target-1", "--budget", "400", "--seed", "4", "--no-figures")
+    done = armwright("design", "target-1", "--budget", "3000", "--seed", "4", "--no-figures")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     for words in ("of the best known hypervolume", "robust", "sensitive", "budget spent", "a toy"):
         assert words in done.stdout
     assert (in_folder / "runs" / "target-1-design-seed4" / "summary.json").is_file()
-    more = armwright("design", "target-1", "--budget", "800", "--seed", "4", "--no-figures", "--json")
+    more = armwright("design", "target-1", "--budget", "4000", "--seed", "4", "--no-figures", "--json")
     summary = json.loads(more.stdout)
-    assert summary["search"]["evaluations"] >= 800
+    assert summary["search"]["evaluations"] >= 4000
     assert summary["folder"] == "runs/target-1-design-seed4"
 
     armwright("optimize", "target-1", *SHORT, "--out", "mine")
@@ -84,7 +85,8 @@ def test_invalid_search_arguments_are_one_line(in_folder: Path, code: int, args:
 
 
 def test_optimize_and_refine_reject_a_design_run(in_folder: Path) -> None:
-    armwright("design", "target-1", "--budget", "300", "--no-figures", "--out", "run")
+    done = armwright("design", "target-1", "--budget", "300", "--no-figures", "--out", "run", "--json")
+    assert json.loads(done.stdout)["search"]["ended_by"] == "budget"
     assert "not a study" in refused(1, "refine", "run")
     assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")
     assert "not a study" in refused(1, "prompt", "--after", "run")

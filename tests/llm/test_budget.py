@@ -38,7 +38,8 @@ def run(
     **settings: Any,
 ) -> StudyResult:
     watch = None if seen is None else seen.append
-    return optimize(PROBLEM, proposer=proposer, n_init=4, n_step=3, n_total=n_total, out=out, watch=watch, **settings)
+    settings = {"n_init": 4, "n_step": 3, "n_total": n_total, "out": out, "watch": watch, "verify": False, **settings}
+    return optimize(PROBLEM, proposer=proposer, **settings)
 
 
 def notes(seen: list[Progress]) -> list[str]:

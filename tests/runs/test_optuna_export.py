@@ -75,7 +75,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run with the default settings, exported."""
     folder = tmp_path_factory.mktemp("optuna") / "plain"
-    optimize(Problem(load_task("target-1")), proposer="rules", n_total=20, out=folder)
+    optimize(Problem(load_task("target-1")), proposer="rules", n_total=10, out=folder)
     export_study(folder)
     return folder
 
@@ -257,7 +257,7 @@ def test_exported_study_can_be_continued(plain: Path, tmp_path: Path) -> None:
     assert database.read_bytes() == before
     assert set((tmp_path / ARTIFACTS).iterdir()) == artifacts
     with opened(database) as study:
-        assert len(study.trials) == 31
+        assert len(study.trials) == 21
 
 
 def test_nsga2_continues_from_the_parents_of_the_run(run: Path) -> None:
