@@ -150,7 +150,7 @@ def test_later_fault_becomes_a_counted_black_box_trial(
     (told,) = [progress for progress in shown if progress.fault]
     assert (told.number, told.fault) == (7, kind)
     assert "\n" not in told.note
-    assert ("no more questions are asked" in told.note) == (kind in FINAL)
+    assert ("no more requests are made" in told.note) == (kind in FINAL)
     failed = Transcript(tmp_path / "run" / "transcripts.jsonl").calls[-1]
     assert (failed.proposal, failed.step, failed.fault) == ("llm-0007", "reasoning", kind)
     assert failed.error
@@ -182,7 +182,7 @@ def test_permanent_fault_is_reported_once_and_ends_proposals(
     assert sources(run) == ["llm"] + ["bbo"] * 11
     assert run.summary["proposer"]["failures"] == {kind: 3}
     assert run.summary["proposer"]["call_failures"] == {kind: 1}
-    assert sum("no more questions are asked in this session" in progress.note for progress in shown) == 1
+    assert sum("no more requests are made in this session" in progress.note for progress in shown) == 1
 
 
 @pytest.mark.parametrize("sent", [{"retry_after": "0"}, {"retry_after_ms": "5"}], ids=str)

@@ -137,7 +137,7 @@ def check_for_keys(
     assert "iteration 6/6" in shown
     assert "failed 5" in shown
     assert shown.count("no usable proposal") == 4  # the last fault is told once
-    assert shown.count("no more questions are asked in this session") == 1
+    assert shown.count("no more requests are made in this session") == 1
 
 
 @pytest.mark.parametrize("command", [("optimize", "target-1", *SHORT), ("doctor", "--call")], ids=lambda c: c[0])

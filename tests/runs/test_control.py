@@ -132,7 +132,7 @@ def test_paused_study_adds_no_trial_until_resumed(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(time, "sleep", look)
     run(out, watch=watching)
     assert looks == [(7, "paused", 7)] * 5
-    assert notes == ["paused by its watcher, who can let it go on; Ctrl-C ends it"]
+    assert notes == ["paused by a watcher, who can resume it; Ctrl-C ends it"]
     assert read_control(out) == Control()
     run(tmp_path / "undisturbed")
     assert lines(out) == lines(tmp_path / "undisturbed")

@@ -117,6 +117,13 @@ def test_summary_has_the_documented_keys(run: StudyResult) -> None:
     assert summary["proposer_bias"]["proposer"]["designs"] == 2
 
 
+def test_summary_with_lone_surrogate_is_read(run: StudyResult) -> None:
+    """Paths that are not UTF-8 contain one, such as the source of a replay."""
+    summary = run.summary | {"replay": "runs/\udc80"}
+    (folder(run) / "summary.json").write_text(json.dumps(summary))
+    assert read_summary(folder(run)) == summary
+
+
 def test_run_without_a_proposer_has_no_proposer_bias() -> None:
     summary = optimize(PROBLEM, proposer="none", n_init=2, n_total=2).summary
     assert summary["proposer_bias"] is None

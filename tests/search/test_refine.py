@@ -145,7 +145,7 @@ def test_refine_run_counts_evaluations_in_vain_and_draws_another_seed(
 
 def test_refine_run_refuses_bad_input(run: StudyResult, tmp_path: Path) -> None:
     assert run.folder is not None
-    with pytest.raises(SettingsError, match="evaluations = 3"):
+    with pytest.raises(SettingsError, match="evaluations per design: expected 12"):
         refine_run(run.folder, 3)
     with pytest.raises(RunFolderError, match="not a run folder"):
         refine_run(tmp_path / "nothing")

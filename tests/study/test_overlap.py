@@ -202,7 +202,7 @@ def test_permanent_fault_of_concurrent_calls_is_reported_once() -> None:
     notes: list[str] = []
     run = search(Keyless(), in_flight=3, watch=lambda progress: notes.append(progress.note))
     assert run.summary["proposer"]["failures"] == {"key": 4}
-    told = "the key is wrong; no more questions are asked in this session"
+    told = "the key is wrong; no more requests are made in this session"
     assert [note for note in notes if note] == [told]
 
 

@@ -77,10 +77,6 @@ class Method(BaseModel, frozen=True, extra="forbid"):
         """The number of proposals in the whole study: one in each block of n_step trials."""
         return -(-self.n_total // self.n_step)
 
-    def first_trial(self, block: int) -> int:
-        """Return the number of the first trial of a block."""
-        return self.n_init + block * self.n_step
-
     def n_started(self, number: int) -> int:
         """Return how many blocks have started when trial `number` starts, its own included."""
         return max(0, (number - self.n_init) // self.n_step + 1)

@@ -192,7 +192,7 @@ class _Export:
         return attributes
 
     def _sampler_notes(self, storage: RDBStorage, study_id: int) -> dict[str, Any]:
-        """Return what samplers noted on the study, with ids of this storage where genetic ones noted parents."""
+        """Return the notes of samplers on the study, with the ids of this storage for parents."""
         notes: dict[str, Any] = {}
         for trial in self.history:
             notes |= trial.sampler_notes.get("study", {})

@@ -22,13 +22,13 @@ Mask = NDArray[np.bool_]
 class SourceBias:
     """Shares of the designs of one source, 0 to 1.
 
-    designs: how many there are.
-    lengths_5_cm, lengths_1_cm: all link lengths are multiples of 0.05 m, of 0.01 m, within 1e-9 m. A link at the end
-    of its range counts by its number, as any other.
-    base_on_symmetry_plane: the base is within 1e-6 m of a symmetry plane of the targets (`symmetry_planes`); None
-    where they have none.
-    repeats: an earlier trial, of whatever source, has the very same parameters.
-    near_repeats: an earlier trial has the same joints, and no number that differs by more than 1 mm; repeats included.
+    Attributes:
+        designs: Number of designs.
+        lengths_5_cm: All link lengths are multiples of 0.05 m, within 1e-9 m.
+        lengths_1_cm: All link lengths are multiples of 0.01 m, within 1e-9 m.
+        base_on_symmetry_plane: The base is within 1e-6 m of a symmetry plane of the targets; None if they have none.
+        repeats: An earlier trial of any source has the same parameters.
+        near_repeats: An earlier trial has the same joints and all numbers within 1 mm; includes repeats.
     """
 
     designs: int
@@ -43,7 +43,10 @@ class SourceBias:
 class FrontShare:
     """A proposer's share of the front after half of the counted iterations and at the end.
 
-    grows: whether it is larger at the end.
+    Attributes:
+        half: Share after half of the iterations.
+        end: Share at the end.
+        grows: True if the share is larger at the end.
     """
 
     half: float
@@ -55,7 +58,11 @@ class FrontShare:
 class ProposerBias:
     """The bias of a proposer's designs and of the black box's; None without designs.
 
-    symmetry_planes: the number of the targets' symmetry planes.
+    Attributes:
+        symmetry_planes: Number of symmetry planes of the targets.
+        proposer: Bias of the proposer's designs.
+        black_box: Bias of the black box's designs.
+        front_share: The proposer's share of the front.
     """
 
     symmetry_planes: int
@@ -78,7 +85,10 @@ def proposer_bias(history: History, proposer: str) -> ProposerBias:
 def source_bias(history: History, source: str, planes: Array) -> SourceBias | None:
     """Return the bias of a source's designs; None if it has none.
 
-    planes: (P, 3) the normals of the targets' symmetry planes.
+    Args:
+        history: The trials.
+        source: The source.
+        planes: (P, 3) normals of the symmetry planes of the targets.
     """
     mine = masks_by_source(history).get(source)
     if mine is None:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, Field
 
+from armwright.files import replace_surrogates
 from armwright.runs.attribution import Attribution
 from armwright.runs.front_gap import FrontGap
 from armwright.runs.proposer_bias import ProposerBias
@@ -119,7 +120,7 @@ def parse_summary(text: str) -> dict[str, Any]:
     """Validate and return the content of a summary.json; ValueError if it is damaged."""
     content = json.loads(text)
     schema = SearchSummary if isinstance(content, dict) and "search" in content else StudySummary
-    schema.model_validate_json(text)
+    schema.model_validate_json(replace_surrogates(json.dumps(content, ensure_ascii=False)))
     return cast("dict[str, Any]", content)
 
 

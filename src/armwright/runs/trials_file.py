@@ -60,7 +60,7 @@ def _parse_trials(content: bytes, first: int, path: Path, config: RunConfig) -> 
         except (ValueError, DesignError) as fault:
             raise RunFolderError(
                 f"{path}, line {number + 1} is damaged ({_message(fault)}); restore the file, or delete this line and "
-                "all after it: the same command then resumes from there"
+                "all after it: the same command resumes from there"
             ) from fault
     return trials, end
 

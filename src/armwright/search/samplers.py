@@ -180,8 +180,7 @@ class BlackBox:
         trial = self._study.ask()
         design = self._suggest(trial)
         self._assign_generation(sampler, trial)
-        for name, value in _attributes(source, None).items():
-            trial.set_user_attr(name, value)
+        trial.set_user_attr("source", source)
         return trial, design
 
     def inject(self, design: Design, number: int, source: str, proposal: str | None) -> tuple[Trial, Design]:

@@ -200,7 +200,7 @@ class Cluster:
 
 
 def _sent_by_value() -> tuple[Callable[..., dict[str, str]], Callable[..., Any]]:
-    """Return what runs where armwright may be another version, or missing.
+    """Return functions for workers on which armwright may have another version or be missing.
 
     Functions within a function are pickled with their code. So they must not use anything of this module.
     """

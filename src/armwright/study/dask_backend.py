@@ -15,8 +15,8 @@ class DaskBackend(EvaluationBackend):
     """Evaluates designs on workers, which get the problem and its evaluator by value.
 
     Args:
-        problem: what is evaluated.
-        workers: by whom.
+        problem: the problem.
+        workers: the workers.
         notify: called with news for the user.
 
     Raises:

@@ -56,7 +56,7 @@ def find_front(
     """Approximate the Pareto front of a problem within a budget.
 
     Args:
-        problem: what is evaluated.
+        problem: the problem.
         budget: a time such as "5s", without the loading of the kernels, or a number of evaluations, which the last
             batch may exceed by up to 1000. With a number the result depends on the seed only.
         seed: of all random numbers.
@@ -137,7 +137,9 @@ class _DirectSearch:
                     self._save(state)
                     saved = now
                 if self.watch is not None:
-                    self.watch(self._progress(budget))
+                    search = self.search
+                    front_size = len(search.matrix)
+                    self.watch(SearchProgress(search.evaluations, self.seconds, search.hypervolume, front_size, budget))
         finally:
             if state is not None:
                 self._save(state)
@@ -148,10 +150,6 @@ class _DirectSearch:
         if budget.is_spent(self.search.evaluations, self.seconds):
             return "budget"
         return "stall" if stop_at_stall and self.search.evaluations and self.search.stalled else ""
-
-    def _progress(self, budget: SearchBudget) -> SearchProgress:
-        search = self.search
-        return SearchProgress(search.evaluations, self.seconds, search.hypervolume, len(search.matrix), budget)
 
     def _save(self, state: Mapping[str, Any]) -> None:
         if self.folder is None:

@@ -125,7 +125,7 @@ class OverlappingSchedule(Schedule):
 
     def _next_asked(self) -> int:
         """Return the trial of the next request: the first of a block without one."""
-        numbers = (self._method.first_trial(block) for block in count(0, self._requests.per_call))
+        numbers = count(self._method.n_init, self._method.n_step * self._requests.per_call)
         return next(number for number in numbers if number not in self._asked)
 
     def _request(self, history: History, number: int) -> None:

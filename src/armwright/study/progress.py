@@ -15,7 +15,7 @@ Activity = Literal["beginning", "proposing", "paused", "finished"]
 
 @dataclass(frozen=True)
 class Progress:
-    """Activity of a study: it begins, asks its proposer, is paused, or has finished a trial.
+    """Progress of a study: it begins, requests a proposal, is paused, or has finished a trial.
 
     Attributes:
         doing: the activity.

@@ -88,7 +88,7 @@ def preview_after(
         return _preview(proposer, history.problem, number, text)
     schedule = request_schedule(requests, config.study, lambda: history)
     number, finished = schedule.upcoming(len(history))
-    # What is to be otherwise than in the run is to be seen, even where the run's own answer waits for its second call.
+    # With other options the new prompt is shown, even if the run waits for the second call of an answer.
     if given:
         text = proposer.prompt_for(history, requests.seed(number), proposer.next_hints(number))
     else:

@@ -30,7 +30,7 @@ class ProposalSlot:
 
     @property
     def fault_message(self) -> str | None:
-        """Why there is no design: empty if there is one, None if there is nothing new to report."""
+        """Reason for a missing design: empty if there is a design, None if the reason was reported before."""
         return "" if self.proposal is not None else self.note or None
 
 
@@ -38,7 +38,7 @@ class ProposalRequests:
     """Requests proposals, until a fault that another request cannot mend.
 
     Args:
-        proposer: whom to ask.
+        proposer: the proposer.
         seed: of the run.
         notify: called with the number of the trial before each request.
     """
@@ -90,7 +90,7 @@ class ProposalRequests:
         """Return the message for the user; only the first request that meets a final fault reports it."""
         if not fault.final:
             return str(fault)
-        return f"{fault}; no more questions are asked in this session" if self.stop(fault.kind) else ""
+        return f"{fault}; no more requests are made in this session" if self.stop(fault.kind) else ""
 
 
 def _check_design(history: History, number: int, proposal: Proposal) -> ProposalSlot:

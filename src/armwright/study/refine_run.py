@@ -54,9 +54,7 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
         evaluations: number of evaluations per design.
     """
     if not POPULATION <= evaluations <= MAX_EVALUATIONS:
-        raise SettingsError(
-            f"evaluations = {evaluations} for each design: from {POPULATION} to {MAX_EVALUATIONS} can be spent"
-        )
+        raise SettingsError(f"evaluations per design: expected {POPULATION} to {MAX_EVALUATIONS}, got {evaluations}")
     path = Path(path)
     config, _ = read_run(path)
     method = config.study
@@ -65,8 +63,8 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
         summary = read_summary(path)
         if len(trials) < method.n_trials or summary is None:
             raise RunFolderError(
-                f"{path} is not finished ({len(trials)} of {method.n_trials} trials are there): give the command that "
-                "began it once more, then refine it"
+                f"{path} is not finished ({len(trials)} of {method.n_trials} trials); rerun the command that began it, "
+                "then refine it"
             )
         before = History(config.problem, tuple(trials), method.n_init, config.reference_point)
         members = worth_refining(before)

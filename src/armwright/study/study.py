@@ -35,7 +35,7 @@ from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, pa
 from armwright.study.schedule import ReplaySchedule, Schedule
 from armwright.study.settings import check_proposer, check_settings, run_config, study_method
 
-POLL_SECONDS = 0.1  # between two checks for requests of the watcher, while there is nothing else to do
+POLL_SECONDS = 0.1  # between two checks for requests of the watcher while the study waits
 
 
 def optimize(
@@ -59,7 +59,7 @@ def optimize(
     """Optimise a problem: n_init random trials, then n_total counted ones in blocks of n_step.
 
     Args:
-        problem: what is evaluated.
+        problem: the problem.
         proposer: "rules", "none", "auto" (a configured model, else the rules), "llm", or a Proposer.
         sampler: "tpe", "tpe-multivariate", "nsga2", "gp", "random", or a factory seed -> Optuna sampler.
         n_init: random trials.
@@ -68,8 +68,8 @@ def optimize(
         in_flight: requests to the proposer that run while black-box trials go on; None: the study waits for each.
         refine_every: after so many counted trials, the next free one refines a design of the front.
         initial_designs: designs of the first of the n_init trials, such as an existing arm.
-        on_model_failure: if the model fails before the first trial, "stop" raises ModelError, and "continue" goes on
-            with black-box trials. A run that has started always goes on.
+        on_model_failure: if the model fails before the first trial, "stop" raises ModelError, and "continue" runs
+            black-box trials only. A run that has started always continues.
         verify: whether the final front is verified (`runs/verification.py`); never with an evaluator.
         workers: processes that evaluate the designs; None: this process.
         seed: of all random numbers.
@@ -173,7 +173,9 @@ class Study:
             discard_results(self._folder.path)  # those of fewer trials
             self._config = self._folder.note_versions(self._config, self._problem.evaluator)
         if self._workers is not None:
-            self._backend = DaskBackend(self._problem, self._workers, self._report_news)
+            self._backend = DaskBackend(
+                self._problem, self._workers, lambda note: self._report("beginning", len(self._trials), note=note)
+            )
         self._schedule = self._new_schedule()
         with closing(self._schedule):
             for number in range(first, self._method.n_trials):
@@ -198,10 +200,10 @@ class Study:
         except ModelError as fault:
             if on_model_failure == "stop" and not self._trials:
                 raise
-            consequence = "the run goes on"
+            consequence = "the run continues"
             if fault.final is not None:
                 self._requests.stop(fault.final)
-                consequence = "no questions are asked in this session"
+                consequence = "no requests are made in this session"
             self._report("beginning", len(self._trials), self._proposer.name, note=f"{fault}; {consequence}")
             self._channel.report("evaluating", len(self._trials), str(fault))
 
@@ -233,7 +235,7 @@ class Study:
             raise StoppedError(self._folder.path)
         if control.paused and not self._is_paused:
             self._channel.report("paused", number)
-            self._report("paused", number, note="paused by its watcher, who can let it go on; Ctrl-C ends it")
+            self._report("paused", number, note="paused by a watcher, who can resume it; Ctrl-C ends it")
         self._is_paused = control.paused
         if control.paused or (self._pending and number == self._method.n_init):
             return False
@@ -291,7 +293,7 @@ class Study:
         return *self._black_box.inject(given, number, source, proposal_id), source
 
     def _take_results(self, timeout: float) -> None:
-        """Pass all finished evaluations to the sampler, and record the trials whose turn it is.
+        """Pass all finished evaluations to the sampler, and record the trials that no missing one precedes.
 
         Args:
             timeout: how long to wait for the first result [s].
@@ -354,10 +356,6 @@ class Study:
         assert self._proposer is not None
         self._channel.report("asking", number)
         self._report("proposing", number, self._proposer.name, note=self._proposer.announce(number))
-
-    def _report_news(self, note: str) -> None:
-        """Report news of the workers."""
-        self._report("beginning", len(self._trials), note=note)
 
     def _report(
         self, doing: Activity, number: int, source: str = "", *, fault: str | None = None, note: str = ""
