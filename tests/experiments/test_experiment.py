@@ -73,10 +73,10 @@ def test_paper_experiment_matches_the_paper() -> None:
     assert plan.task_list == ("target-1", "target-2", "target-3")
     assert plan.seed_list == (0, 1, 2, 3, 4)
     assert (plan.n_init, plan.n_total) == (10, 200)
-    asked = {key: method for key, method in plan.methods.items() if method.asks_a_model}
+    asked = {key: method for key, method in plan.methods.items() if method.needs_a_model}
     steps = {key: method.n_step for key, method in asked.items() if method.model_options.prompt == "plus"}
     assert steps == {"llm-plus-5": 5, "llm-plus": 10, "llm-plus-50": 50}
-    assert all(method.model_options.temperature == 0 for method in plan.methods.values() if method.asks_a_model)
+    assert all(method.model_options.temperature == 0 for method in plan.methods.values() if method.needs_a_model)
     table = published(plan).values
     assert table["BBO", "target-1"] == (6.70, 2.03)
     assert table["BBO/LLM-", "target-2"] == (13.87, 2.33)

@@ -27,7 +27,7 @@ def show_plan(
         console.print(f"several at a time: {install_command('distributed')}")
     for note in notes_on_cells(skipped, ()):
         console.print(note)
-    with_model = [cell for cell in due if cell.plan.asks_a_model and cell.replay is None]
+    with_model = [cell for cell in due if cell.plan.needs_a_model and cell.replay is None]
     if with_model:
         proposals = sum(-(-cell.n_total // cell.plan.n_step) for cell in with_model)
         models = ", ".join(sorted({str(cell.plan.model_options.model) for cell in with_model}))

@@ -81,13 +81,13 @@ class Skipped:
 
 
 def plan_cells(
-    plan: ExperimentPlan, beside: Path, out: Path, replay: Path | None = None
+    plan: ExperimentPlan, folder: Path, out: Path, replay: Path | None = None
 ) -> tuple[list[Cell], list[Skipped]]:
     """Return the cells that can be run, by seed, task and method, and those that cannot.
 
     Args:
         plan: The experiment.
-        beside: Folder of the files that the experiment names.
+        folder: Folder of the files that the experiment names.
         out: Folder of the experiment's results.
         replay: Folder of an earlier experiment, whose recorded runs replace the model.
     """
@@ -96,14 +96,14 @@ def plan_cells(
     n_cells = len(plan.task_list) * len(plan.seed_list) * len(plan.methods)
     if n_cells > MAX_CELLS:
         raise SettingsError(f"the experiment has {n_cells:,} cells; expected at most {MAX_CELLS:,}")
-    space = None if plan.space is None else str((beside / plan.space).resolve())
-    tasks = [_task(name, beside) for name in plan.task_list]
+    space = None if plan.space is None else str((folder / plan.space).resolve())
+    tasks = [_task(name, folder) for name in plan.task_list]
     names = [name for _, name in tasks]
     if len(set(names)) < len(names):
         raise SettingsError(f"expected tasks with different names, got {', '.join(sorted(names))}")
     ready: list[Cell] = []
     skipped: list[Skipped] = []
-    methods = {key: _with_prompt(method, beside) for key, method in plan.methods.items()}
+    methods = {key: _with_prompt(method, folder) for key, method in plan.methods.items()}
     # By seed first: an experiment that is stopped early then has results of every method.
     for seed, (task, task_name), (key, method) in itertools.product(plan.seed_list, tasks, methods.items()):
         cell = Cell(
@@ -130,7 +130,7 @@ def plan_cells(
 
 def _with_model_source(cell: Cell, replay: Path | None) -> tuple[Cell, str]:
     """Return the cell with its model or replay; or the reason why it has neither."""
-    if not cell.plan.asks_a_model:
+    if not cell.plan.needs_a_model:
         return cell, ""
     if replay is not None:
         recorded = replay.resolve() / RUNS / cell.method / cell.task_name / f"seed{cell.seed}"
@@ -142,9 +142,9 @@ def _with_model_source(cell: Cell, replay: Path | None) -> tuple[Cell, str]:
     return cell, ""
 
 
-def _task(name: str, beside: Path) -> tuple[str, str]:
+def _task(name: str, folder: Path) -> tuple[str, str]:
     """Return the argument for `load_task`, independent of the working directory, and the task's name."""
-    file = beside / name
+    file = folder / name
     if Path(name).suffix in (".yaml", ".yml"):
         if not file.is_file():
             raise TaskError(f"there is no file {file}, which the experiment names as a task")
@@ -152,12 +152,12 @@ def _task(name: str, beside: Path) -> tuple[str, str]:
     return name, load_task(name).name
 
 
-def _with_prompt(method: MethodPlan, beside: Path) -> MethodPlan:
+def _with_prompt(method: MethodPlan, folder: Path) -> MethodPlan:
     """Return the method with the path of its prompt file made absolute."""
     options = method.model_options
     if options.prompt in PROMPTS:
         return method
-    options = options.model_copy(update={"prompt": str((beside / options.prompt).resolve())})
+    options = options.model_copy(update={"prompt": str((folder / options.prompt).resolve())})
     return method.model_copy(update={"model_options": options})
 
 

@@ -170,7 +170,7 @@ class Comparison:
 
     @property
     def is_undecidable(self) -> bool:
-        """Whether some contrast has too few pairs for any test at 5 %."""
+        """True if some contrast has too few pairs for any test at 5 %."""
         return any(not can_reject(contrast.test.n) for contrast in self.contrasts)
 
     @cached_property

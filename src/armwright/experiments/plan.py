@@ -36,8 +36,8 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     model_options: ModelOptions = ModelOptions()
 
     @property
-    def asks_a_model(self) -> bool:
-        """Whether it needs a language model, or a recorded run of one."""
+    def needs_a_model(self) -> bool:
+        """True if it needs a language model, or a recorded run of one."""
         return self.design is None and self.proposer == "llm"
 
     def choose_proposer(self, replay: Path | None = None) -> Choice:
@@ -173,7 +173,7 @@ def with_model(plan: ExperimentPlan, options: ModelOptions) -> ExperimentPlan:
     """
     methods: dict[str, MethodPlan] = {}
     for key, method in plan.methods.items():
-        if method.asks_a_model and method.model_options.model is None:
+        if method.needs_a_model and method.model_options.model is None:
             configured = configured_model(method.model_options.with_defaults(options))
             if configured is not None:
                 method = method.model_copy(update={"model_options": configured.options})

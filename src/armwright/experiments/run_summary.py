@@ -17,8 +17,6 @@ from armwright.runs.folder import read_config, read_run
 from armwright.runs.history import History
 from armwright.runs.results import read_summary
 
-LABELS = {"rules": "rules", "llm": "LLM", "manual": "people", "scripted": "scripted"}  # of built-in proposers
-
 
 @dataclass(frozen=True)
 class RunSummary:
@@ -82,12 +80,12 @@ class RunSummary:
 
     @property
     def is_flagged(self) -> bool:
-        """Whether too many proposals failed for the run to represent its method."""
+        """True if too many proposals failed for the run to represent its method."""
         return bool(self.proposer.get("flagged"))
 
     @property
     def is_scripted(self) -> bool:
-        """Whether a scripted stand-in answered instead of a model."""
+        """True if a scripted stand-in answered instead of a model."""
         return self.proposer.get("origin") == "scripted"
 
     @property
@@ -123,7 +121,7 @@ def describe_method(config: RunConfig) -> str:
     text = "BBO" if method.sampler == "tpe" else f"BBO ({method.sampler})"
     if method.proposer is not None:
         name = str(method.proposer["name"])
-        text += f"/{LABELS.get(name, name)}"
+        text += "/LLM" if name == "llm" else f"/{name}"
         text += {"plus": "+", "minus": "-"}.get(str(method.proposer.get("prompt", "")), "")
         if model := method.proposer.get("model"):
             text += f" {model}"

@@ -111,7 +111,7 @@ def _check_extras(cells: Sequence[Cell]) -> None:
     """Raise MissingExtraError before any cell is run, rather than in each."""
     for cell in cells:
         sampler_factory(cell.plan.sampler)
-        if cell.plan.asks_a_model and cell.replay is None:
+        if cell.plan.needs_a_model and cell.replay is None:
             import_module("armwright.llm.client")
 
 

@@ -222,9 +222,9 @@ class _Source(importlib.abc.SourceLoader):
 def _file_module(path: Path, source: bytes) -> ModuleType:
     """Import a Python file as a module; it can import its neighbours, as a program can."""
     name = f"armwright_evaluator_{path.stem}"
-    beside = str(path.resolve().parent)
-    if beside not in sys.path:
-        sys.path.insert(0, beside)
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
     spec = importlib.util.spec_from_loader(name, _Source(path, source))
     assert spec is not None
     assert spec.loader is not None

@@ -35,7 +35,7 @@ _LOOKS = {
     "rules": Look("rules", "#D55E00", "^", 44, "////"),
     "llm": Look("language model", "#CC79A7", "^", 44, "\\\\\\\\"),
     "scripted": Look("scripted stand-in", "#CC79A7", "v", 44, "\\\\\\\\"),
-    "manual": Look("people", "#E69F00", "s", 36, "xxxx"),
+    "manual": Look("manual", "#E69F00", "s", 36, "xxxx"),
 }
 EXISTING = Look("existing arm", "#56B4E9", "P", 70)
 FRONT = "#111111"

@@ -1,1 +1,1 @@
-"""What may be varied, and how a design becomes an arm."""
+"""Design spaces: the parameters of a design, and the arm that it builds."""

@@ -186,7 +186,7 @@ class DesignSpace(SpaceSchema, frozen=True):
 
     @property
     def is_toy(self) -> bool:
-        """Whether even the heaviest arm is nearly massless, as in the paper."""
+        """True if even the heaviest arm is nearly massless, as in the paper."""
         heaviest = max((record.mass for record in self.actuators), default=0.0)
         return self.max_joints * (self.mass.mass(self.link[1]) + heaviest) < TOY_MASS
 

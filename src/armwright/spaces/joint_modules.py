@@ -30,17 +30,17 @@ class Module:
 
     @property
     def is_revolute(self) -> bool:
-        """Whether its joints rotate."""
+        """True if its joints rotate."""
         return self.joints[0][0] == "revolute"
 
     @property
     def is_prismatic(self) -> bool:
-        """Whether its joint translates."""
+        """True if its joint translates."""
         return self.joints[0][0] == "prismatic"
 
     @property
     def is_actuated(self) -> bool:
-        """Whether it has an actuator for each of its joints."""
+        """True if it has an actuator for each of its joints."""
         return self.is_revolute or self.is_prismatic
 
 

@@ -174,7 +174,7 @@ class Design:
 
     @property
     def mount(self) -> str | None:
-        """What the arm is mounted on; None if it is not a parameter of the space."""
+        """The surface that the arm is mounted on; None if it is not a parameter of the space."""
         return None if "mount" not in self.params else str(self.params["mount"])
 
     @property

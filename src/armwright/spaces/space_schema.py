@@ -46,7 +46,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     origin_z: Range = (-1.0, 1.0)
     """Range of the base position along z [m]."""
     mount: tuple[Mount, ...] = Field(default=("floor",), min_length=1)
-    """What the arm is mounted on; several choices add the parameter mount."""
+    """Surface that the arm is mounted on; several choices add the parameter mount."""
     link: Range = (0.03, 0.30)
     """Range of the length of each link [m]."""
     link_directions: tuple[Direction, ...] = Field(default=("+z",), min_length=1)

@@ -1,1 +1,1 @@
-"""What the arm is for: targets, moves, obstacles, workspace and the built-in tasks."""
+"""Tasks: targets, moves, obstacles, workspace and the built-in tasks."""

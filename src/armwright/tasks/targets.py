@@ -22,7 +22,7 @@ Position = tuple[Coordinate, Coordinate, Coordinate]
 
 REACHED = 1e-3  # [m]; a target nearer than this counts as reached
 ALIGNED = math.radians(1.0)  # [rad]; likewise for a target's axis or orientation
-AXIS, ORIENTATION = 2, 3  # number of angles that a target asks for; 0 for a point
+AXIS, ORIENTATION = 2, 3  # number of angles that count at a target; 0 for a point
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class TargetArrays:
 
     @property
     def oriented(self) -> bool:
-        """True if any target asks for more than its point."""
+        """True if any target has an axis or an orientation."""
         return bool(self.n_angular.any())
 
     @property

@@ -202,7 +202,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @property
     def cases_description(self) -> str:
-        """The variations in `cases` beside the nominal task; empty if there are none."""
+        """The variations in `cases` other than the nominal task; empty if there are none."""
         factors = ", ".join(f"{factor:g}" for factor in self.payload_factors)
         parts = [f"of payloads {factors} times as heavy"] if factors else []
         if self.target_noise > 0.0:
