@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from armwright.exceptions import ReplayError, SettingsError
+from armwright.exceptions import ReplayError, RunFolderError, SettingsError
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.transcript import Transcript
+from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.factory import choose_proposer
 from armwright.proposers.proposer import Proposer
@@ -286,6 +286,19 @@ def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path:
     assert run.trials[5].fault == "missing"
     assert "holds no proposal for trial 5; check n_init and n_step" in "".join(notes)
     assert run.summary["proposer"]["flagged"]
+
+
+@pytest.mark.parametrize("key", ["answer", "known", "requests", "cost_usd", "seconds"])
+def test_a_recorded_call_without_a_key_is_damaged(tmp_path: Path, key: str) -> None:
+    call = Call("llm-0004", "answer", "Which?", answer="{}", origin="model", model="m")
+    path = tmp_path / "transcripts.jsonl"
+    Transcript(path).add(call)
+    assert Transcript(path).calls == (call,)
+    content = json.loads(path.read_text())
+    del content[key]
+    path.write_text(json.dumps(content) + "\n")
+    with pytest.raises(RunFolderError, match="line 1 is damaged"):
+        ReplayProposer(path)
 
 
 def test_invalid_recordings_are_refused(tmp_path: Path) -> None:

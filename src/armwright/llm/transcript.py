@@ -5,12 +5,12 @@ import json
 import os
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, cast
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors
@@ -139,4 +139,12 @@ def _read(path: Path, mend: bool) -> Iterator[Call]:
             raise RunFolderError(f"{path}, line {number} is damaged; restore the file or delete the line") from fault
 
 
-_CALL = TypeAdapter(Call)
+def _check_complete(content: Any) -> Any:
+    """Refuse a line that lacks a key, although the fields of questions and replies have defaults."""
+    if isinstance(content, dict) and (missing := _REQUIRED - content.keys()):
+        raise ValueError(f"missing: {', '.join(sorted(missing))}")
+    return cast("Any", content)
+
+
+_REQUIRED = {field.name for field in fields(Call)} - {"hints", "fault", "error"}
+_CALL = TypeAdapter(Annotated[Call, BeforeValidator(_check_complete)])
