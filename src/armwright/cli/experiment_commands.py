@@ -63,13 +63,13 @@ def experiment(
         print(plan.builtin_text(name), end="")
         return
     console = open_console(json_ or print_commands)
-    whole, beside = plan.load_experiment(name)
+    whole, folder = plan.load_experiment(name)
     chosen = plan.with_model(
         plan.with_seeds(plan.with_only(whole, method or (), task or ()), seeds),
         load_model_options(model_options, model=model),
     )
     out = out or Path("experiments") / chosen.name
-    cells, skipped = plan_cells(chosen, beside, out, replay)
+    cells, skipped = plan_cells(chosen, folder, out, replay)
     before = [done for cell in cells if (done := running.finished_before(cell)) is not None]
     finished = {done.cell for done in before}
     due = [cell for cell in cells if cell not in finished]

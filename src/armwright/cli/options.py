@@ -17,6 +17,7 @@ EVALUATION, OUTPUT = "Evaluation", "Output"
 TaskName = Annotated[
     str, typer.Argument(metavar="TASK", help="A built-in task (see `armwright tasks`) or a YAML file.")
 ]
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 SpaceFile = Annotated[
     Path | None, typer.Option(help="Design space as a YAML file.", show_default="the paper's", rich_help_panel=TASK)
 ]
@@ -119,7 +120,7 @@ def load_problem(
         loaded = loaded.model_copy(update={"objectives": None, "reference_point": None})
         chosen = named_objectives(names, measured.objectives) if names else measured.objectives
     elif objectives is not None and names != (loaded.objectives or tuple(o.name for o in PAPER_OBJECTIVES)):
-        # the task's reference point is for its own objectives
+        # the task's reference point applies to its own objectives only
         loaded = loaded.model_copy(update={"objectives": names, "reference_point": None})
     return Problem(
         loaded,

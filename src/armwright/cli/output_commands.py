@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.options import Json, ModelName, ModelOptionsFile, SpaceFile, load_problem
+from armwright.cli.options import Json, ModelName, ModelOptionsFile, RunFolder, SpaceFile, load_problem
 from armwright.cli.streams import open_console, print_json
 from armwright.exceptions import FailureError, SettingsError
 
 
 def pick(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    run: RunFolder,
     where: Annotated[
         list[str] | None, typer.Option(help='A condition such as "position_error<=0.05" (may be repeated).')
     ] = None,
@@ -48,7 +48,7 @@ def pick(
 
 
 def export(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    run: RunFolder,
     design: Annotated[
         int | None, typer.Option(help="Number of the design.", show_default="the knee of the front")
     ] = None,
@@ -97,7 +97,7 @@ def report(
 
 
 def live(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run that is in progress or finished.")],
+    run: RunFolder,
     host: Annotated[
         str, typer.Option(help="Address to listen on; any other than the default opens the page to a network.")
     ] = "127.0.0.1",

@@ -18,6 +18,7 @@ from armwright.cli.options import (
     Objectives,
     PromptName,
     Robust,
+    RunFolder,
     Scheduler,
     Seed,
     SpaceFile,
@@ -230,7 +231,7 @@ def optimize(
 
 
 def refine(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a finished run.")],
+    run: RunFolder,
     evaluations: Annotated[int, typer.Option(help="Evaluations per design of the front.")] = 1000,
     json_: SummaryJson = False,
 ) -> None:

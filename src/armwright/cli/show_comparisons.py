@@ -1,4 +1,4 @@
-"""Print experiments, comparisons of methods, and existing arms beside designs."""
+"""Print experiments, comparisons of methods, and existing arms next to designs."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -72,7 +72,7 @@ def show_files(console: Console, tables: Sequence[Path], figures: Sequence[Path]
 
 
 def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]) -> None:
-    """Print existing arms beside designs, with the base of each arm."""
+    """Print existing arms next to designs, with the base of each arm."""
     objectives, space = comparison.problem.objectives, comparison.problem.space
     others = [o for o in objectives if o not in MEASURES and o.name != "mass"]
     title = "; ".join(filter(None, (f"Arms on {comparison.problem.task.name}", payload_note(comparison.problem.task))))

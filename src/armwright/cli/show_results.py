@@ -1,4 +1,4 @@
-"""Print the results of runs: fronts, attribution, costs and where the files lie."""
+"""Print the results of runs: fronts, attribution, costs and the paths of the files."""
 
 import math
 import shlex

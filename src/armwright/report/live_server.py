@@ -21,7 +21,7 @@ from armwright.extras import check_extra
 
 LOOPBACK = "127.0.0.1"
 HTTP_PORT = 80  # omitted in addresses
-POLL = 0.25  # [s] between two looks for open pages
+POLL = 0.25  # [s] between checks for open pages
 GRACE = 3.0  # [s] to wait for a first page after the study has ended
 LINGER = 60.0  # [s] to wait for a page to come back, such as a tab in the background
 
@@ -103,10 +103,10 @@ def _hosts(host: str, listener: socket.socket) -> Callable[[str], bool]:
     """Return the check of Host headers for this address."""
     address, port = cast("tuple[str, int]", listener.getsockname()[:2])
     if not _is_loopback(address):
-        return lambda asked: True  # on a network, any name may lead here
+        return lambda host: True  # on a network, any name may lead here
     names = {f"[{name}]" if ":" in name else name for name in (host.lower(), address, "localhost", LOOPBACK, "::1")}
     known = {f"{name}:{port}" for name in names}
-    return lambda asked: asked.lower() in known or (port == HTTP_PORT and asked.lower() in names)
+    return lambda host: host.lower() in known or (port == HTTP_PORT and host.lower() in names)
 
 
 def _is_loopback(address: str) -> bool:

@@ -142,8 +142,8 @@ def _of_arm(history: History, number: int) -> dict[str, float]:
 def pack(head: Mapping[str, Any], arrays: Arrays) -> bytes:
     """Pack a JSON head and arrays: the head's length (uint32, little-endian), the head, then the arrays.
 
-    The head's "arrays" says of each its type, where it begins after the head [bytes], and its shape. All begin at
-    multiples of 8, so that a script can look at them where they lie.
+    The head's "arrays" holds the type, the offset after the head [bytes] and the shape of each array. Offsets are
+    multiples of 8, so that a script can use the arrays in place.
     """
     places: dict[str, Any] = {}
     parts: list[bytes] = []
@@ -178,7 +178,7 @@ def _designs(history: History, numbers: range) -> Arrays:
 
 def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
     """Return the arms joint by joint, padded to J joints; `joints`: (n,) the number that an arm has."""
-    own = [arm.joints + (NO_JOINT,) * (room - len(arm.joints)) for arm in arms]
+    joints = [arm.joints + (NO_JOINT,) * (room - len(arm.joints)) for arm in arms]
     links = [arm.links + (NO_LINK,) * (room - len(arm.links)) for arm in arms]
 
     def floats(rows: Any) -> NDArray[np.float32]:
@@ -187,9 +187,9 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
     return {
         **{name: floats([getattr(arm, name) for arm in arms]) for name in ("base", "tool", "tool_axis", "tool_side")},
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
-        "kind": np.array([[KINDS.index(j.kind) for j in row] for row in own], dtype=np.uint8),
-        "axis": np.array([[AXES.index(j.axis) for j in row] for row in own], dtype=np.uint8),
-        **{name: floats([[getattr(j, name) for j in row] for row in own]) for name in ("lower", "upper", "travel")},
+        "kind": np.array([[KINDS.index(j.kind) for j in row] for row in joints], dtype=np.uint8),
+        "axis": np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.uint8),
+        **{name: floats([[getattr(j, name) for j in row] for row in joints]) for name in ("lower", "upper", "travel")},
         "offset": floats([[link.offset for link in row] for row in links]),
         "com": floats([[link.total_com for link in row] for row in links]),
         "mass": floats([[link.total_mass for link in row] for row in links]),

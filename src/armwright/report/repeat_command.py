@@ -14,14 +14,14 @@ from armwright.spaces.design_space import builtin_spaces, load_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.tasks.catalogue import builtin_names, load_task
 
-OWN_TASK, OWN_SPACE = "TASK.yaml", "SPACE.yaml"  # placeholders for the user's own files
+CUSTOM_TASK, CUSTOM_SPACE = "TASK.yaml", "SPACE.yaml"  # placeholders for files of the user
 DEFAULTS = {"sampler": "tpe", "n_init": 10, "n_step": 10, "n_total": 200}
 
 
 def repeat_command(config: RunConfig, refined: bool = False, spent: int | None = None) -> str:
     """Return the shell command that repeats a run, without options at their defaults.
 
-    The user's own task, space and initial designs appear as TASK.yaml, SPACE.yaml and DESIGN-1.json; their content is
+    Custom tasks, spaces and initial designs appear as TASK.yaml, SPACE.yaml and DESIGN-1.json; their content is
     in the run's config.yaml.
 
     Args:
@@ -30,7 +30,7 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
         spent: Evaluations of a direct search.
 
     Returns:
-        The command; empty if objectives, sampler or proposer are the user's own code.
+        The command; empty if objectives, sampler or proposer are custom code.
     """
     name = config.task.name
     if any(record.name not in OBJECTIVES for record in config.objectives) or config.tolerance not in (0.0, TOLERANCE):
@@ -41,7 +41,7 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     settings: dict[str, Any] = {}
     n_designs = 0
     if "paper" not in spaces:
-        settings["space"] = spaces[0] if spaces else OWN_SPACE
+        settings["space"] = spaces[0] if spaces else CUSTOM_SPACE
     if isinstance(config.method, FrontMethod):
         first = config.method.initial_designs or {}
         settings |= {"budget": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
@@ -56,7 +56,7 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     options = [text for key, value in given.items() for text in (f"--{key.replace('_', '-')}", str(value))]
     options += [text for n in range(n_designs) for text in ("--initial-design", f"DESIGN-{n + 1}.json")]
     options += ["--robust"] * (config.tolerance > 0.0)
-    line = shlex.join(["armwright", command, name if is_builtin else OWN_TASK, *options, "--seed", str(config.seed)])
+    line = shlex.join(["armwright", command, name if is_builtin else CUSTOM_TASK, *options, "--seed", str(config.seed)])
     return f"{line} && armwright refine RUN" if refined else line
 
 

@@ -6,26 +6,26 @@ import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./format.js";
 
-const CELLS = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // m, sides of the grid's cells
-const MOST_CELLS = 16; // along one side
-const MOVE = 700; // ms from one posture to the next
-const REST = 500; // ms at a target, when playing
-const VIEW = [0.55, -1, 0.42]; // from where one looks at first
-const FILLS = 0.8; // of the frame's radius, below which an arm is seen too small
-const ARROW = 0.16; // of the frame's radius, long
-const SLACK = 0.2; // of the frame's radius, by which an arm may leave it before it grows
+const CELLS = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 50, 100]; // [m] possible sides of the grid's cells
+const MOST_CELLS = 16; // most cells along one side of the grid
+const MOVE = 700; // [ms] from one posture to the next
+const REST = 500; // [ms] at a target while playing
+const VIEW = [0.55, -1, 0.42]; // initial direction of the camera
+const FILLS = 0.8; // an arm smaller than this share of the frame's radius gets a new frame
+const ARROW = 0.16; // length of arrows, as a share of the frame's radius
+const SLACK = 0.2; // share of the frame's radius by which an arm may leave it before it grows
 
-const [HIT, NOW] = ["#009E73", "#E69F00"]; // of targets
+const [HIT, NOW] = ["#009E73", "#E69F00"]; // colours of targets
 
 let content = null;
 let scene = null, camera = null, controls = null, renderer = null;
-const groups = {}; // what is drawn anew by itself
+const groups = {}; // parts that are redrawn separately
 let materials = {};
-let frame = null; // { centre, radius } of what there is to see
+let frame = null; // { centre, radius } of the visible scene
 let moving = null; // { from, to, began } in joint space
 let playing = false;
-let turned = false; // whether the user has chosen from where to look
-let unit = {}; // shapes of size 1, which all parts share
+let turned = false; // whether the user has rotated the view
+let unit = {}; // unit shapes, shared by all parts
 
 export function openArm(shownContent) {
   content = shownContent;
@@ -64,13 +64,13 @@ export function openArm(shownContent) {
 }
 
 
-// Where the joints of the drawn arm are, from what is drawn; for tests.
+// Returns the positions of the drawn joints; for tests.
 export function drawnJoints() {
   return groups.arm.children.filter((mesh) => mesh.userData.joint !== undefined)
     .map((mesh) => mesh.position.toArray());
 }
 
-// The corners of what is drawn of obstacles, in the world; for tests.
+// Returns the corners of the drawn obstacles in the world; for tests.
 export function drawnObstacles() {
   return groups.obstacles.children.map((part) => {
     part.updateMatrixWorld();
@@ -98,7 +98,7 @@ function begin() {
   }
   $("arm").append(renderer.domElement);
   controls = new THREE.OrbitControls(camera, renderer.domElement);
-  renderer.domElement.style.touchAction = "pan-y"; // a finger that goes up or down scrolls the page
+  renderer.domElement.style.touchAction = "pan-y"; // vertical swipes scroll the page
   controls.addEventListener("change", render);
   controls.addEventListener("start", () => { turned = true; });
   new ResizeObserver(fit).observe($("arm"));
@@ -120,7 +120,7 @@ function paint() {
   };
 }
 
-// What the colours mean; letters as in the names of designs.
+// Draws the legend; letters as in the names of designs.
 function legend() {
   const { joint } = content.head.colours, labels = content.head.joint_labels;
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], labels[axis]]),
@@ -162,7 +162,7 @@ function ball(place, radius, material) {
   return mesh;
 }
 
-// What there is to see of the selected design: the targets, and the arm in all postures.
+// Returns the points of the selected design that must be visible: targets, and the arm in all postures.
 function extent() {
   const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high])];
   for (const i of new Set([state.design, state.compared ?? state.design])) {
@@ -173,7 +173,7 @@ function extent() {
   return { low, high };
 }
 
-// Makes a frame that holds it; one that is there already stays, unless the arm leaves it.
+// Fits the frame to the design; an existing frame stays unless the arm leaves it.
 function reframe() {
   const { low, high } = extent(), radius = Math.max(1e-3, Math.hypot(...high.map((v, k) => v - low[k])) / 2);
   if (frame !== null) {
@@ -251,14 +251,14 @@ function drawObstacles() {
   for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, frame, materials.obstacle));
 }
 
-// The straight moves of the tip.
+// Draws the straight moves.
 function drawMoves() {
   empty(groups.moves);
   const points = content.head.moves.flatMap(([start, end]) => [...content.targets[start], ...content.targets[end]]);
   if (points.length) groups.moves.add(segments(points, new THREE.LineBasicMaterial({ color: content.head.colours.target })));
 }
 
-// The edges of the boxes that the tip should cover.
+// Draws the edges of the boxes to cover.
 function drawWorkspace() {
   empty(groups.workspace);
   const points = content.head.workspace.flatMap(({ low, high }) => [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].flatMap((corner) => {
@@ -277,7 +277,7 @@ function drawTargets() {
   content.targets.forEach(drawGoal);
 }
 
-// Where the tool should point to: an arrow for its z, of a whole orientation its x and y, too.
+// Draws the required tool direction: an arrow along z, and for a full orientation also along x and y.
 function drawGoal(target, t) {
   const { n_angular, rotation } = content.head.target_arrays, size = ARROW * frame.radius;
   if (!n_angular[t]) return;
@@ -294,10 +294,10 @@ function drawGoal(target, t) {
 
 const ballSize = () => 0.028 * frame.radius;
 
-// A link is drawn as thick as it is, as far as that can be seen and hides nothing.
+// Links have their own thickness, limited so that they stay visible and hide nothing.
 const thick = (arm, j) => Math.min(Math.max(arm.radius[j], 0.008 * frame.radius), 0.035 * frame.radius);
 
-// A cylinder from one place to another.
+// Returns a cylinder between two points.
 function rod(from, to, radius, material) {
   const [a, b] = [new THREE.Vector3(...from), new THREE.Vector3(...to)], way = b.clone().sub(a);
   const mesh = new THREE.Mesh(unit.rod, material);
@@ -321,7 +321,7 @@ function drawPosture(group, arm, q, paints) {
     group.add(joint);
   }
   const radius = thick(arm, 0);
-  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.tool_axis[k]); // the base's plate
+  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.tool_axis[k]); // end of the base plate
   group.add(rod(behind(2.05 * radius), behind(1.15 * radius), 2.4 * radius, paints.base));
   if (length(arm.tool) > 0) group.add(rod(ends.at(-1), joints.at(-1), 0.6 * radius, paints.base));
   const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
@@ -359,7 +359,7 @@ export function drawArm() {
   render();
 }
 
-// The line from the tip to a target that is missed.
+// Draws the line from the tip to a missed target.
 function gap(tip) {
   const target = content.targets[state.target];
   const line = segments([...tip, ...target], materials.gap);
@@ -367,7 +367,7 @@ function gap(tip) {
   groups.arm.add(line);
 }
 
-// Turns the joints from the posture that is drawn to the one of the selected target.
+// Animates the joints from the drawn posture to that of the selected target.
 function move() {
   if (!scene || state.design === null) return;
   const to = Array.from(content.q(state.design, state.target));

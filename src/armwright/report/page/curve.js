@@ -1,4 +1,4 @@
-// The hypervolume over the iterations, and who gained what.
+// The hypervolume over the iterations, and the gain of each source.
 
 import { set } from "./state.js";
 import { $, colour, element, isTouched, number, onTheme, percent, plain } from "./format.js";
@@ -75,7 +75,7 @@ function ofSearch(search) {
   }];
 }
 
-// A design is credited with what it added when it came.
+// The gain of a design is the hypervolume that it added when it was evaluated.
 function gains() {
   const { curve } = content, gained = new Map();
   if (content.head.result.search || !curve.length) {

@@ -1,4 +1,4 @@
-// Numbers and elements, as all parts of the page show them. Text is set as text: names and answers are no markup.
+// Formats of numbers, and elements. Text is never markup, so names and answers are safe.
 
 export const $ = (id) => document.getElementById(id);
 
@@ -24,7 +24,7 @@ export const percent = (share, digits = 1) => `${(100 * share).toFixed(digits)} 
 export const millimetres = (metres) => (metres >= 1 ? `${number(metres, 3)} m` : `${number(1000 * metres, 3)} mm`);
 export const plural = (n, word) => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
 
-// Metres to a tenth of a millimetre, so that columns stand under each other.
+// Metres to a tenth of a millimetre, so that columns align.
 export const metres = (value) => value.toFixed(4).replace(/^-(?=[0.]+$)/, "");
 
 export const isTouched = () => matchMedia("(pointer: coarse)").matches;
@@ -36,7 +36,7 @@ export function duration(seconds) {
   return `${(seconds / 3600).toFixed(1)} h`;
 }
 
-// Plotly reads a few tags in its texts.
+// Escapes the tags that Plotly interprets.
 export const plain = (text) => String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
 
 export const title = (objective) => plain(`${objective.label} [${objective.unit.replace(" x ", " × ")}]`);
@@ -45,12 +45,12 @@ export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
-// Calls back when the system goes dark or light.
+// Calls the listener when the colour scheme changes.
 export function onTheme(listener) {
   for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", listener);
 }
 
-// What is nearly black on paper is nearly white in the dark.
+// Nearly black colours become nearly white in a dark scheme.
 export const shown = (paint) => (paint === "#111111" || paint === "#000000" ? colour("ink") : paint);
 
 export function save(name, text, type) {

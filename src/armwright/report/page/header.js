@@ -1,4 +1,4 @@
-// The run's title, its key figures and its configuration.
+// The title of the run, its key figures and its configuration.
 
 import { $, duration, element, number, percent, plural } from "./format.js";
 

@@ -1,4 +1,4 @@
-// Where an arm is in a posture, and what holds it up: the formulas of armwright/kinematics, in double precision.
+// Forward kinematics and static torques: the formulas of armwright/kinematics in double precision.
 
 const GRAVITY = 9.81; // m/s², along -z
 const REVOLUTE = 0;
@@ -11,7 +11,7 @@ const at = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
 const column = (m, k) => [m[k], m[3 + k], m[6 + k]];
 const turned = (m, v) => [0, 3, 6].map((r) => m[r] * v[0] + m[r + 1] * v[1] + m[r + 2] * v[2]);
 
-// m, 3 x 3 by rows, turned about its own axis k by an angle.
+// Rotates m (3 x 3 by rows) about its own axis k by an angle [rad].
 function rotated(m, k, angle) {
   const [i, j] = [(k + 1) % 3, (k + 2) % 3], [s, c] = [Math.sin(angle), Math.cos(angle)];
   const out = m.slice();
@@ -41,7 +41,7 @@ export function chain(arm, q) {
   return { joints: [...joints, add(place, turned(frame, arm.tool))], ends, axes, centres, tool: [x, cross(z, x), z] };
 }
 
-// Torques of the joints' motors [N m] that hold the arm and its payload [kg] up against gravity.
+// Returns the joint torques [N m] that hold the arm and its payload [kg] against gravity.
 export function holding(arm, posed, payload) {
   const { joints, axes } = posed, tip = joints.at(-1);
   const loads = [...posed.centres.map((place, k) => [arm.mass[k], place]), [payload, tip]];
@@ -56,7 +56,7 @@ export function holding(arm, posed, payload) {
   });
 }
 
-// Where a sliding joint's rail begins and ends, in a posture.
+// Returns the ends of a prismatic joint's rail in a posture.
 export function rail(arm, posed, q, j) {
   const along = (way) => posed.joints[j].map((v, k) => v + posed.axes[j][k] * (way - q[j]));
   return [along(arm.lower[j]), along(arm.upper[j])];
@@ -66,11 +66,11 @@ export function rail(arm, posed, q, j) {
 export function angleOff(tool, frame, isWhole) {
   const goal = [0, 1, 2].map((k) => column(frame, k));
   if (!isWhole) return Math.atan2(length(cross(tool[2], goal[2])), dot(tool[2], goal[2]));
-  const skew = tool.map((axis, k) => cross(axis, goal[k])).reduce(add); // 2 sin of the angle, along what it turns about
+  const skew = tool.map((axis, k) => cross(axis, goal[k])).reduce(add); // 2 sin(angle) times the axis of rotation
   return Math.atan2(length(skew), tool.reduce((sum, axis, k) => sum + dot(axis, goal[k]), -1));
 }
 
-// The longest distance from the first joint that the tip could have [m].
+// Returns the largest possible distance of the tip from the first joint [m].
 export function reach(arm) {
   let sum = length(arm.tool);
   for (let j = 0; j < arm.kind.length; j++) {

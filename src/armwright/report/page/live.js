@@ -1,4 +1,4 @@
-// The same page while the run goes on: asks its server for what is new, and sends what the user wants.
+// The page of a run in progress: fetches new content from its server, and sends requests of the user.
 
 import { $, duration, element } from "./format.js";
 
@@ -10,14 +10,14 @@ let token = "";
 let status = null;
 let busy = false, behind = false, lost = false;
 
-// The part of the run that the page lacks.
+// Fetches the part of the run that the page lacks.
 async function fetchRun() {
   const reply = await fetch(`run?designs=${content.n}&calls=${content.calls.length}`);
   if (!reply.ok) throw new Error(await reply.text());
   return reply.arrayBuffer();
 }
 
-// How a design's file is got where the page does not hold it; null offline.
+// Fetches the file of a design that the page does not hold; null offline.
 export function fileFetcher() {
   if ($("content")) return null;
   return async (design, format) => {
@@ -39,10 +39,10 @@ export function openLive(shownContent, taken) {
     const text = $("hint-text").value.trim();
     if (text && (await send({ action: "hint", text }))) $("hint-text").value = "";
   });
-  // A browser has six connections to a server for all of its tabs; those that nobody sees do without.
+  // A browser allows six connections to a server over all its tabs, so hidden tabs disconnect.
   listenTo();
   document.addEventListener("visibilitychange", listenTo);
-  setInterval(show, 1000); // the seconds of what goes on
+  setInterval(show, 1000); // updates the elapsed seconds
 }
 
 let events = null;
@@ -51,7 +51,7 @@ function listenTo() {
   events?.close();
   events = null;
   if (document.hidden) return;
-  events = new EventSource("events"); // asks again by itself when the connection is lost
+  events = new EventSource("events"); // reconnects automatically
   events.addEventListener("status", (event) => {
     lost = false;
     const before = status;

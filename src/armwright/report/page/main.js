@@ -1,4 +1,4 @@
-// Opens the page: with what it holds, or with what its server sends.
+// Opens the page with its embedded content or with that of its server.
 
 import { drawArm, drawnJoints, drawnObstacles, openArm } from "./arm.js";
 import { Content, embedded } from "./content.js";
@@ -16,7 +16,7 @@ import { $ } from "./format.js";
 const content = new Content();
 let isOpen = false;
 
-// The design to begin with: of the address, else the knee of the front.
+// Selects the design of the address, or else the knee of the front.
 function begin() {
   const selected = fromAddress(content);
   if (selected.design === undefined) selected.design = ranked(content, content.head.front)[0] ?? (content.n ? 0 : null);
@@ -40,7 +40,7 @@ function open() {
   $("loading").hidden = true;
 }
 
-// After more was added.
+// Redraws the page after content was added.
 function grow() {
   drawHeader();
   drawCurve();
@@ -59,7 +59,7 @@ function take(buffer) {
     open();
     return;
   }
-  const isAnother = content.n < known || content.head.designs_from === 0; // the run began anew, or was refined
+  const isAnother = content.n < known || content.head.designs_from === 0; // the run was restarted or refined
   if (isAnother) {
     forget();
     set({ design: Math.min(state.design ?? 0, content.n - 1), compared: null });
@@ -83,6 +83,6 @@ async function start() {
   if (data && content.n === 0) $("loading").textContent = "The run has no finished design yet.";
 }
 
-// For whoever opens the console, and for tests.
+// For the console and for tests.
 window.armwright = { content, state, set, postures, drawnJoints, drawnObstacles, drawArm };
 start();

@@ -1,14 +1,14 @@
-// The designs in the plane of two objectives: who found them, their front, and which one is selected.
+// The designs in the plane of two objectives: their sources, their front and the selected design.
 
 import { listen, set, state } from "./state.js";
 import { $, colour, element, isTouched, number, onTheme, plain, plural, title } from "./format.js";
 
 const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
-const VIEW = 1.35; // of the reference point, the part of the plane that is shown first
-const PRECISE = 0.02; // of the reference point
-const FLOOR = 1e-4; // m; on a logarithmic axis smaller errors are drawn here
-const DENSE = 100; // designs of a front, from which on outlines would eat the dots
-const MARKS = [0.05, 0.35, 0.65, 1]; // of the iterations: 10, 70, 130, 200 of 200
+const VIEW = 1.35; // initial range of the axes, as a multiple of the reference point
+const PRECISE = 0.02; // errors below this share of the reference point count as precise
+const FLOOR = 1e-4; // [m] smaller errors are drawn here on a logarithmic axis
+const DENSE = 100; // from this number of designs on a front, markers have no outlines
+const MARKS = [0.05, 0.35, 0.65, 1]; // shares of the iterations: 10, 70, 130, 200 of 200
 const CONFIG = {
   displaylogo: false, responsive: true, plotlyServerURL: "",
   modeBarButtons: [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]],
@@ -58,7 +58,7 @@ export function growPareto() {
   if (content.objectives.length > 1) draw();
 }
 
-// Whether the front comes so near to the targets that only a logarithmic axis tells its designs apart.
+// Returns whether errors on the front are so small that only a logarithmic axis separates its designs.
 function isPrecise() {
   const reference = content.head.reference_point;
   if (reference === null) return false;
@@ -73,7 +73,7 @@ const counted = () => Math.max(0, content.n - content.nInit);
 const until = () => (state.iteration === null ? content.n : content.nInit + state.iteration);
 const placed = (value, axis) => (log && axis === 0 ? Math.max(value, FLOOR) : value);
 
-// Numbers of the feasible, non-dominated designs among the first n in the two objectives that are shown, by rising x.
+// Returns the feasible designs among the first n that are non-dominated in the shown objectives, by rising x.
 export function frontUntil(n) {
   const order = [...Array(n).keys()].sort((a, b) => {
     const [u, v] = [content.values(a), content.values(b)];
@@ -93,7 +93,7 @@ function slider() {
   const planned = content.head.config.method.n_total;
   const marks = MARKS.map((share) => Math.max(1, Math.round(share * planned))).filter((mark) => mark <= total);
   const list = [...new Set(marks)];
-  if (list.join() === $("marks").dataset.list) return; // so that a button keeps the focus
+  if (list.join() === $("marks").dataset.list) return; // keeps the focus of a button
   $("marks").dataset.list = list.join();
   $("marks").replaceChildren(...list.map((mark) => {
     const button = document.createElement("button");
@@ -231,8 +231,7 @@ function axis(objective, range, isLog) {
   };
 }
 
-// The rings around the selected and the compared design lie on the plot, so that to move them draws nothing anew,
-// however many designs there are.
+// Rings around the selected and the compared design are elements above the plot: moving them redraws nothing.
 function mark() {
   const { xaxis, yaxis } = $("pareto")._fullLayout, [width, height] = [xaxis._length, yaxis._length];
   for (const [id, i] of [["ring-selected", state.design], ["ring-compared", state.compared]]) {

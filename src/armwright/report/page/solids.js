@@ -1,8 +1,8 @@
-// Obstacles in space: what can be seen through, with the edges of boxes and the rims of cylinders.
+// Obstacles: translucent, with the edges of boxes and the rims of cylinders.
 
 const RIM = 48; // points of a circle
 
-// A world place of one in the obstacle's own frame.
+// Transforms a point from the obstacle's frame to the world.
 function placed({ centre, rotation }, p) {
   return [0, 1, 2].map((r) => centre[r] + rotation[r][0] * p[0] + rotation[r][1] * p[1] + rotation[r][2] * p[2]);
 }
@@ -13,10 +13,10 @@ function lines(points, material) {
   return new THREE.LineSegments(geometry, material);
 }
 
-// A four-sided prism stands for a box: its sides are 1 long before it is scaled.
+// A box is a four-sided prism with unit sides, scaled.
 const prism = () => new THREE.CylinderGeometry(Math.SQRT1_2, Math.SQRT1_2, 1, 4, 1, false, Math.PI / 4);
 
-// Meshes and lines of an obstacle; the ground is a plate below the frame { centre, radius } that is looked at.
+// Returns the meshes and lines of an obstacle; the ground is a plate below the visible frame { centre, radius }.
 export function solidParts(solid, frame, { face, edge }) {
   const { shape, half, rotation, centre } = solid;
   if (shape === "ground") {
@@ -30,7 +30,7 @@ export function solidParts(solid, frame, { face, edge }) {
   }
   const geometry = shape === "sphere" ? new THREE.SphereGeometry(1, 32, 20)
     : shape === "box" ? prism() : new THREE.CylinderGeometry(1, 1, 1, RIM);
-  // These stand along their own y; obstacles along their z: y is taken for z, and z for -y.
+  // Shapes of three.js are upright along y, obstacles along z: swap the axes.
   const mesh = new THREE.Mesh(geometry, face);
   const [a, b, c] = half, wide = shape === "box" ? 2 : 1, high = shape === "sphere" ? 1 : 2;
   const columns = [0, 1, 2].map((k) => [0, 1, 2].map((r) => rotation[r][k]));

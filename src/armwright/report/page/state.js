@@ -1,12 +1,12 @@
-// What the user looks at, and who wants to know when it changes.
+// The selection of the user, and its listeners.
 
 const listeners = [];
 
 export const state = {
   design: null, // number of the selected design
-  compared: null, // of one that stays in sight
+  compared: null, // number of the design that stays visible for comparison
   target: 0,
-  iteration: null, // how far the Pareto plot shows; null: to the end
+  iteration: null, // last iteration in the Pareto plot; null: all
 };
 
 export function listen(listener) {
@@ -20,7 +20,7 @@ export function set(change) {
   if (changed.size) for (const listener of listeners) listener(changed);
 }
 
-// The address says what is selected: #design=42&target=3, targets counted from 1.
+// The address holds the selection: #design=42&target=3, targets counted from 1.
 export function fromAddress(content) {
   const query = new URLSearchParams(location.hash.slice(1)), found = {};
   const design = Number.parseInt(query.get("design"), 10), target = Number.parseInt(query.get("target"), 10);
