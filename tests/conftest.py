@@ -1,4 +1,4 @@
-"""Fixtures shared by all tests, the two tiers of the suite, and a home that is not the user's.
+"""Shared fixtures, the two tiers of the suite, and isolation from the user's home.
 
 `make test` runs what is not slow, `make test-all` the rest. A test is slow if it is marked so, lies in one of
 SLOW_FOLDERS or uses one of SLOW_FIXTURES. A test that is not slow fails if it starts a process.
@@ -50,7 +50,7 @@ def _own_home(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
 
 @pytest.fixture
 def chat_server() -> Iterator[ChatServer]:
-    """An OpenAI-compatible server on 127.0.0.1 that answers as a test tells it."""
+    """Yield a local OpenAI-compatible server with scripted answers."""
     with ChatServer() as server:
         yield server
 
@@ -73,7 +73,7 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def pytest_collection_finish() -> None:
-    """What all tests share lives to the end: the collector need not look at it again and again."""
+    """Freeze shared objects, so that the garbage collector skips them."""
     gc.collect()
     gc.freeze()
 

@@ -1,4 +1,4 @@
-"""Hostile files and answers, each of which once broke something: refused in one line, or read.
+"""Hostile files and answers that once caused a failure are read or refused in one line.
 
 `tests/fuzz` found most of them.
 """

@@ -1,4 +1,4 @@
-"""Fronts and hypervolumes against pymoo, and by what must hold for any points."""
+"""Fronts and hypervolumes against pymoo, and their properties."""
 
 import numpy as np
 import pytest

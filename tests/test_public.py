@@ -1,4 +1,4 @@
-"""The public face: what `import armwright as aw` offers."""
+"""The public API of `import armwright as aw`."""
 
 import ast
 import re

@@ -196,7 +196,7 @@ def test_version_and_help() -> None:
 
 
 def test_optimize_shows_its_options_in_groups() -> None:
-    """At most 25 of them, --help included, and as many parameters: options that travel together are one value."""
+    """At most 25 options, --help included, and as many parameters."""
     shown = armwright("optimize", "--help", COLUMNS="120").stdout
     groups = ["Arguments", "Options", "Task", "Search", "Language model", "Evaluation", "Output"]
     assert re.findall(r"^╭─ ([\w ]+) ─", shown, re.MULTILINE) == groups
@@ -343,7 +343,7 @@ def test_damaged_run_folder_exits_with_1(in_folder: Path) -> None:
 
 @pytest.mark.parametrize("place", ["file/run", "/proc/armwright"])
 def test_unwritable_output_folder_exits_with_1(in_folder: Path, place: str) -> None:
-    """Also as root, whom a read-only mode does not stop."""
+    """This also holds for root, who may write to read-only folders."""
     (in_folder / "file").write_text("")
     assert f"cannot write {place}" in refused(1, "optimize", "target-1", *SHORT, "--out", place)
 
@@ -367,7 +367,7 @@ def test_unwritable_output_is_one_line(in_folder: Path, command: tuple[str, ...]
 
 
 def test_file_and_folder_names_are_printed_literally(in_folder: Path) -> None:
-    """No markup, no emoji, and a task file of any name."""
+    """No markup or emoji is interpreted, for a task file of any name."""
     made = armwright("init", "мой [b] файл.yaml")
     assert made.returncode == 0, made.stderr
     done = armwright("optimize", "мой [b] файл.yaml", *SHORT, "--out", "o/[red]a:smile:[/b]")
@@ -401,7 +401,7 @@ def test_ctrl_c_leaves_a_resumable_run(in_folder: Path) -> None:
 def test_ctrl_c_cancels_model_calls_in_flight(
     chat_server: ChatServer, in_folder: Path, in_flight: int | None, refused: int
 ) -> None:
-    """While the server holds its answers back, the command ends, keeps what was paid for, and says how to go on."""
+    """While the server withholds its answers, the command ends, records paid answers, and says how to resume."""
     released = threading.Event()
 
     def answer(request: Request) -> Answer:
@@ -447,7 +447,7 @@ cli.main()
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_interrupt_dropped_by_python_still_ends_the_command(name: str) -> None:
-    """As in finalisers and in callbacks of libraries, where no exception leads out."""
+    """This happens in finalisers and library callbacks, where exceptions cannot propagate."""
     done = subprocess.run([sys.executable, "-c", DROPPED.format(name=name)], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 

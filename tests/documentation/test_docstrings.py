@@ -1,4 +1,4 @@
-"""The examples in docstrings."""
+"""Doctests of the public modules."""
 
 import doctest
 from importlib import import_module

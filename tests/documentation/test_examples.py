@@ -1,4 +1,4 @@
-"""The examples, run as a user runs them."""
+"""Run the examples as a user does."""
 
 import json
 import re
@@ -97,7 +97,7 @@ def test_zdt1_example_runs(chat_server: ChatServer) -> None:
 
 @pytest.mark.slow
 def test_example_without_a_model_falls_back_to_rules() -> None:
-    """And that rules propose in its place."""
+    """Rules propose instead."""
     said = run("optuna_zdt1.py", "--n-trials", "20")
     assert "No language model is configured (--model, ARMWRIGHT_MODEL): built-in rules propose instead." in said
     assert "2 proposals by rules" in said
@@ -123,7 +123,7 @@ def test_python_code_of_the_optuna_page_runs(in_folder: Path, capsys: pytest.Cap
 
 
 def test_mujoco_example_follows_the_ik_postures() -> None:
-    """Motors strong enough bring the tip to where the inverse kinematics has it, within what gravity bends."""
+    """Strong motors bring the tip to the IK posture, up to the deflection by gravity."""
     follow = aw.load_evaluator(f"{EXAMPLES}/mujoco_simulation.py:follow")
     problem = aw.Problem(aw.load_task("target-1"))
     designs = problem.space.sample(3, 0)

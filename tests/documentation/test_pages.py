@@ -1,6 +1,6 @@
-"""Everything that the documentation shows is tried: commands are run, files are loaded, programs are executed.
+"""Run the commands and programs of the documentation, and load its files.
 
-What cannot be run here stands in NOT_RUN, by name and with the reason; its options are checked all the same.
+Commands that cannot run here are listed in NOT_RUN with the reason; their options are still checked.
 """
 
 import os
@@ -80,7 +80,7 @@ BEFORE = {
 
 
 def cli() -> dict[str, Any]:
-    """Each command by its name, as Typer parses it."""
+    """Return Typer's commands by name."""
     return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 
 
@@ -89,7 +89,7 @@ def reason_not_to_run(command: str) -> str:
 
 
 def parsed(arguments: Sequence[str]) -> None:
-    """Arguments of armwright, taken apart by its own parser; nothing is run."""
+    """Parse the arguments of a command without running it."""
     name, *rest = arguments
     assert name in cli(), f"there is no command {name}"
     cli()[name].make_context(f"armwright {name}", list(rest))
@@ -159,7 +159,7 @@ def test_files_named_in_sentences_exist() -> None:
 
 
 def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[str]:
-    """A line as a user types it, in a folder, with armwright on the path."""
+    """Run a line as a user types it, in a folder, with armwright on the path."""
     program = folder / ".bin" / "armwright"
     if not program.is_file():
         program.parent.mkdir()
@@ -182,7 +182,7 @@ def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[st
 
 
 def planned(experiment: str, folder: Path, where: str) -> None:
-    """All cells of an experiment, as commands that could be run."""
+    """Check that all cells of an experiment are valid commands."""
     cells = shell(f"{experiment} --print-commands", folder, where).stdout.splitlines()
     assert len(cells) > 20
     for line in cells:
@@ -201,7 +201,7 @@ def test_long_experiments_can_be_planned(experiment: str, in_folder: Path) -> No
 
 
 def run_command(command: Command, folder: Path) -> str:
-    """What it prints, or writes into the file that it names."""
+    """Return what a command prints, or writes to the file it names."""
     text = command.text.replace(".venv/bin/", "")
     if LONG.fullmatch(text):
         if "mine.yaml" in text:  # the others are planned once for all pages
@@ -215,12 +215,12 @@ def run_command(command: Command, folder: Path) -> str:
 
 
 def letters(text: str) -> str:
-    """What of an output is the same on every processor."""
+    """Return the letters of an output, which do not depend on the processor."""
     return " ".join(re.findall(r"[A-Za-z]+", text))
 
 
 def file_of(block: Block) -> str | None:
-    """The file that a block is shown as: the paragraph before it ends with its name and a colon."""
+    """Return the file name that the paragraph before a block states."""
     before = "\n".join((ROOT / block.page).read_text(encoding="utf-8").splitlines()[: block.line - 1]).rstrip()
     found = re.search(r"`([\w-]+\.\w+)`:$", before)
     return found[1] if found else None
@@ -229,7 +229,7 @@ def file_of(block: Block) -> str | None:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", FOLLOWED)
 def test_page_can_be_followed(page: str, in_folder: Path) -> None:
-    """Its commands, files and programs, from the first to the last, in one folder."""
+    """Run commands and programs and write files in order, in one folder."""
     shutil.copytree(ROOT / "examples", in_folder / "examples")
     for name, file in (("ur3", "ur3_robot"), ("so101", "so101")):
         shutil.copy(robot(file), in_folder / f"{name}.urdf")
@@ -285,7 +285,7 @@ def test_files_shown_on_a_page_load(block: Block, in_folder: Path) -> None:
 
 
 def test_every_code_block_has_a_tested_language() -> None:
-    """What commands print is text; formulas and drawings have no language."""
+    """Printed output is text; formulas and drawings have no language."""
     for page in PAGES:
         for block in blocks(page):
             assert block.language in ("sh", "yaml", "csv", "python", "jinja", "text", ""), block.where
@@ -294,7 +294,7 @@ def test_every_code_block_has_a_tested_language() -> None:
 
 
 def test_keys_of_an_experiment_method_are_options() -> None:
-    """The reference tells them by the help of `armwright optimize`."""
+    """The reference documents them by the help of `armwright optimize`."""
     options = {parameter.name for parameter in cli()["optimize"].params}
     assert set(ExperimentPlan.model_fields["methods"].annotation.__args__[1].model_fields) <= options | {
         "label",

@@ -53,7 +53,7 @@ def test_python_reference_lists_every_public_name_once() -> None:
 
 
 class Loaded(HTMLParser):
-    """The addresses that a page loads by itself."""
+    """Addresses that a page loads by itself."""
 
     def __init__(self, text: str) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The stored baselines belong to the tasks and the best known fronts that they lie beside."""
+"""Stored baselines match the tasks and their best known fronts."""
 
 import runpy
 

@@ -1,4 +1,4 @@
-"""Existing arms on a task, compared with the designs of a run."""
+"""Compare existing arms with the designs of a run."""
 
 import json
 import subprocess

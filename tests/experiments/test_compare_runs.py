@@ -39,7 +39,7 @@ TASKS = ("target-1", "random-4")
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Black box and rules on two tasks with three seeds, 12 counted trials each."""
+    """Run black box and rules on two tasks with three seeds, 12 counted trials each."""
     place = tmp_path_factory.mktemp("runs")
     for task in TASKS:
         for proposer in ("none", "rules"):
@@ -102,7 +102,7 @@ def test_overall_contrast_counts_every_task_once(runs: Path) -> None:
     gains = [0.9, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
 
     def as_task(run: RunSummary, i: int) -> RunSummary:
-        """The same run on another task, the rules' hypervolume so many times as large."""
+        """Return the run on another task, with the hypervolume of rules scaled."""
         gain = gains[i] if "rules" in run.method else 1.0
         history = [gain * value for value in run.summary["hypervolume"]["history"]]
         summary = {**run.summary, "hypervolume": {**run.summary["hypervolume"], "history": history}}

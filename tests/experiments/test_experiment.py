@@ -1,4 +1,4 @@
-"""Experiments: what a file stands for, and that its cells are run once, wherever that is."""
+"""Experiment files, and running each cell exactly once."""
 
 import csv
 import json
@@ -54,7 +54,7 @@ def file_of(folder: Path, **changes: Any) -> Path:
 
 
 def asking(server: ChatServer, **settings: Any) -> dict[str, Any]:
-    """A method that asks our server."""
+    """Return a method that calls the local server."""
     named = {"model": "test-model", "base_url": server.url, "origin": "scripted"}
     return {"label": "BBO/LLM+", "proposer": "llm", "n_step": 3, "model_options": named, **settings}
 
@@ -64,7 +64,7 @@ def invoke(*arguments: str | Path) -> Any:
 
 
 def run_here(file: Path, *options: str) -> Any:
-    """The command for an experiment, whose cells run in this process."""
+    """Run an experiment with its cells in this process."""
     return invoke("experiment", file, "--workers", "0", "--no-figures", *options)
 
 

@@ -1,4 +1,4 @@
-"""What is said of a few runs, against scipy, statsmodels and by properties."""
+"""Statistics of few runs, against scipy and statsmodels."""
 
 import gc
 

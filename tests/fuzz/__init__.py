@@ -1,4 +1,4 @@
-"""Input that somebody made up: valid documents changed at random, and what has to come of each.
+"""Fuzzing: randomly mutated documents are read or refused, never mishandled.
 
 python -m tests.fuzz --help      # or make fuzz
 """

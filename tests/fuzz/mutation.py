@@ -1,4 +1,4 @@
-"""Valid documents changed at random: values that break programs in the place of good ones, and damaged bytes."""
+"""Mutate valid documents: replace values by hostile ones and damage bytes."""
 
 import copy
 import json

@@ -1,4 +1,4 @@
-"""Clearance: Coal says how far convex shapes are apart, Pinocchio where the links are."""
+"""Clearance against Coal, with link poses from Pinocchio."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -41,7 +41,7 @@ def random_obstacle(rng: np.random.Generator, kind: str, spread: float = 0.7, si
 
 
 def coal_shape(obstacle: Obstacle) -> tuple[Any, coal.Transform3s]:
-    """As Coal has it, from what the file says; the frame alone is ours, and tested by itself."""
+    """Return an obstacle in Coal; only the frame is ours, and it is tested separately."""
     solid = obstacle.solid
     at = coal.Transform3s(solid.rotation, np.array(solid.centre))
     match obstacle:
@@ -67,7 +67,7 @@ def apart(one: tuple[Any, coal.Transform3s], other: tuple[Any, coal.Transform3s]
 
 
 def agree(ours: float, theirs: float) -> bool:
-    """The distance where both are apart; where they are in each other, that they are, as depths are defined apart."""
+    """Compare distances of separate shapes; for penetrating ones only the sign, as depths are defined differently."""
     return abs(ours - theirs) < NEAR if theirs > NEAR else ours < 2 * NEAR
 
 
@@ -160,7 +160,7 @@ def test_clearance_of_whole_arms_agrees_with_coal(dof: int, precision: Precision
 
 
 def test_clearance_of_nearly_parallel_segments_is_accurate() -> None:
-    """Thousands of arms that fold onto themselves, nearly in a plane, where a common normal is hard to find."""
+    """Arms folded onto themselves, nearly in a plane, make common normals ill-conditioned."""
     rng = np.random.default_rng(0)
     arms = []
     for _ in range(1500):
@@ -277,7 +277,7 @@ def planar(lengths: Sequence[float], radius: float = 0.015) -> Arm:
 
 @pytest.mark.parametrize("short", [0.0, 0.001, 0.02, 0.03, 0.05, 0.06, 0.2])
 def test_straight_arm_is_clear_of_itself(short: float) -> None:
-    """However short its middle links are, the nearest is two radii away; folded back it is in itself."""
+    """With middle links of any length the clearance is two radii; a folded arm penetrates itself."""
     arm = planar([0.2, short, 0.2, short, short, 0.2])
     straight = clearances(stack_arms([arm]), np.zeros((1, 1, 6)))[0][0, 0]
     assert straight >= 0.03 - 1e-6

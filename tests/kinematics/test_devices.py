@@ -1,4 +1,4 @@
-"""The boundary of the kernels: threads, forks, the process's stderr, devices and their memory."""
+"""Threads, forks, stderr, devices and memory of the kernels."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Moving arms: Pinocchio and MuJoCo say what torques it takes, closed forms and finer steps how joints have to move."""
+"""Dynamics against Pinocchio, MuJoCo, closed forms and finer steps."""
 
 from collections.abc import Sequence
 from dataclasses import replace

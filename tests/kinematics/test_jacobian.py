@@ -1,4 +1,4 @@
-"""Manipulability and dexterity: Pinocchio has the Jacobian, scikit-robot the measure, two links a closed form."""
+"""Manipulability and dexterity against Pinocchio, scikit-robot and a closed form."""
 
 import numpy as np
 import pinocchio

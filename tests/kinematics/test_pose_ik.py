@@ -1,6 +1,6 @@
-"""Targets with an axis or an orientation: the kernels against peers and a plain reference, and by what must hold.
+"""Pose IK kernels against other libraries, a plain reference, and invariants.
 
-As in tests/kinematics/test_position_ik.py: single updates one by one, whole solves in distribution.
+As in tests/kinematics/test_position_ik.py, single updates are compared exactly and whole solves in distribution.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The kernels against peers (Pinocchio, MuJoCo, scikit-robot), against the plain reference, and by what must hold.
+"""Position IK kernels against Pinocchio, MuJoCo, scikit-robot, a plain reference, and invariants.
 
 The solver is chaotic in places, in float32 as in float64 (docs/method.md §2). So positions and torques are compared
 at postures, the solver by single updates, and whole solves in distribution.

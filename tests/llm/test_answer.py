@@ -1,4 +1,4 @@
-"""What is taken of an answer: lenient in form, strict in substance, refused in the words of the design space."""
+"""Reading answers: lenient about form, strict about values."""
 
 import json
 import random

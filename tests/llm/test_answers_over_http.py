@@ -1,4 +1,4 @@
-"""Answers over the real protocols: lenient in form, strict in values."""
+"""Answers over the vendors' protocols: lenient about form, strict about values."""
 
 import json
 from collections.abc import Callable, Iterable, Sequence

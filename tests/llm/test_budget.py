@@ -1,4 +1,4 @@
-"""What a run may spend, and what it says about it."""
+"""Call and cost budgets of a run, and its forecast."""
 
 import threading
 from collections.abc import Callable

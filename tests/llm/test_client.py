@@ -1,4 +1,4 @@
-"""The language model as a proposer, over the real protocol, against a server of our own on 127.0.0.1."""
+"""The language model proposer over HTTP, against a local server."""
 
 import json
 import threading

@@ -1,4 +1,4 @@
-"""Tasks and spaces drafted from a description, over the real protocols, against a server on 127.0.0.1."""
+"""Drafting tasks and spaces over HTTP, against a local server."""
 
 import json
 import re

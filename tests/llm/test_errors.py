@@ -1,4 +1,4 @@
-"""What goes wrong with a model, over the real protocols, against a server of our own that makes each fault."""
+"""Model faults over HTTP, against a local server that produces each of them."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence

@@ -1,6 +1,6 @@
-"""What the model is told: six golden files that a person has read, facts of other cases, and rules for all problems.
+"""Prompts: six reviewed golden files, facts of other cases, and properties of all prompts.
 
-The golden files are made again with: ARMWRIGHT_REMAKE_GOLDEN=1 python -m pytest tests/llm/test_prompt.py
+Rewrite the golden files with: ARMWRIGHT_REMAKE_GOLDEN=1 python -m pytest tests/llm/test_prompt.py
 """
 
 import json

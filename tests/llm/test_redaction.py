@@ -1,4 +1,4 @@
-"""Keys stay in the environment: a server that repeats them everywhere, and everything that is shown and written."""
+"""API keys never reach output or files, even if the server echoes them."""
 
 import base64
 import json

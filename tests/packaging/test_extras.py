@@ -1,4 +1,4 @@
-"""What is asked for without what it needs: one line, and the command that installs it."""
+"""Missing extras are reported in one line with the install command."""
 
 import re
 import sys

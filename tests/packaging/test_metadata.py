@@ -1,4 +1,4 @@
-"""What is said of the package in several places is the same."""
+"""Package metadata agrees everywhere."""
 
 import re
 import tomllib

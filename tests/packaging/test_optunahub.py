@@ -1,4 +1,4 @@
-"""The package for OptunaHub, loaded as OptunaHub loads it, and what its registry asks of a package."""
+"""The OptunaHub package, loaded by OptunaHub, and the requirements of its registry."""
 
 import re
 import subprocess

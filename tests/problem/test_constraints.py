@@ -1,4 +1,4 @@
-"""Constraints: what they say, and that infeasible designs count nowhere; against Optuna, pymoo and moocore."""
+"""Constraints, and infeasible designs in every result, against Optuna, pymoo and moocore."""
 
 import json
 from dataclasses import replace

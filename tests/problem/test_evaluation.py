@@ -1,4 +1,4 @@
-"""An evaluation: its shapes, and what its arrays say of each other."""
+"""Shapes and consistency of an evaluation."""
 
 from typing import Any
 

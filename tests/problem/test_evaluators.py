@@ -1,4 +1,4 @@
-"""Evaluators of one's own."""
+"""Custom evaluators."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Problems with one objective, or with three: a run completes, resumes, and its numbers are moocore's."""
+"""Runs with one and three objectives, named objectives, and payloads; against moocore and Pinocchio."""
 
 from dataclasses import replace
 from pathlib import Path

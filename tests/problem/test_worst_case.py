@@ -1,4 +1,4 @@
-"""The worst over payloads and over targets that are off, against each case as a task of its own."""
+"""Worst case over payloads and displaced targets, against each case as its own task."""
 
 from pathlib import Path
 

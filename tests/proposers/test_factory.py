@@ -1,4 +1,4 @@
-"""Which proposer a run gets, and which options it refuses."""
+"""The choice of a proposer, and options it refuses."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""People as the proposer: questions and answers as files."""
+"""Manual proposals through files."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""A recorded run played again: equal to the bit, without a network."""
+"""Replay of recorded runs: bit-identical and offline."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""The rules proposer by its properties: in the space, repeatable, without repeats, and worth a trial."""
+"""Properties of the rules proposer."""
 
 import itertools
 from typing import Any

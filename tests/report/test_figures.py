@@ -1,4 +1,4 @@
-"""The figures: what they hold, and that odd runs do not break them."""
+"""Content of the figures, and figures of unusual runs."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The live page: a real study in a process of its own, a real browser, a real server; each survives the others."""
+"""The live page, with a study in another process and a real browser."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""The page's server as an attacker meets it: another page in the same browser, and requests that no browser sends."""
+"""The live server under attack from other pages and hand-made requests."""
 
 import http.client
 import http.server

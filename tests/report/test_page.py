@@ -1,4 +1,4 @@
-"""report.html in a real browser: what it shows is the run, without a network, whatever the run's words are."""
+"""report.html in a real browser, offline."""
 
 import csv
 import io

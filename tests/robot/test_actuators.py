@@ -1,4 +1,4 @@
-"""Actuators: what they weigh loads the joints before them, what they can is what the torques are measured by."""
+"""Actuators: their masses as loads and their torques as limits."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What Arm, Joint and Link refuse, and what they promise."""
+"""Validation and properties of Arm, Joint and Link."""
 
 import math
 from dataclasses import FrozenInstanceError

@@ -1,4 +1,4 @@
-"""The MJCF of an arm in MuJoCo, against its URDF in Pinocchio, the plain reference and what was stated."""
+"""MJCF in MuJoCo, against the URDF in Pinocchio and the plain reference."""
 
 from dataclasses import replace
 from itertools import pairwise

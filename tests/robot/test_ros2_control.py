@@ -1,4 +1,4 @@
-"""The URDF with the tags of ros2_control: the URDF as it is without them, and interfaces within its limits."""
+"""URDF with ros2_control tags."""
 
 import io
 from xml.etree import ElementTree

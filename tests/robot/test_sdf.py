@@ -1,4 +1,4 @@
-"""The SDFormat model of an arm in Drake, whose parser is libsdformat, against its URDF in Pinocchio."""
+"""SDFormat in Drake (libsdformat), against the URDF in Pinocchio."""
 
 from typing import Any
 from xml.etree import ElementTree

@@ -1,4 +1,4 @@
-"""The SRDF of an arm in Pinocchio, beside its URDF; what it proves of collisions against Coal."""
+"""SRDF in Pinocchio, and its disabled collision pairs against Coal."""
 
 from collections import Counter
 from itertools import combinations

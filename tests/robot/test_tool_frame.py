@@ -1,4 +1,4 @@
-"""The tip of every format: where the tool ends, its z along the tool's axis and its x to the tool's side."""
+"""The tip frame of every export format."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Arms read from URDF: our own ones, and robots that are for sale, against Pinocchio's reading of the same files."""
+"""Reading URDF, our own and commercial robots, against Pinocchio."""
 
 from pathlib import Path
 

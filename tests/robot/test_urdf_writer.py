@@ -1,4 +1,4 @@
-"""The URDF of an arm, loaded as it stands by Pinocchio, MuJoCo, yourdfpy and scikit-robot."""
+"""URDF files in Pinocchio, MuJoCo, yourdfpy and scikit-robot."""
 
 import io
 from xml.etree import ElementTree

@@ -1,4 +1,4 @@
-"""The xacro of an arm, processed by the real xacro: its URDF by default, another arm with other arguments."""
+"""Xacro files, processed by xacro."""
 
 import io
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Who found what: shares that add up, whatever the trials are."""
+"""Attribution of hypervolume and front members to sources."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The channel between a running study and whoever watches it: pause, stop, hints, and what the study says of itself."""
+"""Pause, stop, hints and status of a running study."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Every format of `armwright export`, written for a design of a run and loaded by who it is for."""
+"""Every format of `armwright export`, loaded by its target program."""
 
 from collections.abc import Callable
 from pathlib import Path

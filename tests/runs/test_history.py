@@ -1,4 +1,4 @@
-"""Histories that grow from one another know what a history of all trials does, and compute only what is new."""
+"""Grown histories equal new ones and compute only new trials."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""SourceBias of designs: round lengths, bases on symmetry planes, repeats, the front's share."""
+"""Proposer bias: round lengths, bases on symmetry planes, repeats, front share."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a run leaves on disk, and what happens when it was damaged."""
+"""The files of a run, and damage to them."""
 
 import csv
 import json

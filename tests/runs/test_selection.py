@@ -1,4 +1,4 @@
-"""Choosing a design, and writing it for others."""
+"""Picking and exporting designs."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""Robust and sensitive: against the plain float64 reference, and by designs that are one or the other on purpose."""
+"""Verification of designs, against the plain float64 reference."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Refinement: better in every objective, within the space, counted, and the same each time."""
+"""Refinement by CMA-ES: improvements, counts and determinism."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The black box on Optuna, and each of the traps of asking, telling and injecting."""
+"""Optuna samplers: asking, telling and injecting designs."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""Designs to begin with: read from files, the first trials, known to the sampler, kept with the run."""
+"""Initial designs from files."""
 
 import json
 from pathlib import Path

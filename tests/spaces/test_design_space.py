@@ -1,4 +1,4 @@
-"""The design space: what it holds, what it builds, what it refuses."""
+"""The design space: parameters, arms, validation."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Spaces beyond the paper's: slides, fixed joints, two axes at one place, links in any direction, mounts, tools."""
+"""Spaces with slides, fixed and compound joints, link directions, mounts and tools."""
 
 from dataclasses import fields
 from pathlib import Path

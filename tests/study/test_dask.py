@@ -1,4 +1,4 @@
-"""Designs and cells evaluated by Dask workers: local processes, and a cluster from the shell."""
+"""Designs and cells evaluated by local and remote Dask workers."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Designs that a study draws again are recorded with the first one's values and not evaluated again."""
+"""Repeated designs are recorded without another evaluation."""
 
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace

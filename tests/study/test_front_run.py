@@ -1,4 +1,4 @@
-"""`front`: a search for the whole front in a run folder: counted, resumed, seeded, refused."""
+"""`armwright design`: front searches in a run folder."""
 
 import dataclasses
 import json

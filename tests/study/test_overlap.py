@@ -1,4 +1,4 @@
-"""Overlap: questions go on while black-box trials run; the ratio is kept, and nothing is paid for twice."""
+"""Model calls in flight while black-box trials run."""
 
 import random
 import threading

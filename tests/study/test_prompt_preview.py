@@ -1,4 +1,4 @@
-"""`armwright prompt`: what it prints is, to the byte, what is sent."""
+"""`armwright prompt` prints exactly the prompts that are sent."""
 
 import json
 import threading

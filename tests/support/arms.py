@@ -1,4 +1,4 @@
-"""Random arms to test with: the paper's, and ones with nothing regular about them."""
+"""Random arms for tests: of the paper's space, and irregular ones."""
 
 import numpy as np
 

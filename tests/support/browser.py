@@ -1,4 +1,4 @@
-"""A real browser: Debian's chromium, or whichever is on the path, with WebGL in software."""
+"""A real browser: Chromium from the path, with WebGL in software."""
 
 import shutil
 from collections.abc import Iterator

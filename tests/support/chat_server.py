@@ -1,4 +1,4 @@
-"""A small real server on 127.0.0.1 that answers as a test tells it.
+"""A local model server with scripted answers.
 
 It speaks OpenAI's chat completions (…/chat/completions) and Anthropic's messages (…/v1/messages).
 """

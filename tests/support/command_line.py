@@ -1,4 +1,4 @@
-"""Run armwright's command line: in the test's own process, which costs no start-up time, or in another one."""
+"""Run armwright's command line in this process or in another one."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""A Dask scheduler and workers, each a process of its own as from a shell, and an evaluator that tests can hold."""
+"""Dask scheduler and workers as shell processes, and an evaluator that tests can hold."""
 
 import json
 import os

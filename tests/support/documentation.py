@@ -1,4 +1,4 @@
-"""What the documentation shows: its commands, programs and files, as blocks of the pages."""
+"""Commands, programs and files shown in the documentation."""
 
 import re
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Arms to export, and what Pinocchio makes of their URDF: the oracle of the other formats.
+"""Arms to export, and their URDF in Pinocchio as the oracle of the other formats.
 
 That this is our arm is what test_urdf, test_mjcf and test_kinematics prove.
 """

@@ -1,4 +1,4 @@
-"""Marks for tests of what an extra brings: skipped, with the way out, if it is not installed."""
+"""Skip marks for tests that need an extra."""
 
 import pytest
 

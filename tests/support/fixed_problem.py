@@ -1,4 +1,4 @@
-"""Problems whose evaluation is a simple formula, the same on every machine; and histories of them."""
+"""Problems evaluated by simple formulas, equal on every machine, and their histories."""
 
 from collections.abc import Sequence
 from dataclasses import replace

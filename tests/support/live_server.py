@@ -1,4 +1,4 @@
-"""The live page of a finished run, served by a thread of this process, and requests to it."""
+"""Serve the live page of a finished run from a thread, and send requests to it."""
 
 import http.client
 import json

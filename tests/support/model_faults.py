@@ -1,6 +1,6 @@
-"""What goes wrong between us and a model, in the vendors' own words: OpenAI's and Anthropic's.
+"""Faults of model servers, as OpenAI and Anthropic report them.
 
-Each fault is an answer for ChatServer. FAULTS holds them under the words that armwright has for them.
+Each fault is an answer for ChatServer. FAULTS groups them by armwright's kind of fault.
 """
 
 import json

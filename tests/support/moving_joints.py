@@ -1,4 +1,4 @@
-"""The kernels for arms with the same joints fixed, in the moving joints alone: as the references have them."""
+"""Kernel results in the moving joints only, as the references have them."""
 
 from typing import Any
 

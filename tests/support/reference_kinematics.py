@@ -1,4 +1,4 @@
-"""The physics of docs/method.md in plain float64 numpy: what the kernels are compared with.
+"""The physics of docs/method.md in plain float64 numpy, as a reference for the kernels.
 
 Written from the text, with the matrices as they stand there: slow, plain, and apart from the kernels on
 purpose. Everything is batched: N arms at T targets, so q is (N, T, D) for D moving joints. A fixed joint

@@ -1,4 +1,4 @@
-"""URDF files of robots that are for sale, from packages that come with the tests; and random ones."""
+"""URDF files of commercial robots from test packages, and random ones."""
 
 from importlib import metadata
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The ways in which a model is spoken to, each with the proposer that speaks so to a test's server."""
+"""Wire formats of models, each with a proposer that uses it with a local server."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Straight moves: Pinocchio says where the tip is and what holds it, a closed form which joints take it there."""
+"""Straight moves against Pinocchio and a closed form."""
 
 from collections.abc import Sequence
 from dataclasses import replace

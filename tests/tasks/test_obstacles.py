@@ -1,4 +1,4 @@
-"""Obstacles: what a file may say of them, and that they come from there to the prompt, the figures and the page."""
+"""Obstacles in task files, prompts, figures and the page."""
 
 from collections.abc import Sequence
 from copy import copy

@@ -1,4 +1,4 @@
-"""Symmetry planes: of known sets, and of any set that was mirrored, however it is turned."""
+"""Symmetry planes of known and of random mirrored sets."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Targets that say more than their points: from the file to objectives, prompts and reports."""
+"""Targets with orientations, weights and tolerances."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Tasks: the built-in ones, files, points from CSV."""
+"""Built-in tasks, task files, and targets from CSV."""
 
 import contextlib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Workspaces: scipy says whether points are spread evenly, closed forms which of them arms reach."""
+"""Workspaces against scipy and closed forms."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The run that the others are held against, and what the suite came to, said at its end."""
+"""The reference run of the fault tests, and their final report."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Commands that are killed at random moments and given again, until they end; what must hold on the way and at the end.
+"""Kill commands at random moments and repeat them until they end, checking invariants.
 
 A scenario is a command; the same command never killed is its reference. A kill falls, by chance, into the start of the
 process, into its search (at a random amount of work) or into what comes after (results, page, figures; at a random

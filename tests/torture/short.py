@@ -1,4 +1,4 @@
-"""A short study on the command line, for faults that are made on purpose, and who may do less than root."""
+"""A short study on the command line for fault injection, also as an unprivileged user."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""A clock that jumps, by libfaketime: into the past, the future, before 1970; while a command goes on."""
+"""Clocks that jump during a command (libfaketime)."""
 
 import threading
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Files of a run cut short, and with others' bytes: the run goes on as it was, or one line names the file."""
+"""Truncated and overwritten run files: the run resumes, or one line names the file."""
 
 import json
 import random

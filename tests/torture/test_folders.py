@@ -1,4 +1,4 @@
-"""Folders that are held, read-only, moved or gone; no home; no cache."""
+"""Locked, read-only, moved and deleted folders; no home; no cache."""
 
 import shutil
 import signal

@@ -1,4 +1,4 @@
-"""No room: for a file to grow, and on the whole disk. What was finished is kept, one line says why it ended."""
+"""Full disks: finished trials are kept, and one line states the reason."""
 
 import random
 import resource

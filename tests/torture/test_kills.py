@@ -1,4 +1,4 @@
-"""kill -9 at random moments: no finished trial is lost or doubled, and the end is that of a run never killed."""
+"""kill -9 at random moments: no trial is lost or doubled, and the result is unchanged."""
 
 import csv
 import json

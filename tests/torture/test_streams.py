@@ -1,4 +1,4 @@
-"""Nobody reads, no terminal, no stdin, stdout or stderr, a terminal that goes away."""
+"""Closed pipes, missing terminals and closed standard streams."""
 
 import os
 import pty

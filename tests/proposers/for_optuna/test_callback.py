@@ -1,4 +1,4 @@
-"""Proposals in a plain `study.optimize`: how many, by whom, and each of Optuna's traps."""
+"""Proposals in a plain `study.optimize`."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""What Optuna asks of its samplers, asked of a study with proposals: its own suite, and what else a study may do."""
+"""Optuna's conformance suite for samplers, applied to studies with proposals."""
 
 import warnings
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""The language model as a proposer for any study, over the real protocol, against a server of our own."""
+"""The language model proposer for any Optuna study, against a local server."""
 
 import json
 import re

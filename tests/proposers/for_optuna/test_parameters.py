@@ -1,4 +1,4 @@
-"""Any study's parameters and a model's answer: round trips over random distributions, and all that is refused."""
+"""Parameters of any study in answers: round trips and refusals."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The rules for any study: what each proposes, and that everything it proposes is in the space."""
+"""Rules for any Optuna study."""
 
 import math
 from typing import Any
