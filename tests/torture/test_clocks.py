@@ -47,20 +47,20 @@ def clock(tmp_path: Path) -> Iterator[dict[str, str]]:
     jumping.join()
 
 
-def test_the_clock_jumps(clock: dict[str, str]) -> None:
+def test_clock_of_these_tests_jumps(clock: dict[str, str]) -> None:
     """Or these tests would show nothing."""
     said = run(["date", "+%Y"], environment=clock)
     years = {run(["date", "+%Y"], environment=clock).stdout for _ in range(30)} | {said.stdout}
     assert len(years) > 1
 
 
-def test_a_study_under_a_clock_that_jumps(tmp_path: Path, whole: Path, clock: dict[str, str]) -> None:
+def test_study_survives_a_jumping_clock(tmp_path: Path, whole: Path, clock: dict[str, str]) -> None:
     done = study(tmp_path / "run", environment=clock)
     assert (done.returncode, done.stderr) == (0, "")
     is_same_run(tmp_path / "run", whole)
 
 
-def test_a_run_of_the_future_is_resumed(tmp_path: Path, whole: Path, clock: dict[str, str]) -> None:
+def test_run_from_the_future_is_resumed(tmp_path: Path, whole: Path, clock: dict[str, str]) -> None:
     ahead = clock["LD_PRELOAD"]
     environment = {"LD_PRELOAD": ahead, "FAKETIME": "+10y", "DONT_FAKE_MONOTONIC": "1"}
     folder = tmp_path / "run"
@@ -73,7 +73,7 @@ def test_a_run_of_the_future_is_resumed(tmp_path: Path, whole: Path, clock: dict
 
 
 @pytest.mark.slow
-def test_a_search_and_an_experiment_under_a_clock_that_jumps(
+def test_design_and_experiment_survive_a_jumping_clock(
     tmp_path: Path, clock: dict[str, str], record_property: Tell
 ) -> None:
     asked = ("design", "target-1", "--budget", "5000", "--out")

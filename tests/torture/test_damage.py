@@ -101,7 +101,7 @@ def count(outcomes: Counter[str]) -> str:
 
 
 @pytest.mark.parametrize("name", DERIVED)
-def test_a_damaged_derived_file_does_not_change_a_resumed_run(
+def test_damaged_derived_file_does_not_change_a_resumed_run(
     tmp_path: Path, intact: Path, name: str, kills: int, record_property: Tell
 ) -> None:
     for folder, _ in damaged_copies(intact, tmp_path, name, kills):
@@ -111,7 +111,7 @@ def test_a_damaged_derived_file_does_not_change_a_resumed_run(
 
 
 @pytest.mark.parametrize("name", NEEDED)
-def test_a_damaged_needed_file_is_refused_by_name_or_harmless(
+def test_damaged_required_file_is_reported_or_harmless(
     tmp_path: Path, intact: Path, name: str, kills: int, record_property: Tell
 ) -> None:
     """Trials whose numbers changed to other valid ones are not noticed: there are no checksums."""
@@ -130,7 +130,7 @@ def test_a_damaged_needed_file_is_refused_by_name_or_harmless(
     record_property(f"damaged {name}", count(outcomes))
 
 
-def test_trials_cut_at_any_byte_are_made_again(tmp_path: Path, intact: Path, kills: int) -> None:
+def test_trials_truncated_at_any_byte_are_repeated(tmp_path: Path, intact: Path, kills: int) -> None:
     content = (intact / "trials.jsonl").read_bytes()
     chance = random.Random("cut")
     for n in range(kills):
@@ -145,7 +145,7 @@ def test_trials_cut_at_any_byte_are_made_again(tmp_path: Path, intact: Path, kil
         assert trials(folder) == trials(intact)
 
 
-def test_a_config_cut_at_any_line_is_refused_or_the_same_run(tmp_path: Path, intact: Path) -> None:
+def test_config_truncated_at_any_line_is_refused_or_harmless(tmp_path: Path, intact: Path) -> None:
     lines = (intact / "config.yaml").read_text().splitlines(keepends=True)
     for n in range(len(lines)):
         folder = tmp_path / f"run{n}"
@@ -159,7 +159,7 @@ def test_a_config_cut_at_any_line_is_refused_or_the_same_run(tmp_path: Path, int
 @pytest.mark.parametrize(
     "name", ["trials.jsonl", "config.yaml", "status.json", "control.json", "summary.json", ".lock"]
 )
-def test_a_folder_where_a_file_should_be(tmp_path: Path, intact: Path, name: str) -> None:
+def test_folder_in_place_of_a_file_is_reported(tmp_path: Path, intact: Path, name: str) -> None:
     folder = tmp_path / "run"
     shutil.copytree(intact, folder)
     (folder / name).unlink()
@@ -173,7 +173,9 @@ def test_a_folder_where_a_file_should_be(tmp_path: Path, intact: Path, name: str
         assert trials(folder) == trials(intact)
 
 
-def test_damaged_transcripts(tmp_path: Path, chat_server: ChatServer, kills: int, record_property: Tell) -> None:
+def test_damaged_transcripts_are_reported_or_harmless(
+    tmp_path: Path, chat_server: ChatServer, kills: int, record_property: Tell
+) -> None:
     chat_server.answer = thoughtful
 
     def ask(folder: Path) -> StudyResult:
@@ -196,7 +198,7 @@ def test_damaged_transcripts(tmp_path: Path, chat_server: ChatServer, kills: int
     record_property("damaged transcripts.jsonl", count(outcomes))
 
 
-def test_a_damaged_search(tmp_path: Path, kills: int, record_property: Tell) -> None:
+def test_damaged_search_state_is_reported_or_harmless(tmp_path: Path, kills: int, record_property: Tell) -> None:
     def search(folder: Path, budget: str = "3000") -> object:
         return find_front(PROBLEM, budget=budget, seed=1, stop_at_stall=False, out=folder)
 
@@ -219,7 +221,7 @@ def test_a_damaged_search(tmp_path: Path, kills: int, record_property: Tell) -> 
     record_property("damaged search.npz", count(outcomes))
 
 
-def test_a_run_of_an_older_version_goes_on(tmp_path: Path) -> None:
+def test_run_of_an_older_version_resumes(tmp_path: Path) -> None:
     """Made before payloads, constraints and obstacles were in config.yaml; read, extended and shown."""
     folder = tmp_path / "run"
     shutil.copytree(OLDER, folder)
@@ -231,7 +233,7 @@ def test_a_run_of_an_older_version_goes_on(tmp_path: Path) -> None:
     assert write_report(folder).is_file()
 
 
-def test_a_run_of_a_newer_version_is_refused_by_name(tmp_path: Path, intact: Path) -> None:
+def test_run_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(intact, folder)
     ours = read_config(intact).versions["armwright"]
@@ -241,7 +243,7 @@ def test_a_run_of_a_newer_version_is_refused_by_name(tmp_path: Path, intact: Pat
         short(folder)
 
 
-def test_a_trial_of_a_newer_version_is_refused_by_line(tmp_path: Path, intact: Path) -> None:
+def test_trial_of_a_newer_version_is_refused(tmp_path: Path, intact: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(intact, folder)
     first, *others = (folder / "trials.jsonl").read_text().splitlines(keepends=True)

@@ -36,7 +36,7 @@ def at(number: int, act: Callable[[], object]) -> Callable[[Progress], None]:
     return watch
 
 
-def test_a_second_process_is_refused_and_the_first_is_as_if_alone(tmp_path: Path, whole: Path) -> None:
+def test_second_process_is_refused_without_effect_on_the_first(tmp_path: Path, whole: Path) -> None:
     folder, refusals = tmp_path / "run", []
 
     def second() -> None:
@@ -51,7 +51,7 @@ def test_a_second_process_is_refused_and_the_first_is_as_if_alone(tmp_path: Path
     assert trials(folder) == trials(whole)
 
 
-def test_of_two_that_begin_at_once_one_has_the_folder(tmp_path: Path, whole: Path) -> None:
+def test_one_of_two_simultaneous_processes_gets_the_folder(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
     both = [subprocess.Popen(command(folder, "--no-figures"), stderr=subprocess.PIPE, text=True) for _ in range(2)]
     for process in both:
@@ -61,7 +61,7 @@ def test_of_two_that_begin_at_once_one_has_the_folder(tmp_path: Path, whole: Pat
     is_same_run(folder, whole)
 
 
-def test_the_lock_of_a_killed_process_is_free(tmp_path: Path, whole: Path) -> None:
+def test_lock_of_a_killed_process_is_free(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
     process = subprocess.Popen(command(folder, "--no-figures"), stdout=subprocess.DEVNULL)
     while n_lines(folder / "trials.jsonl") < 3:
@@ -76,7 +76,7 @@ def test_the_lock_of_a_killed_process_is_free(tmp_path: Path, whole: Path) -> No
     is_same_run(folder, whole)
 
 
-def test_looking_whether_a_folder_is_held_keeps_nobody_out(tmp_path: Path) -> None:
+def test_checking_a_lock_does_not_block_others(tmp_path: Path) -> None:
     """A process that looks all the time, while others come and go."""
     looking = (
         "import sys; from pathlib import Path; from armwright.runs.folder import is_held\n"
@@ -96,14 +96,14 @@ def test_looking_whether_a_folder_is_held_keeps_nobody_out(tmp_path: Path) -> No
 # Gone while a run goes on.
 
 
-def test_a_folder_that_is_deleted_is_not_made_again_without_its_trials(tmp_path: Path) -> None:
+def test_deleted_folder_is_not_recreated_without_its_trials(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with pytest.raises(RunFolderError, match="was moved or deleted during the run; move it back"):
         optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, lambda: shutil.rmtree(folder)))
     assert not folder.exists()
 
 
-def test_a_folder_that_is_deleted_after_the_last_trial_is_not_made_again(tmp_path: Path) -> None:
+def test_folder_deleted_after_the_last_trial_is_not_recreated(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with pytest.raises(RunFolderError, match="was moved or deleted"):
         optimize(PROBLEM, **SETTINGS, out=folder, watch=at(N_TRIALS - 1, lambda: shutil.rmtree(folder)))
@@ -111,7 +111,7 @@ def test_a_folder_that_is_deleted_after_the_last_trial_is_not_made_again(tmp_pat
 
 
 @pytest.mark.parametrize("number", [9, N_TRIALS - 1])
-def test_a_folder_that_is_moved_goes_on_where_it_is_now(tmp_path: Path, whole: Path, number: int) -> None:
+def test_moved_folder_resumes_at_its_new_place(tmp_path: Path, whole: Path, number: int) -> None:
     folder, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
     with pytest.raises(RunFolderError, match="was moved or deleted"):
         optimize(PROBLEM, **SETTINGS, out=folder, watch=at(number, lambda: folder.rename(elsewhere)))
@@ -121,7 +121,7 @@ def test_a_folder_that_is_moved_goes_on_where_it_is_now(tmp_path: Path, whole: P
     is_same_run(elsewhere, whole)
 
 
-def test_another_folder_in_its_place_is_left_alone(tmp_path: Path) -> None:
+def test_replaced_folder_is_left_untouched(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with pytest.raises(RunFolderError, match="was moved or deleted"):
         optimize(
@@ -131,7 +131,7 @@ def test_another_folder_in_its_place_is_left_alone(tmp_path: Path) -> None:
     assert list(folder.iterdir()) == [] or {path.name for path in folder.iterdir()} == {"status.json"}
 
 
-def test_trials_that_are_deleted_end_the_run(tmp_path: Path) -> None:
+def test_deleted_trials_end_the_run(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with pytest.raises(RunFolderError, match="the file was deleted during the run"):
         optimize(PROBLEM, **SETTINGS, out=folder, watch=at(9, lambda: (folder / "trials.jsonl").unlink()))
@@ -152,7 +152,7 @@ def read_only(folder: Path) -> Iterator[None]:
             path.chmod(mode)
 
 
-def test_a_read_only_folder_is_read_and_not_written(tmp_path: Path, whole: Path) -> None:
+def test_read_only_folder_is_read_and_not_written(tmp_path: Path, whole: Path) -> None:
     run_, empty = tmp_path / "run", tmp_path / "empty"
     shutil.copytree(whole, run_)
     empty.mkdir()
@@ -170,7 +170,7 @@ def test_a_read_only_folder_is_read_and_not_written(tmp_path: Path, whole: Path)
     is_same_run(run_, whole)
 
 
-def test_a_folder_that_becomes_read_only_goes_on_when_it_is_not(tmp_path: Path, whole: Path) -> None:
+def test_folder_resumes_after_being_read_only(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
     process = subprocess.Popen(
         as_a_plain_user(command(folder, "--no-figures")), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
@@ -208,7 +208,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory, whole: Path) -> Path:
 
 
 @pytest.mark.parametrize("environment", NO_HOME, ids=["unset", "no folders at all"])
-def test_no_home(tmp_path: Path, whole: Path, cache: Path, environment: dict[str, str | None]) -> None:
+def test_command_without_a_home(tmp_path: Path, whole: Path, cache: Path, environment: dict[str, str | None]) -> None:
     folder = tmp_path / "run"
     done = study(folder, environment={**environment, "WARP_CACHE_PATH": str(cache)}, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
@@ -226,14 +226,14 @@ def test_figures_without_a_home(tmp_path: Path, cache: Path) -> None:
     assert list((tmp_path / "run" / "figures").glob("*.png"))
 
 
-def test_no_cache_for_the_kernels(tmp_path: Path) -> None:
+def test_missing_kernel_cache(tmp_path: Path) -> None:
     nowhere = {"HOME": "/proc/self/nowhere", "XDG_CACHE_HOME": None, "WARP_CACHE_PATH": None}
     words = one_line(study(tmp_path / "run", environment=nowhere))
     assert "cannot write compiled kernels" in words
     assert "set WARP_CACHE_PATH to a writable folder" in words
 
 
-def test_a_cache_that_is_full_and_read_only(tmp_path: Path, whole: Path, cache: Path) -> None:
+def test_filled_read_only_kernel_cache(tmp_path: Path, whole: Path, cache: Path) -> None:
     with read_only(cache):
         done = run(
             as_a_plain_user(command(tmp_path / "run", "--no-figures")), environment={"WARP_CACHE_PATH": str(cache)}
@@ -243,9 +243,7 @@ def test_a_cache_that_is_full_and_read_only(tmp_path: Path, whole: Path, cache: 
 
 
 @pytest.mark.parametrize("with_part", [True, False])
-def test_a_folder_that_is_replaced_is_whole_or_not_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_part: bool
-) -> None:
+def test_folder_replacement_is_atomic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_part: bool) -> None:
     """Whatever step the process dies at: here when it takes away the files of the old one, one by one."""
     place, part = tmp_path / "figures", tmp_path / "figures.part"
     for folder, content in ((place, "old"), (part, "new")):

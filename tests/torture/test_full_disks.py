@@ -26,7 +26,7 @@ def largest(folder: Path) -> int:
     return max(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
-def test_a_file_may_not_grow(tmp_path: Path, whole: Path, kills: int, record_property: Tell) -> None:
+def test_file_size_limit_keeps_finished_trials(tmp_path: Path, whole: Path, kills: int, record_property: Tell) -> None:
     """At a random size, between nothing and more than is needed."""
     chance = random.Random("limits")
     ended: Counter[int] = Counter()
@@ -46,7 +46,7 @@ def test_a_file_may_not_grow(tmp_path: Path, whole: Path, kills: int, record_pro
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("thorough")
-def test_the_page_and_the_figures_find_no_room(tmp_path: Path, record_property: Tell, kills: int) -> None:
+def test_no_space_for_page_and_figures(tmp_path: Path, record_property: Tell, kills: int) -> None:
     whole = tmp_path / "whole"
     study(whole, "--figures")
     chance = random.Random("figures")
@@ -72,7 +72,7 @@ def disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", place], check=True)
 
 
-def test_a_disk_runs_full(disk: Path, whole: Path, kills: int, record_property: Tell) -> None:
+def test_full_disk_keeps_finished_trials(disk: Path, whole: Path, kills: int, record_property: Tell) -> None:
     """A real disk, full after a random number of pages; then it grows."""
     chance = random.Random("disk")
     rounds = max(1, kills // 10)
@@ -91,7 +91,7 @@ def test_a_disk_runs_full(disk: Path, whole: Path, kills: int, record_property: 
     record_property("a full disk", f"{rounds} times; each resumed")
 
 
-def test_no_room_for_a_search(tmp_path: Path) -> None:
+def test_no_space_for_a_search(tmp_path: Path) -> None:
     asked = ("design", "target-1", "--budget", "5000", "--no-figures", "--out")
     assert armwright(*asked, tmp_path / "whole").returncode == 0
     for n in (1000, 20_000):
@@ -101,7 +101,7 @@ def test_no_room_for_a_search(tmp_path: Path) -> None:
         assert (folder / "trials.jsonl").read_bytes() == (tmp_path / "whole" / "trials.jsonl").read_bytes()
 
 
-def test_no_room_for_an_answer(tmp_path: Path) -> None:
+def test_no_space_for_an_answer(tmp_path: Path) -> None:
     """Half a line is taken back: what another thread adds when there is room again stands on a line of its own."""
     calls = [Call(f"llm-{n}", "answer", "?", answer="x" * 1000, origin="model", model="m") for n in range(3)]
     transcript = Transcript(tmp_path / "transcripts.jsonl")
@@ -119,7 +119,7 @@ def test_no_room_for_an_answer(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("thorough")
-def test_no_room_for_the_kernels(tmp_path: Path, whole: Path) -> None:
+def test_no_space_for_the_kernels(tmp_path: Path, whole: Path) -> None:
     cache = {"WARP_CACHE_PATH": str(tmp_path / "cache")}
     words = one_line(study(tmp_path / "run", environment=cache, preexec_fn=limit(50_000)))
     assert "cannot write compiled kernels: File too large" in words
@@ -128,7 +128,7 @@ def test_no_room_for_the_kernels(tmp_path: Path, whole: Path) -> None:
     is_same_run(tmp_path / "run", whole)
 
 
-def test_nowhere_to_say_it(tmp_path: Path, whole: Path) -> None:
+def test_output_streams_on_a_full_disk(tmp_path: Path, whole: Path) -> None:
     """stdout and stderr on a full disk."""
     with open("/dev/full", "w") as full:
         code = subprocess.run(command(tmp_path / "run", "--no-figures"), stdout=full, stderr=full).returncode

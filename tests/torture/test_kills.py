@@ -79,18 +79,16 @@ def study(n_total: int, *settings: str) -> Scenario:
     )
 
 
-def test_a_study_with_its_figures(torture: Callable[[str, Scenario], Counter[str]]) -> None:
+def test_killed_study_with_figures(torture: Callable[[str, Scenario], Counter[str]]) -> None:
     torture("optimize, rules", study(60, "--proposer", "rules"))
 
 
-def test_a_study_whose_sampler_keeps_notes(torture: Callable[[str, Scenario], Counter[str]]) -> None:
+def test_killed_study_with_sampler_notes(torture: Callable[[str, Scenario], Counter[str]]) -> None:
     settings = ("--proposer", "none", "--sampler", "nsga2", "--refine-every", "20", "--no-figures")
     torture("optimize, NSGA-II", study(60, *settings))
 
 
-def test_a_study_that_was_finished_and_is_extended(
-    torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path
-) -> None:
+def test_killed_extension_of_a_finished_study(torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path) -> None:
     """The command extends a finished run of 20 trials that it finds, or first makes it."""
     longer = study(50, "--proposer", "rules", "--no-figures")
 
@@ -108,7 +106,7 @@ def test_a_study_that_was_finished_and_is_extended(
     )
 
 
-def test_a_study_with_a_local_worker(torture: Callable[[str, Scenario], Counter[str]]) -> None:
+def test_killed_study_with_a_local_worker(torture: Callable[[str, Scenario], Counter[str]]) -> None:
     """Killed: its process, its worker, or all at once."""
     scenario = study(40, "--proposer", "rules", "--workers", "1", "--no-figures")
     torture("optimize, a local worker", replace(scenario, victims=("process", "worker", "all")))
@@ -133,7 +131,7 @@ def paid_once(folder: Path) -> None:
     assert used.keys() <= {proposal for proposal, step in paid if step == "parameters"}
 
 
-def test_a_study_that_asks_a_model(
+def test_killed_study_with_a_model(
     torture: Callable[[str, Scenario], Counter[str]], chat_server: ChatServer, record_property: Tell
 ) -> None:
     chat_server.answer = thoughtful
@@ -153,7 +151,7 @@ def test_a_study_that_asks_a_model(
     torture("optimize, a model", Scenario(asked.arguments, asked.progress, is_beginning, same))
 
 
-def test_a_study_that_asks_a_model_while_it_goes_on(
+def test_killed_study_with_model_calls_in_flight(
     torture: Callable[[str, Scenario], Counter[str]], chat_server: ChatServer, tmp_path: Path
 ) -> None:
     """What it comes to depends on when answers come, so its oracle is its own record, played again."""
@@ -223,7 +221,7 @@ SEARCH = Scenario(
 )  # fmt: skip
 
 
-def test_a_search_for_the_whole_front(torture: Callable[[str, Scenario], Counter[str]]) -> None:
+def test_killed_front_search(torture: Callable[[str, Scenario], Counter[str]]) -> None:
     torture("front", SEARCH)
 
 
@@ -245,7 +243,7 @@ def table(folder: Path) -> list[dict[str, str]]:
     return [{name: value for name, value in row.items() if "seconds" not in name} for row in rows]
 
 
-def test_an_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path) -> None:
+def test_killed_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp_path: Path) -> None:
     """Killed: its process, one of its workers, or all of them at once."""
     file = tmp_path / "small.yaml"
     file.write_text(yaml.safe_dump(EXPERIMENT))
@@ -275,9 +273,7 @@ def test_an_experiment(torture: Callable[[str, Scenario], Counter[str]], tmp_pat
 
 
 @pytest.mark.usefixtures("thorough")
-def test_the_first_start_of_all(
-    torture: Callable[[str, Scenario], Counter[str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_killed_first_start(torture: Callable[[str, Scenario], Counter[str]], monkeypatch: pytest.MonkeyPatch) -> None:
     """The kernels are compiled by the first command; each folder here has a cache of its own, which is empty."""
     short = study(3, "--proposer", "none", "--no-figures")
 
@@ -291,10 +287,10 @@ def test_the_first_start_of_all(
 ENDED = ("INT", "INT INT", "TERM")
 
 
-def test_a_study_that_is_told_to_end(torture: Callable[[str, Scenario], Counter[str]]) -> None:
+def test_interrupted_study(torture: Callable[[str, Scenario], Counter[str]]) -> None:
     scenario = study(60, "--proposer", "rules", "--no-figures")
     torture("optimize, Ctrl-C, Ctrl-C twice, SIGTERM", replace(scenario, victims=ENDED))
 
 
-def test_a_search_that_is_told_to_end(torture: Callable[[str, Scenario], Counter[str]]) -> None:
+def test_interrupted_front_search(torture: Callable[[str, Scenario], Counter[str]]) -> None:
     torture("front, Ctrl-C, Ctrl-C twice, SIGTERM", replace(SEARCH, victims=ENDED))

@@ -11,7 +11,7 @@ from tests.torture.lives import is_beginning, is_same_run, n_lines
 from tests.torture.short import armwright, command, one_line, run, study
 
 
-def test_nobody_reads_the_output(tmp_path: Path, whole: Path) -> None:
+def test_closed_output_pipe_ends_the_command(tmp_path: Path, whole: Path) -> None:
     """As with `| head -1`."""
     folder = tmp_path / "run"
     process = subprocess.Popen(
@@ -31,7 +31,7 @@ def test_nobody_reads_the_output(tmp_path: Path, whole: Path) -> None:
 
 
 @pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
-def test_streams_that_are_closed(tmp_path: Path, whole: Path, closed: str) -> None:
+def test_closed_standard_streams(tmp_path: Path, whole: Path, closed: str) -> None:
     """Nor does any file of the run take their numbers."""
     folder = tmp_path / "run"
     done = run(["sh", "-c", f'exec "$@" {closed}', "sh", *command(folder, "--no-figures")], start_new_session=True)
@@ -39,21 +39,21 @@ def test_streams_that_are_closed(tmp_path: Path, whole: Path, closed: str) -> No
     is_same_run(folder, whole)
 
 
-def test_an_error_without_a_stderr(tmp_path: Path) -> None:
+def test_error_without_a_stderr(tmp_path: Path) -> None:
     (tmp_path / "run").write_text("")
     done = run(["sh", "-c", 'exec "$@" 2>&-', "sh", *command(tmp_path / "run")])
     assert (done.returncode, done.stderr) == (1, "")
 
 
 @pytest.mark.parametrize("terminal", [None, "no-such-terminal"])
-def test_no_terminal(tmp_path: Path, whole: Path, terminal: str | None) -> None:
+def test_command_without_a_terminal(tmp_path: Path, whole: Path, terminal: str | None) -> None:
     folder = tmp_path / "run"
     done = study(folder, environment={"TERM": terminal, "COLUMNS": "0", "LINES": None}, start_new_session=True)
     assert (done.returncode, done.stderr) == (0, "")
     is_same_run(folder, whole)
 
 
-def test_a_terminal_that_goes_away(tmp_path: Path, whole: Path) -> None:
+def test_terminal_that_disappears(tmp_path: Path, whole: Path) -> None:
     folder = tmp_path / "run"
     master, slave = pty.openpty()
     process = subprocess.Popen(
@@ -71,6 +71,6 @@ def test_a_terminal_that_goes_away(tmp_path: Path, whole: Path) -> None:
     is_same_run(folder, whole)
 
 
-def test_an_error_is_one_line_wherever_it_goes(tmp_path: Path) -> None:
+def test_error_is_one_line_on_any_stream(tmp_path: Path) -> None:
     (tmp_path / "run").write_text("")
     assert "cannot write" in one_line(armwright("optimize", "target-1", "--out", tmp_path / "run"))
