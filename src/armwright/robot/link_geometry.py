@@ -80,17 +80,6 @@ def home_position(joint: Joint) -> float:
     return min(max(0.0, joint.lower), joint.upper)
 
 
-def cylinder_inertia(link: Link) -> tuple[str, str]:
-    """Return the moments of a solid cylinder across and around its axis, about its centre of mass [kg m²].
-
-    m (3 r² + l²) / 12 across the axis and m r² / 2 around it. A cylinder without length is a disc, for which
-    2 across = around holds; all digits are written, since MuJoCo refuses a value below it by rounding.
-    """
-    around = link.mass * link.radius**2 / 2.0
-    across = around / 2.0 + link.mass * link.length**2 / 12.0
-    return f"{across:.17g}", f"{around:.17g}"
-
-
 def inertia_tensor(link: Link) -> Array:
     """Return (3, 3) of the cylinder and the mass at its end, about their common centre of mass, in the link frame."""
     r2, l2 = link.radius**2, link.length**2
@@ -111,11 +100,14 @@ def inertia_rpy(link: Link) -> Vector:
 
 
 def inertia_moments(link: Link) -> dict[str, str]:
-    """Return the moments about the centre of mass in the frame of `inertia_rpy` [kg m²], by their URDF names."""
-    if link.end_mass == 0.0:
-        across, around = cylinder_inertia(link)
-        return {"ixx": across, "iyy": across, "izz": around, "ixy": "0", "ixz": "0", "iyz": "0"}
-    tensor = inertia_tensor(link)
+    """Return the moments about the centre of mass in the frame of `inertia_rpy` [kg m²], by their URDF names.
+
+    A cylinder has m (3 r² + l²) / 12 across its axis and m r² / 2 around it. Without length it is a disc, for which
+    2 across = around holds; all digits are written, since MuJoCo refuses a value below it by rounding.
+    """
+    around = link.mass * link.radius**2 / 2.0
+    across = around / 2.0 + link.mass * link.length**2 / 12.0
+    tensor = inertia_tensor(link) if link.end_mass else np.diag([across, across, around])
     return {name: f"{tensor[place]:.17g}" for name, place in TENSOR_INDICES.items()}
 
 

@@ -7,9 +7,7 @@ from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     COLOURS,
     MIN_INERTIA,
-    TENSOR_INDICES,
-    cylinder_inertia,
-    inertia_tensor,
+    inertia_moments,
     marker_radius,
     midpoint,
     moving_joints,
@@ -86,12 +84,11 @@ def _add_joint(body: Element, name: str, joint: Joint) -> None:
 def _add_link(body: Element, joint: Joint, link: Link) -> None:
     euler = numbers(rpy_along(link.offset))
     inertial = {"pos": numbers(link.total_com), "mass": number(link.total_mass)}
+    moments = list(inertia_moments(link).values())
     if link.end_mass == 0.0:
-        across, around = cylinder_inertia(link)
-        inertial |= {"euler": euler, "diaginertia": f"{across} {across} {around}"}
+        inertial |= {"euler": euler, "diaginertia": " ".join(moments[:3])}
     else:
-        tensor = inertia_tensor(link)
-        inertial["fullinertia"] = " ".join(f"{tensor[place]:.17g}" for place in TENSOR_INDICES.values())
+        inertial["fullinertia"] = " ".join(moments)
     SubElement(body, "inertial", inertial)
     if link.length > 0.0:
         cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}

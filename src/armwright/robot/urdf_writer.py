@@ -2,7 +2,7 @@
 
 from xml.etree.ElementTree import Element, SubElement
 
-from armwright.robot.arm import Arm, Vector
+from armwright.robot.arm import Arm, Joint
 from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     COLOURS,
@@ -21,6 +21,8 @@ from armwright.robot.link_geometry import (
     tip_rpy,
     to_xml,
 )
+
+FIXED = Joint("fixed", "z")
 
 
 def to_urdf(arm: Arm, name: str = "arm") -> str:
@@ -49,18 +51,13 @@ def urdf_tree(arm: Arm, name: str) -> Element:
     robot = Element("robot", name=name)
     add_header(robot)
     SubElement(robot, "link", name="base")
-    _add_joint(robot, "world_to_base", "fixed", "world", "base", arm.base)
+    add_joint(robot, "world_to_base", "world", "base", numbers(arm.base))
     for segment in segments(arm):
-        joint = segment.joint
         _add_link(robot, segment)
-        element = _add_joint(
-            robot, f"joint_{segment.number}", joint.kind, segment.parent, segment.name, segment.position
-        )
-        if joint.kind != "fixed":
-            SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
-            SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
+        name, position = f"joint_{segment.number}", numbers(segment.position)
+        add_joint(robot, name, segment.parent, segment.name, position, joint=segment.joint)
     SubElement(robot, "link", name="tip")
-    _add_joint(robot, "tip_joint", "fixed", f"link_{len(arm.links)}", "tip", tip_position(arm), tip_rpy(arm))
+    add_joint(robot, "tip_joint", f"link_{len(arm.links)}", "tip", numbers(tip_position(arm)), numbers(tip_rpy(arm)))
     return robot
 
 
@@ -75,14 +72,17 @@ def add_header(robot: Element) -> None:
     SubElement(robot, "link", name="world")
 
 
-def _add_joint(
-    robot: Element, name: str, kind: str, parent: str, child: str, xyz: Vector, rpy: Vector = (0.0, 0.0, 0.0)
-) -> Element:
-    element = SubElement(robot, "joint", name=name, type=kind)
+def add_joint(
+    robot: Element, name: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0", joint: Joint = FIXED
+) -> None:
+    """Add a joint between two links."""
+    element = SubElement(robot, "joint", name=name, type=joint.kind)
     SubElement(element, "parent", link=parent)
     SubElement(element, "child", link=child)
-    SubElement(element, "origin", xyz=numbers(xyz), rpy=numbers(rpy))
-    return element
+    SubElement(element, "origin", xyz=xyz, rpy=rpy)
+    if joint.kind != "fixed":
+        SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
+        SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
 
 
 def _add_link(robot: Element, segment: Segment) -> None:
@@ -94,14 +94,19 @@ def _add_link(robot: Element, segment: Segment) -> None:
     SubElement(inertial, "mass", value=number(link.total_mass))
     SubElement(inertial, "inertia", inertia_moments(link))
     if link.length > 0.0:
-        for purpose in ("visual", "collision"):
-            body = SubElement(element, purpose)
-            SubElement(body, "origin", xyz=numbers(midpoint(link)), rpy=numbers(rpy_along(link.offset)))
-            shape = SubElement(body, "geometry")
-            SubElement(shape, "cylinder", radius=number(link.radius), length=number(link.length))
-            if purpose == "visual":
-                SubElement(body, "material", name="link")
+        centre, rpy = numbers(midpoint(link)), numbers(rpy_along(link.offset))
+        add_cylinder(element, centre, rpy, number(link.radius), number(link.length))
     add_marker(element, segment, number(marker_radius(link)))
+
+
+def add_cylinder(element: Element, xyz: str, rpy: str, radius: str, length: str) -> None:
+    """Add the cylinder of a link, for display and for collisions."""
+    for purpose in ("visual", "collision"):
+        body = SubElement(element, purpose)
+        SubElement(body, "origin", xyz=xyz, rpy=rpy)
+        SubElement(SubElement(body, "geometry"), "cylinder", radius=radius, length=length)
+        if purpose == "visual":
+            SubElement(body, "material", name="link")
 
 
 def add_marker(element: Element, segment: Segment, radius: str) -> None:

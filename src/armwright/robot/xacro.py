@@ -6,19 +6,16 @@ from xml.etree.ElementTree import Comment, Element, SubElement
 
 from armwright.robot.arm import Arm, Link, Vector
 from armwright.robot.link_geometry import (
-    AXIS_VECTORS,
     MARKER_SCALE,
     TENSOR_INDICES,
     Segment,
-    joint_limits,
-    number,
     numbers,
     rpy_along,
     segments,
     tip_rpy,
     to_xml,
 )
-from armwright.robot.urdf_writer import add_header, add_marker
+from armwright.robot.urdf_writer import add_cylinder, add_header, add_joint, add_marker
 
 NAMESPACE = "http://www.ros.org/wiki/xacro"
 NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
@@ -50,22 +47,18 @@ def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float = 0.0) -> str:
     _add_macro(robot)
     add_header(robot)
     SubElement(robot, "link", name=_prefixed("base"))
-    _add_joint(robot, "world_to_base", "fixed", "world", "base", "${base_x} ${base_y} ${base_z}")
+    add_joint(robot, _prefixed("world_to_base"), "world", _prefixed("base"), "${base_x} ${base_y} ${base_z}")
     position, terms = "0 0 0", ["0", "0", "0"]
     for segment in segments(arm):
-        joint = segment.joint
         _add_link(robot, segment)
-        parent = _prefixed(segment.parent)
-        element = _add_joint(robot, f"joint_{segment.number}", joint.kind, parent, segment.name, position)
-        if joint.kind != "fixed":
-            SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
-            SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
+        name, parent, child = map(_prefixed, (f"joint_{segment.number}", segment.parent, segment.name))
+        add_joint(robot, name, parent, child, position, joint=segment.joint)
         terms = _scaled(_direction(segment.link), segment.number)
         position = _evaluated(terms)
     SubElement(robot, "link", name=_prefixed("tip"))
     position = " ".join(f"${{{term} + tool_{axis}}}" for axis, term in zip("xyz", terms, strict=True))
     last = _prefixed(f"link_{len(arm.links)}")
-    _add_joint(robot, "tip_joint", "fixed", last, "tip", position, numbers(tip_rpy(arm)))
+    add_joint(robot, _prefixed("tip_joint"), last, _prefixed("tip"), position, numbers(tip_rpy(arm)))
     return to_xml(robot)
 
 
@@ -160,14 +153,6 @@ def _com(link: Link, n: int) -> list[str]:
     return _scaled((x / link.length, y / link.length, z / link.length), n)
 
 
-def _add_joint(robot: Element, name: str, kind: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0") -> Element:
-    element = SubElement(robot, "joint", name=_prefixed(name), type=kind)
-    SubElement(element, "parent", link=parent)
-    SubElement(element, "child", link=_prefixed(child))
-    SubElement(element, "origin", xyz=xyz, rpy=rpy)
-    return element
-
-
 def _add_link(robot: Element, segment: Segment) -> None:
     link, n = segment.link, segment.number
     element = SubElement(robot, "link", name=_prefixed(segment.name))
@@ -186,11 +171,5 @@ def _add_link(robot: Element, segment: Segment) -> None:
     drawn = SubElement(element, "xacro:if", value=f"${{{length} > 0}}")
     x, y, z = direction
     midpoint = _evaluated(_scaled((x / 2, y / 2, z / 2), n))
-    for purpose in ("visual", "collision"):
-        body = SubElement(drawn, purpose)
-        SubElement(body, "origin", xyz=midpoint, rpy=numbers(rpy_along(direction)))
-        shape = SubElement(body, "geometry")
-        SubElement(shape, "cylinder", radius=f"${{{own}radius}}", length=f"${{{length}}}")
-        if purpose == "visual":
-            SubElement(body, "material", name="link")
+    add_cylinder(drawn, midpoint, numbers(rpy_along(direction)), f"${{{own}radius}}", f"${{{length}}}")
     add_marker(element, segment, f"${{{MARKER_SCALE} * {own}radius}}")
