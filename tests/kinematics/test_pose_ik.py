@@ -12,7 +12,7 @@ import pytest
 
 from armwright.kinematics import ik as solve
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
-from armwright.kinematics.ik import solve_postures, update_once
+from armwright.kinematics.ik import solve_postures
 from armwright.problem.evaluation import Evaluation, Scene, evaluate, evaluate_arrays
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.urdf_writer import to_urdf
@@ -25,6 +25,7 @@ from tests.support import reference_kinematics as reference
 from tests.support import reference_poses
 from tests.support.arms import general_arms, paper_arms
 from tests.support.reference_kinematics import Array
+from tests.support.single_update import update_once
 
 KINDS = pytest.mark.parametrize("rows", [2, 3])
 DOWN = (0.0, 0.0, -1.0)

@@ -7,6 +7,7 @@ import numpy as np
 from armwright.kinematics import ik as solve
 from armwright.kinematics.arm_arrays import FIXED, ArmArrays
 from armwright.kinematics.ik import Postures
+from tests.support import single_update
 
 
 def moving(arrays: ArmArrays) -> np.ndarray:
@@ -41,5 +42,5 @@ def update_once(
     arrays: ArmArrays, targets: np.ndarray, q: np.ndarray, h_before: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     own = moving(arrays)
-    after, h = solve.update_once(arrays, targets, of_all(q, arrays), of_all(h_before, arrays))
+    after, h = single_update.update_once(arrays, targets, of_all(q, arrays), of_all(h_before, arrays))
     return after[:, own], h[:, own]

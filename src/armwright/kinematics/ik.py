@@ -87,8 +87,7 @@ def solve_postures(
         initial = np.where(arms.motion[:, None] == FIXED, 0.0, angles)
     kind = _kind_of(target_arrays)
     columns = _target_columns(points, np.zeros(t) if payload is None else payload, target_arrays)
-    q, reached, torque = (np.empty((n, t, size), dtype=precision) for size in (dof, 3, dof))
-    postures = Postures(q, reached, torque, angle=np.zeros((n, t), dtype=precision))
+    whole = [np.empty((n, t, size), dtype=precision) for size in _result_sizes(dof)]
     parts = _parts(n, t, LANES[device])
 
     def solve(chunk: slice) -> None:
@@ -96,47 +95,16 @@ def solve_postures(
         for part, lanes in parts:
             part_initial = None if initial is None else initial[chunk, part]
             results = _solve(chunk_arms, columns[part], updates, part_initial, kind, lanes, device)
-            q[chunk, part], reached[chunk, part], torque[chunk, part] = results[:3]
-            if kind == "pose":
-                postures.angle[chunk, part] = results[3][..., 0]
+            for values, solved in zip(whole, results, strict=True):
+                values[chunk, part] = solved
 
     groups = -(-t // LANES[device])
     size = max(1, LARGEST_CHUNK[device] // _bytes_of_one(arms, groups, LANES[device]))
     if device == "cpu":
         size = min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups)))
     in_chunks(solve, n, size, device)
-    return postures
-
-
-def update_once(
-    arms: ArmArrays, points: Array, q: Floats, h_before: Floats, target_arrays: TargetArrays | None = None
-) -> tuple[Floats, Floats]:
-    """Make one update of the inverse kinematics of each arm at its own target, on the CPU.
-
-    Args:
-        arms: N arms.
-        points: (N, 3) the target of each arm [m].
-        q: (N, D) joint angles [rad] or displacements [m], in the precision of the arms.
-        h_before: (N, D) limit gradients of the update before, in the same precision.
-        target_arrays: The axis or orientation of one target for all arms.
-
-    Returns:
-        (N, D) joint angles or displacements, and limit gradients.
-    """
-    shape = (len(arms), arms.dof)
-    if q.shape != shape or h_before.shape != shape:
-        raise ArmError(f"q and h_before: expected the shape {shape}: arms, joints; got {q.shape} and {h_before.shape}")
-    # Only the target's position relative to the base matters, so each arm is moved and all share the target 0.
-    shifted = replace(arms, base=np.asarray(arms.base - points, dtype=arms.precision))
-    lanes = LANES["cpu"]
-    wp, kernels = load(arms.precision, lanes, arms.motions, _kind_of(target_arrays), "cpu")
-    columns = _target_columns(np.zeros((1, 3)), np.zeros(1), target_arrays)
-    columns_, q_last, h_last = (
-        wp.array(_in_lanes(values, lanes), dtype=kernels.Lane, device="cpu")
-        for values in (columns[None], q[:, None], h_before[:, None])
-    )
-    _launch(shifted, columns_[0], 1, q_last, h_last, wp, kernels)
-    return _from_lanes(q_last.numpy())[:, 0], _from_lanes(h_last.numpy())[:, 0]
+    q, reached, torque, angle = whole
+    return Postures(q, reached, torque, angle[..., 0])
 
 
 def _kind_of(target_arrays: TargetArrays | None) -> TargetKind:
@@ -171,7 +139,7 @@ def _solve(
     lanes: int,
     device: Device,
 ) -> list[NDArray[Any]]:
-    """Return joint angles, tip positions, torques and, for poses, angle errors of a chunk of arms, (N, T, ...)."""
+    """Return joint angles, tip positions, torques and angle errors of a chunk of arms, (N, T, ...)."""
     grouped = _in_lanes(columns[None], lanes)[0]
     if initial_q is not None:
         initial_q = _in_lanes(np.clip(initial_q, arms.lower[:, None], arms.upper[:, None]), lanes)
