@@ -80,7 +80,7 @@ def test_endless_and_huge_files_are_refused(tmp_path: Path) -> None:
     for place in (Path("/dev/zero"), tmp_path / "big.yaml"):
         if place.parent == tmp_path:
             place.write_bytes(b" " * (MAX_BYTES + 1))
-        with pytest.raises(SpaceError, match="at most 4 MiB"):
+        with pytest.raises(SpaceError, match="at most 4,096 KiB"):
             load_space(place)
     with pytest.raises(SpaceError, match="cannot read"):
         load_space("a\0.yaml")

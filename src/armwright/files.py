@@ -25,6 +25,26 @@ def naming_write_errors(path: Path, note: str = "", error: type[ArmwrightError] 
         raise error(f"cannot write {path}: {fault.strerror or fault}{note}") from fault
 
 
+def read_bytes(path: Path, limit: int, error: type[Exception]) -> bytes:
+    """Read a file of at most `limit` bytes; raise `error` with a one-line message if that fails."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(limit + 1)  # not stat(): a device has no size
+    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
+        raise error(f"cannot read {path}: {getattr(fault, 'strerror', None) or fault}") from fault
+    if len(data) > limit:
+        raise error(f"{path}: expected at most {limit // 1024:,} KiB")
+    return data
+
+
+def read_text(path: Path, limit: int, error: type[Exception]) -> str:
+    """Read a text file in UTF-8 as `read_bytes` does, without a byte order mark."""
+    try:
+        return read_bytes(path, limit, error).decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as fault:
+        raise error(f"{path} is not a text file in UTF-8") from fault
+
+
 def replace_file(target: Path, content: bytes) -> None:
     """Replace a file atomically: readers, and a crash, leave the old or the new content."""
     part = target.with_name(target.name + ".part")

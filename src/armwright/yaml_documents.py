@@ -9,6 +9,7 @@ from pydantic import BaseModel, ValidationError
 from yaml.composer import Composer
 
 from armwright.exceptions import did_you_mean
+from armwright.files import read_text
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
@@ -19,17 +20,7 @@ MAX_NODES = 400_000  # values in a document; 10,000 targets with all their keys 
 
 def read_document(path: Path, schema: type[Schema], error: type[Exception]) -> Schema:
     """Read a YAML file as a value of `schema`; raise `error` with a one-line message if it is not one."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)  # not stat(): a device has no size
-        text = data.decode("utf-8")
-    except UnicodeDecodeError as fault:
-        raise error(f"{path} is not a text file in UTF-8") from fault
-    except (OSError, ValueError) as fault:  # ValueError: a NUL in the name
-        raise error(f"cannot read {path}: {getattr(fault, 'strerror', None) or fault}") from fault
-    if len(data) > MAX_BYTES:
-        raise error(f"{path}: expected at most {MAX_BYTES // 2**20} MiB")
-    return parse_document(text, schema, error, str(path))
+    return parse_document(read_text(path, MAX_BYTES, error), schema, error, str(path))
 
 
 def parse_document(text: str, schema: type[Schema], error: type[Exception], where: str) -> Schema:

@@ -707,7 +707,7 @@ def test_file_that_is_not_a_template_is_refused(tmp_path: Path) -> None:
     (tmp_path / "plus").write_text("my own", encoding="utf-8")
     for name, message in (
         ("latin", "is not a text file in UTF-8"),
-        ("large", "is larger than 256 KiB"),
+        ("large", "expected at most 256 KiB"),
         (".", "is a folder, not a template file"),
         ("none", 'unknown prompt ".*none"'),
     ):

@@ -253,7 +253,7 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(file: Path, number: i
 
 def test_missing_and_oversized_files_are_refused(file: Path) -> None:
     file.write_bytes(b" " * (LARGEST_FILE + 1))
-    with pytest.raises(ArmError, match="at most 4 MiB"):
+    with pytest.raises(ArmError, match="at most 4,096 KiB"):
         read_urdf(file)
     with pytest.raises(ArmError, match="cannot read"):
         read_urdf(file.parent)

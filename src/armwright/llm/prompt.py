@@ -12,6 +12,7 @@ from typing import Any
 from jinja2 import TemplateError, TemplateSyntaxError, meta, nodes
 
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.files import read_text
 from armwright.llm.feedback import Feedback, proposal_records
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt_values import MOST_TARGETS, VARIABLES, common_values, shown_values
@@ -142,14 +143,7 @@ def load_prompt(name: str | Path) -> Prompt:
         raise SettingsError(
             f'unknown prompt "{name}".{did_you_mean(str(name), PROMPTS)} Prompts: {", ".join(PROMPTS)}, or a file'
         )
-    try:
-        if path.stat().st_size > LARGEST_TEMPLATE:
-            raise SettingsError(f"{path} is larger than {LARGEST_TEMPLATE // 1024} KiB, the limit for a prompt")
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise SettingsError(f"cannot read {path}: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise SettingsError(f"{path} is not a text file in UTF-8") from error
+    text = read_text(path, LARGEST_TEMPLATE, SettingsError)
     # A file called "plus" must not pass for the built-in prompt.
     return Prompt(path.name if path.name not in PROMPTS else f"./{path.name}", text)
 

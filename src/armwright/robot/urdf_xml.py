@@ -14,6 +14,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError
+from armwright.files import read_bytes
 
 LARGEST_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
 DEEPEST = 50  # nested elements; a URDF needs 6
@@ -95,13 +96,7 @@ class UrdfDocument:
 
 def read_document(path: Path) -> UrdfDocument:
     """Read the links and joints of a URDF file; raise ArmError if it is not one."""
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise ArmError(f"{path}: expected a URDF of at most {LARGEST_FILE // 2**20} MiB")
-        data = path.read_bytes()
-    except OSError as fault:
-        raise ArmError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    return parse_document(data, str(path))
+    return parse_document(read_bytes(path, LARGEST_FILE, ArmError), str(path))
 
 
 def parse_document(data: bytes, where: str) -> UrdfDocument:

@@ -5,8 +5,10 @@ import math
 from pathlib import Path
 
 from armwright.exceptions import TaskError
+from armwright.files import read_text
 from armwright.tasks.targets import Point
 
+MAX_BYTES = 16 * 1024 * 1024
 UNITS = {"m": 1.0, "mm": 1e-3}  # [m]
 
 
@@ -29,12 +31,7 @@ def read_points(path: Path, unit: str = "m", offset: Point = (0.0, 0.0, 0.0)) ->
     """
     if unit not in UNITS:
         raise TaskError(f'unit: expected {" or ".join(UNITS)}, got "{unit}"')
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as fault:
-        raise TaskError(f"cannot read {path}: {fault.strerror or fault}") from fault
-    except UnicodeDecodeError as fault:
-        raise TaskError(f"{path} is not a text file in UTF-8") from fault
+    lines = read_text(path, MAX_BYTES, TaskError).splitlines()
     points: list[Point] = []
     rows = [(number, _split_row(line)) for number, line in enumerate(lines, start=1) if _holds_data(line)]
     if rows and not any(map(_is_number, rows[0][1][:3])):
