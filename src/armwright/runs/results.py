@@ -62,6 +62,22 @@ def write_results(
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
+def rewrite_results(
+    folder: RunFolder, history: History, config: RunConfig, summary: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Verify the front and write the results again; return the summary, which keeps what only its sessions knew."""
+    verification = verify_front(history)
+    if isinstance(config.method, FrontMethod):
+        new = {**summary, "verification": _verification_record(history, verification)}
+    else:
+        known = {key: summary[key] for key in ("proposer", "proposer_bias", "refine") if key in summary}
+        new = summarize(history, config, None, verification) | known
+        if new["refine"] is not None:
+            new["evaluations"] += new["refine"]["in_vain"]
+    write_results(folder, history, new, verification)
+    return new
+
+
 def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
     """Verify the front of a finished run again, rewrite its results, and return history and summary."""
     path = Path(path)
@@ -70,10 +86,7 @@ def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
     if summary is None:
         raise RunFolderError(f"{path} is not finished; rerun the command that began it")
     with RunFolder(path) as folder:
-        verification = verify_front(history)
-        summary = resummarize(summary, history, config, verification)
-        write_results(folder, history, summary, verification)
-    return history, summary
+        return history, rewrite_results(folder, history, config, summary)
 
 
 def complete_summary(path: Path, history: History) -> dict[str, Any] | None:
@@ -171,19 +184,6 @@ def _common_record(
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
     }
-
-
-def resummarize(
-    summary: Mapping[str, Any], history: History, config: RunConfig, verification: Verification | None
-) -> dict[str, Any]:
-    """Return the summary after trials were added or designs verified; keep what only its sessions knew."""
-    if isinstance(config.method, FrontMethod):
-        return {**summary, "verification": _verification_record(history, verification)}
-    known = {key: summary[key] for key in ("proposer", "proposer_bias", "refine") if key in summary}
-    new = summarize(history, config, None, verification) | known
-    if new["refine"] is not None:
-        new["evaluations"] += new["refine"]["in_vain"]
-    return new
 
 
 def describe_infeasibility(history: History) -> str:

@@ -10,9 +10,8 @@ import numpy as np
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import REFINE, FrontMember, History
-from armwright.runs.results import describe_infeasibility, discard_results, read_summary, resummarize, write_results
+from armwright.runs.results import describe_infeasibility, discard_results, read_summary, rewrite_results
 from armwright.runs.trial import FinishedTrial
-from armwright.runs.verification import verify_front
 from armwright.search.cma_es import POPULATION, Refined
 from armwright.search.refine import EVALUATIONS, refine_members, worth_refining
 from armwright.seeding import REFINING, derived_seed
@@ -79,10 +78,8 @@ def refine_run(path: str | Path, evaluations: int = EVALUATIONS) -> RefinedRun:
         discard_results(path)
         for trial in improved:
             folder.append(trial)
-        after = History(config.problem, (*trials, *improved), method.n_init, config.reference_point)
-        verification = verify_front(after)
-        summary = resummarize(summary, after, config, verification)
-        write_results(folder, after, summary, verification)
+        after = before.grown((*trials, *improved), config.reference_point)
+        summary = rewrite_results(folder, after, config, summary)
     return RefinedRun(before, after, summary, len(members), refined.evaluations)
 
 
