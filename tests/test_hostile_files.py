@@ -212,7 +212,7 @@ def test_invalid_server_address_is_refused(url: str) -> None:
     ids=lambda text: text[:40],
 )
 def test_hostile_urdf_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
-    """Entities are not declared, nothing is fetched, and xacro is not expanded."""
+    """No entity is declared, nothing is fetched, and xacro is not expanded."""
     file = tmp_path / "arm.urdf"
     file.write_text(text)
     with pytest.raises(ArmwrightError) as refusal:

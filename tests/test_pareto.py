@@ -40,7 +40,7 @@ def test_front_agrees_with_pymoo(values: np.ndarray) -> None:
 
 @given(POINTS)
 def test_front_satisfies_its_definition(values: np.ndarray) -> None:
-    """Nothing beats a member; whatever is left out is beaten by a member, or equal to an earlier one."""
+    """Members are not dominated; others are dominated by a member or equal an earlier one."""
     mask = front_mask(values)
     for i, row in enumerate(values):
         if mask[i]:
@@ -76,7 +76,7 @@ def test_front_and_hypervolume_ignore_order_and_duplicates(values: np.ndarray, r
 
 @given(POINTS | ANYWHERE)
 def test_points_outside_the_box_add_no_hypervolume(values: np.ndarray) -> None:
-    """On its edge neither: they bound no area."""
+    """Points on the edge add no area either."""
     inside = values[np.all(values < REFERENCE, axis=1)]
     assert hypervolume(values, REFERENCE) == hypervolume(inside, REFERENCE)
     outside = values[~np.all(values < REFERENCE, axis=1)]
@@ -139,7 +139,7 @@ def test_pareto_functions_accept_no_points() -> None:
 
 @given(POINTS | ANYWHERE)
 def test_default_reference_point_bounds_the_front(values: np.ndarray) -> None:
-    """1.1 times the worst values on the front; what is dominated does not move it; never 0."""
+    """The point is 1.1 times the worst values of the front and never 0."""
     point = default_reference_point(values)
     front = NonDominatedSorting().do(values, only_non_dominated_front=True)
     assert point == pytest.approx(np.maximum(1.1 * values[front].max(axis=0), 1e-9), rel=1e-12)

@@ -259,7 +259,7 @@ def test_thicker_links_have_less_clearance() -> None:
 
 
 def test_links_of_no_radius_are_ignored() -> None:
-    """Of radius 0: as if the arm ended before them."""
+    """Links of radius 0 count as if the arm ended before them."""
     arms = stack_arms(moving_arms(30, 6, 2))
     q = random_postures(moving_arms(30, 6, 2), 3, 0)
     obstacles = [random_obstacle(np.random.default_rng(5), kind) for kind in SHAPES[:3]]

@@ -51,7 +51,7 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 def test_first_use_by_many_threads_restores_stderr() -> None:
-    """Warp's native code is silenced while it starts, and only then."""
+    """Warp's native code is silenced only while it starts."""
     assert run(THREADS).stderr.splitlines()[-1] == "still heard"
 
 
@@ -66,7 +66,7 @@ def test_kernels_are_silent_and_work_with_closed_stderr(closed: str) -> None:
 
 @pytest.mark.slow
 def test_forked_child_can_solve() -> None:
-    """It has the parent's pool, but not its threads."""
+    """The child inherits the parent's pool, but not its threads."""
     assert run(FORK).returncode == 0
 
 
@@ -119,7 +119,7 @@ for kernel in kernels.values():
 
 @pytest.mark.slow
 def test_kernels_compile_for_cuda_without_a_gpu(tmp_path: Path) -> None:
-    """To PTX, by the compiler that Warp brings. What they compute there, only a GPU can say."""
+    """Compile to PTX with Warp's compiler; only a GPU can run the result."""
     command = [sys.executable, "-c", COMPILE_FOR_CUDA, str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
@@ -157,7 +157,7 @@ def test_chunk_is_halved_until_it_fits_gpu_memory() -> None:
 
 
 def test_results_do_not_depend_on_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither those of the solver, bounded by bytes, nor those of designs whose postures are in memory at a time."""
+    """This holds for the solver's chunks and for chunks of designs."""
     asked = Problem(load_task("target-2"))
     matrix = asked.space.matrix(asked.space.sample(100, 3))
     whole = asked.evaluate_matrix(matrix).values

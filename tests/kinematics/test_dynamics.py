@@ -216,14 +216,14 @@ def by_differences(step: float, time: float) -> tuple[Array, Array]:
 
 
 def test_torques_of_nonredundant_arms_match_finite_differences() -> None:
-    """Fast enough that gravity is the smaller part; what is left is the damping, and the samples' own 0.1 mm."""
+    """At a speed where gravity is the smaller part; the residual is damping and the samples' 0.1 mm."""
     for step in (0.04, 0.02, 0.01):
         theirs, ours = by_differences(step, 0.25)
         assert np.abs(theirs - ours).max() < 0.005 * np.abs(theirs).max()
 
 
 def test_finer_step_gives_the_same_torques() -> None:
-    """With joints to spare, too, whose samples drift: what is sought is of each posture by itself."""
+    """This includes redundant arms, whose samples drift: each posture determines its own torques."""
     space = paper_space(6)
     arms = [space.arm(design) for design in space.sample(200, 1)]
     found = []
@@ -286,7 +286,7 @@ def test_each_move_has_its_own_time() -> None:
 
 
 def test_joint_at_its_limit_stays_there() -> None:
-    """A slide at the end of its way stays there, though it alone could go on along the line."""
+    """A slide at its limit stays there, although it alone could continue along the line."""
     arm = Arm(
         (0.0, 0.0, 0.0),
         (Joint("prismatic", "x", 0.0, 0.2), Joint("prismatic", "z", 0.0, 0.5)),

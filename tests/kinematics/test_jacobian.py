@@ -98,7 +98,7 @@ def test_three_orthogonal_rails_have_dexterity_one() -> None:
 
 
 def test_dexterity_does_not_depend_on_arm_size() -> None:
-    """Manipulability of turning joints is a volume, so that it says nothing of arms of other sizes; dexterity does."""
+    """Manipulability is a volume and grows with the arm; dexterity is comparable between sizes."""
     small = moving_arms(30, 5, 1)
     large = [
         Arm(

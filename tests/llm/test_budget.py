@@ -110,7 +110,7 @@ def test_max_calls_bounds_the_requests_of_a_run(chat_server: ChatServer, most: i
 
 
 def test_retries_of_refused_answers_count_as_calls(chat_server: ChatServer) -> None:
-    """Three requests for one answer; the budget bounds the requests within one call, too."""
+    """The budget also bounds the three requests of one answer."""
     good = chat_server.answer
     chat_server.answer = lambda request: "no JSON" if "response_format" in request else good(request)
     run(llm_proposer(chat_server.url, model="m", max_calls=4), n_total=6)
@@ -118,7 +118,7 @@ def test_retries_of_refused_answers_count_as_calls(chat_server: ChatServer) -> N
 
 
 def test_budget_includes_earlier_sessions(chat_server: ChatServer, tmp_path: Path) -> None:
-    """Earlier sessions included; a larger one goes on asking."""
+    """A larger budget resumes the calls."""
     run(llm_proposer(chat_server.url, model="m", max_calls=5), tmp_path / "run", n_total=6)
     again = run(llm_proposer(chat_server.url, model="m", max_calls=6), tmp_path / "run", n_total=12)
     assert len(chat_server.requests) == 6
@@ -152,7 +152,7 @@ def test_forecast_includes_a_known_price(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_model_on_a_local_server_has_no_vendor_price(chat_server: ChatServer) -> None:
-    """Whatever it is called: forecast, summary and bound agree."""
+    """Forecast, summary and bound agree, whatever the model's name."""
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="openai-chat:gpt-4o"), seen=seen, n_total=3)
     assert seen[0].note.endswith("; on a local server")
@@ -196,7 +196,7 @@ def test_forecast_of_a_resumed_run_uses_its_past_calls(chat_server: ChatServer, 
 def test_max_cost_bounds_the_requests_of_a_run(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
 ) -> None:
-    """The price is the public one of the tokens that the server counts; every call costs the same here."""
+    """The price is the public one of the tokens counted by the server; all calls cost the same here."""
     free = run(wires.proposer(wire, chat_server, monkeypatch), n_total=3).summary["proposer"]
     each = free["cost_usd"] / free["calls"]
     assert each > 0.0
@@ -217,7 +217,7 @@ def test_invalid_budgets_are_refused(chat_server: ChatServer, wrong: dict[str, A
 
 
 def test_max_cost_without_a_price_stops_after_the_check(chat_server: ChatServer) -> None:
-    """However the run was told to go on."""
+    """This holds with on_model_failure="continue" too."""
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="m", max_cost=1.0), seen=seen, on_model_failure="continue")
     assert len(chat_server.requests) == 1  # the check, which showed that there is no price
@@ -252,7 +252,7 @@ def test_run_continues_without_proposals_after_its_budget(
 def test_started_run_continues_without_its_model(
     chat_server: ChatServer, tmp_path: Path, status: int, kind: str, asked: int
 ) -> None:
-    """Said once; where asking again is of no use, nothing more is asked."""
+    """The fault is reported once; permanent faults end the calls."""
     run(llm_proposer(chat_server.url, model="m"), tmp_path / "run", n_total=3)
     chat_server.requests.clear()
     chat_server.answer = lambda request: (status, '{"error": {"message": "not today"}}')

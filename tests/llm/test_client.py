@@ -173,7 +173,7 @@ def test_hanging_server_is_an_error(chat_server: ChatServer, monkeypatch: pytest
 
 
 def test_paid_answers_are_not_requested_again(chat_server: ChatServer, tmp_path: Path) -> None:
-    """Killed between the answer and the trial: the answer in the transcript is used."""
+    """After a kill between answer and trial, the recorded answer is used."""
     whole = run(chat_server, tmp_path / "whole")
     run(chat_server, tmp_path / "cut")
     trials = tmp_path / "cut" / "trials.jsonl"
@@ -224,7 +224,7 @@ def test_folder_of_an_unreachable_model_accepts_another_proposer(
 
 
 def test_answer_with_invalid_unicode_is_recorded(chat_server: ChatServer, tmp_path: Path) -> None:
-    """A lone surrogate can come in JSON, and cannot be written as UTF-8."""
+    """JSON can hold a lone surrogate, which UTF-8 cannot."""
     chat_server.answer = lambda request: designer(request) if "response_format" in request else "so \ud800 be it"
     result = run(chat_server, tmp_path / "run", n_total=1)
     assert result.trials[4].source == "llm"

@@ -121,7 +121,7 @@ def test_constraints_in_the_task_template_are_valid(tmp_path: Path) -> None:
 
 
 def test_violations_are_relative_distances_from_the_bound() -> None:
-    """Against plain formulas of the physics; of a bound of 0, in the quantity's own unit."""
+    """For a bound of 0, the violation is in the quantity's own unit."""
     problem = Problem(task("worst_error <= 0.4", "length >= 0.5", "unreached_targets <= 0", "peak_torque <= 0.06"))
     designs = SPACE.sample(50, 3)
     outcomes = problem.evaluate(designs)
@@ -202,7 +202,7 @@ def test_hypervolume_grows_with_a_looser_bound(values: np.ndarray, data: st.Data
 
 
 def test_hypervolume_grows_with_a_looser_task_bound() -> None:
-    """The same with the bounds of a task, on the same real designs."""
+    """The same for constraints of a task, on real designs."""
     designs = SPACE.sample(400, 0)
     volumes = []
     for bound in (0.1, 0.3, 0.6, 5.0):
@@ -234,7 +234,7 @@ def test_inactive_constraint_changes_no_trial(sampler: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
 def test_black_boxes_prefer_feasible_designs(sampler: str) -> None:
-    """Of the counted trials more are feasible than where the sampler knows of no constraint, on average over seeds."""
+    """More trials are feasible than without constraints in the sampler, on average over seeds."""
     bound, shares = Problem(task(*BOUNDS)), []
     for problem in (bound, Problem(task())):
         runs = [optimize(problem, proposer="none", sampler=sampler, n_total=100, seed=seed) for seed in range(3)]
@@ -285,7 +285,7 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
 def test_killed_constrained_run_resumes_identically(tmp_path: Path, sampler: str) -> None:
-    """Of what a kill leaves: whole lines, and a part of one."""
+    """A kill leaves whole lines and a part of one."""
     how: dict[str, Any] = {"proposer": "rules", "sampler": sampler, "n_total": 24, "seed": 3}
     problem = Problem(task(*BOUNDS))
     optimize(problem, out=tmp_path / "whole", **how)

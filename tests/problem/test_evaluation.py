@@ -31,14 +31,14 @@ def test_evaluation_arrays_have_documented_shapes() -> None:
 
 
 def test_position_error_is_the_distance_from_the_target() -> None:
-    """Also where the target is out of reach: a result, never an exception."""
+    """Unreachable targets also give a result, not an exception."""
     result = evaluate(paper_arms(50, 4, 32), TARGETS)
     assert np.allclose(result.position_error, np.linalg.norm(result.reached - TARGETS, axis=-1), atol=1e-12)
     assert np.all(result.position_error[:, 2] > 0.5)
 
 
 def test_fixed_joints_have_columns_of_zeros() -> None:
-    """Every joint of the arm has its column, in the arm's own order; only those that move have values."""
+    """Every joint has a column, in the arm's order; only moving joints have values."""
     fixed, turn = Joint("fixed", "x"), Joint("revolute", "y", -2.0, 2.0)
     joints = (fixed, turn, fixed, Joint("revolute", "x", -2.0, 2.0), fixed)
     arm = Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.05, 0.2), 0.3, 0.015),) * 5)
@@ -54,7 +54,7 @@ def test_fixed_joints_have_columns_of_zeros() -> None:
 
 
 def test_joint_limits_hold_exactly() -> None:
-    """To the last bit of a float64 reader: 2.4 rad is 2.4 rad."""
+    """A float64 reader sees no value beyond the limit: 2.4 rad is 2.4 rad."""
     arms = general_arms(500, 4, 33)
     q = evaluate(arms, TARGETS).q
     lower, upper = (np.array([[getattr(j, end) for j in arm.joints] for arm in arms]) for end in ("lower", "upper"))

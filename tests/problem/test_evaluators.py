@@ -22,7 +22,7 @@ ARM = paper_arms(1, 3, 0)[0]
 
 @aw.evaluator("reach [m]", "joints_used")
 def measured(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
-    """How far it reaches."""
+    """Return the reach of the arm."""
     return sum(link.length for link in arm.links), len(arm.joints)
 
 
@@ -83,7 +83,7 @@ def test_system_exit_in_an_evaluator_is_a_failure() -> None:
 
 
 def test_working_folder_is_restored_after_an_evaluation(in_folder: Path) -> None:
-    """Where a solver goes elsewhere, the folder of a run is still found by its name."""
+    """A run folder is still found if a solver changes the working folder."""
 
     @aw.evaluator("reach [m]", "joints_used", worst=(9.0, 9.0))
     def elsewhere(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
@@ -190,7 +190,7 @@ def test_unloadable_evaluator_is_one_line(file: Path, place: str, words: str) ->
 
 @pytest.mark.slow
 def test_run_is_resumed_with_its_own_evaluator(file: Path) -> None:
-    """The file may be mended; that is noted. The run folder names it, and never loads it."""
+    """A changed evaluator file is noted; the run folder names the file but never loads it."""
     task = WHOLE
 
     def run(n_total: int, evaluator: aw.Evaluator | None) -> aw.StudyResult:

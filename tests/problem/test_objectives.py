@@ -218,7 +218,7 @@ def test_former_objective_names_are_reported_with_the_current_one(tmp_path: Path
     ],
 )
 def test_task_objectives_reach_run_prompt_figures_and_page(tmp_path: Path, names: tuple[str, ...]) -> None:
-    """From the task file to the folder, the prompt, the figures, the page and the search for the whole front."""
+    """Follow objectives from the task file to run, prompt, page and front search."""
     task = LOADED.model_copy(update={"objectives": names})
     file = tmp_path / "task.yaml"
     file.write_text(yaml.safe_dump(task.model_dump(mode="json")))
@@ -260,7 +260,7 @@ def test_objectives_option_drops_a_foreign_reference_point(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("dof", [1, 3, 4, 6, 8])
 def test_torques_with_a_payload_agree_with_pinocchio(dof: int) -> None:
-    """A payload is a point mass at the tip: in the URDF a massive link without length, fixed there."""
+    """A payload is a point mass at the tip, in the URDF a fixed link without length."""
     targets, payload = np.random.default_rng(dof).uniform(-0.8, 0.8, (3, 3)), np.array([0.0, 0.7, 2.5])
     arms = general_arms(20, dof, 3)
     evaluation = evaluate(arms, targets, payload=payload)

@@ -23,7 +23,7 @@ ROBUST = PLAIN.model_copy(
 
 
 def alone() -> list[Task]:
-    """Each case as a task of its own."""
+    """Return each case as its own task."""
     shifts = [sign * 0.004 * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     moved = [tuple(map(tuple, (PLAIN.target_positions + shift).tolist())) for shift in shifts]
     heavier = [tuple((factor * PLAIN.payloads).tolist()) for factor in (0.0, 1.5)]

@@ -31,7 +31,7 @@ from armwright.proposers.factory import choose_proposer
     ],
 )
 def test_option_without_effect_is_refused(tmp_path: Path, name: str, option: str, value: Any) -> None:
-    """Also if it states the default."""
+    """This holds even if it states the default."""
     chosen, options = name.replace("x", str(tmp_path / "x")), ModelOptions(**{option: value})
     if name == "manual:x" and option in ("prompt", "memory", "proposals", "wait"):
         assert choose_proposer(chosen, options).proposer is not None

@@ -175,7 +175,7 @@ def test_manual_answer_may_hold_several_designs_and_expectations(tmp_path: Path)
 
 
 def test_only_pending_files_are_announced(tmp_path: Path) -> None:
-    """Neither questions that lie answered, nor trials for which a design lies ready."""
+    """Answered questions and trials with a ready design are not announced."""
     proposer = ManualProposer(tmp_path / "ask", PromptOptions(proposals=2), wait=False)
     notes: list[str] = []
     for text in (LINES + LINES.replace("0.01", "0.02"), ""):

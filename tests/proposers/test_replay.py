@@ -160,7 +160,7 @@ def interrupted_at(stop: int) -> Callable[[Progress], None]:
 
 @pytest.mark.parametrize("stop", [4, 6])
 def test_interrupted_replay_resumes(in_pairs: ChatServer, tmp_path: Path, stop: int) -> None:
-    """Within a call that gave two designs, too: no recorded call is played twice."""
+    """This includes a stop within a call of two designs: no recorded call is used twice."""
     first = recorded(in_pairs, tmp_path / "first", {"proposals": 2})
     for watch in (interrupted_at(stop), None):
         with suppress(KeyboardInterrupt):
@@ -173,7 +173,7 @@ def test_interrupted_replay_resumes(in_pairs: ChatServer, tmp_path: Path, stop: 
 
 
 def test_proposals_beyond_the_recording_are_missing(varied: ChatServer, tmp_path: Path) -> None:
-    """Counted, told once, and the run does not pass for the model's."""
+    """They are counted and reported once, and the run is flagged."""
     recorded(varied, tmp_path / "first")
     notes: list[str] = []
     longer = {**SETTINGS, "n_total": 20}
@@ -216,7 +216,7 @@ def test_proposals_of_a_truncated_recording_are_missing(
     ],
 )
 def test_transcript_alone_can_be_replayed(in_pairs: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
-    """The form of the answer and the number of designs are seen in its calls."""
+    """Answer form and number of designs are inferred from the calls."""
     if "proposals" not in asking:
         in_pairs.answer = designer
     recorded(in_pairs, tmp_path / "first", asking)
@@ -276,7 +276,7 @@ def test_differing_prompt_is_reported_or_refused_when_strict(varied: ChatServer,
 
 
 def test_recording_with_other_settings_is_reported(varied: ChatServer, tmp_path: Path) -> None:
-    """Proposals that were recorded for other trials are missing, each in words."""
+    """Proposals recorded for other trials are missing, with a reason."""
     recorded(varied, tmp_path / "first")
     alone = tmp_path / "alone.jsonl"
     shutil.copy(tmp_path / "first" / "transcripts.jsonl", alone)
@@ -314,7 +314,7 @@ def test_invalid_recordings_are_refused(tmp_path: Path) -> None:
 
 
 def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
-    """Not even its last line that a crash cut short."""
+    """Not even a truncated last line is changed."""
     recorded(varied, tmp_path / "first")
     file = tmp_path / "first" / "transcripts.jsonl"
     file.write_text(file.read_text() + '{"proposal": "llm-00')

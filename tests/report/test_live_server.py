@@ -230,7 +230,7 @@ def test_control_needs_token_origin_and_json(served: tuple[Path, int, str]) -> N
 
 
 def test_foreign_host_header_is_refused(served: tuple[Path, int, str]) -> None:
-    """DNS rebinding: the browser believes that the page and the server are one site."""
+    """With DNS rebinding, the browser considers page and server one site."""
     _, port, token = served
     for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", f"127.0.0.1:{port + 1}", ""):
         assert ask(port, "GET", "/run", Host=host)[0] in (400, 421)

@@ -113,7 +113,7 @@ def test_token_counts_only_in_its_header(served: tuple[Path, int, str]) -> None:
 
 
 def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By hmac's comparison and nothing else: where that says yes, any token does."""
+    """With hmac's comparison patched to accept everything, any token is accepted."""
     server = a_server()
     wrong = {"host": "127.0.0.1:9", "origin": "http://127.0.0.1:9", "content-type": "application/json",
              "x-armwright-token": "no"}  # fmt: skip
@@ -261,7 +261,7 @@ def test_dns_rebinding_shows_nothing(served: tuple[Path, int, str], browser: Bro
 
 
 def test_names_in_a_run_folder_are_escaped(tmp_path: Path, browser: Browser) -> None:
-    """Of objectives, sources, faults, arms, and the folder itself: somebody sends a run folder to look at."""
+    """Names of objectives, sources, faults, arms and the folder may come from a stranger."""
     folder = tmp_path / re.sub("[/]", "", LINK)[:60]
     aw.optimize(aw.Problem(task=aw.load_task("target-1")), proposer="rules", n_init=3, n_step=2, n_total=4, out=folder)
     config = yaml.safe_load((folder / "config.yaml").read_text())

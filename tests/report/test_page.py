@@ -445,5 +445,5 @@ def test_unfinished_run_is_shown(run: Path, tmp_path: Path, tab: Tab) -> None:
 
 
 def test_page_modules_are_wrapped_in_functions() -> None:
-    """What the page runs is what its modules say: nothing of import and export is left."""
+    """No import or export statement is left in the page's modules."""
     assert not re.search(r"^\s*(import|export) ", program(), re.MULTILINE)

@@ -156,7 +156,7 @@ def test_catalogue_names_a_source_for_each_actuator() -> None:
 
 
 def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
-    """Space file, run, rules, prompt, folder, page, URDF limits, build sheet, command."""
+    """Follow actuators through space file, run, rules, prompt, page, URDF, build sheet and command."""
     task = TASK.model_copy(update={"objectives": ("worst_error", "torque_utilisation", "price")})
     run = optimize(Problem(task, SPACE), proposer="rules", n_init=6, n_step=3, n_total=18, out=tmp_path / "run")
     config, history = read_run(tmp_path / "run")

@@ -25,7 +25,7 @@ LINK = uniform_link((0.0, 0.3, 0.4), 0.2, 0.015)
     ],
 )
 def test_invalid_joints_are_refused(kind: str, axis: str, lower: float, upper: float, words: str) -> None:
-    """An unknown kind in particular: it is never taken for a fixed joint."""
+    """An unknown kind is not taken for a fixed joint."""
     with pytest.raises(ArmError, match=words):
         Joint(kind, axis, lower, upper)
 
@@ -61,14 +61,14 @@ def test_arm_errors_are_user_errors() -> None:
 
 
 def test_uniform_link_has_its_mass_at_half_length() -> None:
-    """Its centre of mass lies half way; its length is the distance from joint to joint."""
+    """The centre of mass is halfway; the length is the distance between joints."""
     assert LINK.com == (0.0, 0.15, 0.2)
     assert LINK.length == pytest.approx(0.5)
     assert uniform_link((0.0, 0.0, 0.0), 0.1, 0.01).length == 0.0
 
 
 def test_reach_is_the_stretched_length_and_longest_stroke() -> None:
-    """All links in one line, and the longest stroke, whichever way it goes; turning adds nothing."""
+    """All links are in line, with the longest stroke in either direction."""
     slide = Joint("prismatic", "z", -0.3, 0.1)
     assert Arm((5.0, 5.0, 5.0), (TURN, Joint("fixed", "x"), slide), (LINK,) * 3).reach == pytest.approx(1.8)
 
@@ -78,7 +78,7 @@ def test_fixed_joint_needs_no_limits() -> None:
 
 
 def test_arms_are_hashable_values() -> None:
-    """Equal by content, usable as keys, and never changed."""
+    """Arms are compared by content, hashable and immutable."""
     one, other = (Arm((0.0, 0.0, 0.0), (TURN,), (LINK,)) for _ in range(2))
     assert one == other
     assert len({one, other}) == 1

@@ -113,7 +113,7 @@ def test_mjcf_tip_matches_the_arm() -> None:
 
 
 def test_mjcf_gravity_torque_matches_the_urdf() -> None:
-    """What qfrc_bias is at rest; both files have the same ten digits."""
+    """Compare qfrc_bias at rest; both files have the same ten digits."""
     for arm in ARMS:
         simulated = Simulated(arm)
         peer = pinocchio.buildModelFromXML(to_urdf(arm))
@@ -149,7 +149,7 @@ def test_mjcf_motion_matches_the_urdf() -> None:
 
 
 def test_gravity_torques_hold_the_posture() -> None:
-    """Constant, for ten steps; without them nearly every arm falls."""
+    """Apply them for ten steps; without them nearly every arm falls."""
     falls: list[bool] = []
     for arm in ARMS:
         simulated = Simulated(arm)
@@ -167,7 +167,7 @@ def test_gravity_torques_hold_the_posture() -> None:
 
 
 def test_mjcf_geometry_has_no_contacts() -> None:
-    """Folded onto itself, an arm is held as any other; a cylinder for each link and a ball for each joint are seen."""
+    """A folded arm has no contacts; each link has a visual cylinder and each joint a ball."""
     joints = tuple(Joint("revolute", "y", -3.2, 3.2) for _ in range(4))
     arm = Arm((0.0, 0.0, 0.5), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4)
     simulated = Simulated(arm)
@@ -178,7 +178,7 @@ def test_mjcf_geometry_has_no_contacts() -> None:
 
 
 def test_cylinders_reach_from_joint_to_joint() -> None:
-    """Of arms that do not slide: what slides stands beyond the end of the link before it."""
+    """Only for arms without slides, which stand beyond the end of the link before them."""
     for arm in TURNING:
         simulated = Simulated(arm)
         model, data = simulated.model, simulated.data
@@ -225,7 +225,7 @@ def test_immobile_arm_compiles() -> None:
 
 
 def test_links_without_length_load() -> None:
-    """A disc's inertia lies on the edge of what a body can have: rounding must not put it beyond."""
+    """The inertia of a disc is at the limit of validity; rounding must not exceed it."""
     joint = Joint("revolute", "y", -1.0, 1.0)
     for mass, radius in np.random.default_rng(36).uniform([0.001, 0.001], [5.0, 0.1], (200, 2)).tolist():
         link = Link((0.0, 0.0, 0.0), mass, (0.0, 0.0, 0.0), radius)
@@ -239,6 +239,6 @@ def test_names_are_escaped(name: str) -> None:
 
 
 def test_export_is_deterministic() -> None:
-    """Nothing but the arm and its name is in it."""
+    """The text depends only on the arm and its name."""
     assert to_mjcf(MIXED) == to_mjcf(MIXED)
     assert to_mjcf(MIXED).startswith('<?xml version="1.0"?>\n<mujoco model="arm">')

@@ -35,7 +35,7 @@ def test_urdf_parsers_accept_ros2_control(arm: Arm) -> None:
 
 @pytest.mark.parametrize("arm", ARMS)
 def test_interfaces_match_moving_joints_and_urdf_limits(arm: Arm) -> None:
-    """As ros2_control reads them: command_interface and state_interface with param min, max and initial_value."""
+    """Read command_interface and state_interface with min, max and initial_value."""
     robot = ElementTree.fromstring(to_ros2_control(arm))
     (system,) = robot.findall("ros2_control")
     assert system.get("type") == "system"

@@ -99,7 +99,7 @@ def test_sdf_states_collisions_and_visuals() -> None:
 
 
 def test_degenerate_links_load() -> None:
-    """Without mass, without length or with next to nothing of either; none has no mass or no inertia in the file."""
+    """Links with zero or tiny mass or length have positive mass and inertia in the file."""
     rng = np.random.default_rng(44)
     edge = [(0.0, 0.02, 0.0), (1e-13, 0.02, 0.1), (1.0, 1e-9, 0.1), (1.0, 0.02, 1e-15)]
     links = [Link((0.0, 0.0, 0.1), 0.0, (0.0, 0.0, 0.05), 0.02, end_mass=0.5)]

@@ -110,7 +110,7 @@ def test_clear_collision_pairs_are_disabled() -> None:
 
 
 def test_neighbouring_and_rigidly_joined_links_are_adjacent() -> None:
-    """Through a link without length, too, and through fixed joints; nothing is said of links that are not solid."""
+    """This applies across links without length and fixed joints; links that are not solid are left out."""
     turning, fixed = Joint("revolute", "y", -3.1, 3.1), Joint("fixed", "x")
     long, none = uniform_link((0.0, 0.0, 0.3), 1.0, 0.02), Link((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0), 0.02)
     arm = Arm((0.0, 0.0, 0.0), (turning, turning, turning, fixed, fixed), (long, none, long, long, long))
@@ -127,7 +127,7 @@ def test_links_that_fold_onto_each_other_are_not_disabled() -> None:
 
 
 def test_coaxial_links_never_collide_beyond_a_neighbour() -> None:
-    """Only yaw, over any range: the line stays a line."""
+    """With yaw joints only, over any range, the line stays a line."""
     joints = tuple(Joint("revolute", "z", -6.0, 6.0) for _ in range(4))
     settled = disabled_collision_pairs(Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.2), 0.5, 0.03),) * 4))
     assert Counter(settled.values()) == {"Adjacent": 3, "Never": 3}
@@ -146,7 +146,7 @@ def test_pinocchio_loads_pairs_and_home_posture(arm: Arm) -> None:
 
 
 def test_srdf_group_is_the_chain_from_base_to_tip() -> None:
-    """By the names of the URDF, which has no other leaf; group_state names joints that move, alone."""
+    """Names follow the URDF, which has no other leaf; group_state names only moving joints."""
     srdf, urdf = ElementTree.fromstring(to_srdf(MIXED, "mixed")), ElementTree.fromstring(to_urdf(MIXED, "mixed"))
     assert srdf.get("name") == urdf.get("name")
     (chain,) = srdf.findall("group/chain")
@@ -168,7 +168,7 @@ numbers = st.lists(st.floats(-1.0, 1.0).map(lambda value: round(value, 3)), min_
 
 @given(numbers)
 def test_segment_distance_agrees_with_bounded_least_squares(values: list[float]) -> None:
-    """Also of parallel ones, of points, and of ones that cross."""
+    """This includes parallel and crossing segments, and points."""
     a, b, c, d = np.array(values).reshape(4, 3)
     found = segment_distance(a[None], b[None], c[None], d[None])[0]
     solved = lsq_linear(np.array([b - a, c - d]).T, c - a, bounds=(0.0, 1.0), method="bvls")

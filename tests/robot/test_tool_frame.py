@@ -49,7 +49,7 @@ EVERY_FORMAT = pytest.mark.parametrize("tip", FORMATS.values(), ids=FORMATS)
 
 @EVERY_FORMAT
 def test_tip_has_the_tool_orientation_at_zero(tip: Callable[[Arm, Array], Array]) -> None:
-    """All 24 turns of a cube, straight up and down included, and any other."""
+    """Check the 24 rotations of a cube and random ones."""
     signed = [
         (s * np.eye(3)[i], t * np.eye(3)[j])
         for i, j in permutations(range(3), 2)

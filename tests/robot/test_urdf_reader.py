@@ -98,7 +98,7 @@ def test_exported_urdf_is_read_back(file: Path, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_link_frames_may_have_any_orientation(file: Path, seed: int) -> None:
-    """The same arm, whichever way its links' frames are turned and its axes point."""
+    """The arm does not depend on the orientation of link frames and axes."""
     arm = any_arm(seed, ("revolute", "prismatic"))
     file.write_text(with_frames_anyhow(arm, seed))
     assert_equal_arms(read_urdf(file).arm, arm)
@@ -106,7 +106,7 @@ def test_link_frames_may_have_any_orientation(file: Path, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_fixed_joints_are_merged(file: Path, seed: int) -> None:
-    """As Pinocchio sees it: the tip, and what holds all masses and the payload."""
+    """Tip and gravity torques, with payload, agree with Pinocchio."""
     file.write_text(with_frames_anyhow(any_arm(seed), seed))
     read = read_urdf(file)
     q = random_values(read.arm, 5, seed)
@@ -115,7 +115,7 @@ def test_fixed_joints_are_merged(file: Path, seed: int) -> None:
 
 
 def test_skew_axes_move_the_zero_posture(file: Path) -> None:
-    """Joints at right angles, each off its zero: other angles mean the same postures."""
+    """Orthogonal joints with moved zeros have other angles for the same postures."""
     moved = 0
     for seed in range(12):
         arm = any_arm(seed, ("revolute",))
@@ -131,7 +131,7 @@ def test_skew_axes_move_the_zero_posture(file: Path) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_commercial_robots_agree_with_pinocchio(name: str) -> None:
-    """Merged bodies, fingers held at 0, axes of either sign, moved zeros: as Pinocchio sees the whole file."""
+    """Merged bodies, fingers held at 0, axes of either sign and moved zeros agree with Pinocchio."""
     path = robot(name)
     joints, error = ROBOTS[name]
     read = read_urdf(path)
@@ -181,7 +181,7 @@ def one_joint(joint: str = 'type="revolute"', inside: str = '<limit lower="-1" u
 
 
 def test_urdf_limits_are_converted(file: Path) -> None:
-    """Without 0 between them, against the axis, and as far as the kernels go."""
+    """Limits may exclude 0, oppose the axis, or exceed the range of the kernels."""
     file.write_text(one_joint(inside='<axis xyz="0 -2 0"/><limit lower="0.5" upper="1.5" effort="3"/>'))
     (joint,) = read_urdf(file).arm.joints
     assert (joint.axis, joint.lower, joint.upper, joint.effort) == ("y", -1.5, -0.5, 3.0)
@@ -262,7 +262,7 @@ def test_missing_and_oversized_files_are_refused(file: Path) -> None:
 
 
 def test_chain_of_ten_thousand_links_is_read(file: Path) -> None:
-    """Nothing recurses."""
+    """No function recurses."""
     n = 10_000
     links = "".join(f'<link name="{i}"/>' for i in range(n + 1))
     joint = '<joint name="{0}" type="{2}"><parent link="{0}"/><child link="{1}"/><limit lower="-1" upper="1"/></joint>'

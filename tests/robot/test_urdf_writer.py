@@ -122,7 +122,7 @@ def test_urdf_in_scikit_robot_matches_the_arm(arm: Arm) -> None:
 
 
 def test_links_without_length_load_in_mujoco() -> None:
-    """A disc's inertia lies on the edge of what a body can have: rounding must not put it beyond."""
+    """The inertia of a disc is at the limit of validity; rounding must not exceed it."""
     rng = np.random.default_rng(24)
     joint = Joint("revolute", "y", -1.0, 1.0)
     for mass, radius in rng.uniform([0.001, 0.001], [5.0, 0.1], (200, 2)).tolist():
@@ -131,7 +131,7 @@ def test_links_without_length_load_in_mujoco() -> None:
 
 
 def test_massless_arm_has_no_mass_in_any_parser() -> None:
-    """Where no inertia is stated, MuJoCo would take water's density and scikit-robot 1 g a link."""
+    """Without a stated inertia, MuJoCo assumes the density of water and scikit-robot 1 g per link."""
     links = (Link((0.0, 0.0, 0.2), 0.0, (0.0, 0.0, 0.1), 0.015), Link((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.015))
     arm = Arm((0.0, 0.0, 0.0), (Joint("revolute", "y", -1.0, 1.0),) * 2, links)
     assert mujoco.MjModel.from_xml_string(to_urdf(arm)).body_mass.sum() < 1e-9
@@ -147,6 +147,6 @@ def test_names_are_escaped(name: str) -> None:
 
 
 def test_export_is_deterministic() -> None:
-    """Written to a run folder and compared: no time, no order of a dictionary in it."""
+    """The text holds no time and no arbitrary order."""
     assert to_urdf(ARMS[0]) == to_urdf(ARMS[0])
     assert to_urdf(ARMS[0]).startswith('<?xml version="1.0"?>\n<robot name="arm">')

@@ -69,7 +69,7 @@ def test_xacro_and_urdf_agree_in_yourdfpy_and_mujoco(arm: Arm) -> None:
 
 @EVERY_ARM
 def test_xacro_arguments_change_the_arm(arm: Arm) -> None:
-    """Any length, radius, mass, mass at the end and base, against the arm built by hand with them."""
+    """Compare with arms built by hand with the same lengths, radii, masses and bases."""
     rng = np.random.default_rng(45)
     slope = 0.3
     arguments: dict[str, float] = {f"base_{axis}": float(rng.uniform(-1.0, 1.0)) for axis in "xyz"}
@@ -114,7 +114,7 @@ def test_xacro_length_matches_the_design_space(mass: dict[str, object]) -> None:
 
 
 def test_mass_proportional_to_length_leaves_no_remainder() -> None:
-    """Else rounding would make a link of its own of 1e-18 kg."""
+    """Otherwise rounding would create a separate link of 1e-18 kg."""
     for length in np.random.default_rng(47).uniform(0.01, 1.0, 200).tolist():
         arm = Arm((0.0, 0.0, 0.0), (Joint("fixed", "x"),), (uniform_link((0.0, 0.0, length), 0.7 * length, 0.02),))
         (argument,) = [
@@ -139,7 +139,7 @@ def test_link_length_may_become_zero_or_positive() -> None:
 
 
 def test_links_without_length_load_in_mujoco() -> None:
-    """A disc's inertia lies on the edge of what a body can have: rounding must not put it beyond."""
+    """The inertia of a disc is at the limit of validity; rounding must not exceed it."""
     joint = Joint("revolute", "y", -1.0, 1.0)
     for mass, radius in np.random.default_rng(48).uniform([0.001, 0.001], [5.0, 0.1], (50, 2)).tolist():
         arm = Arm((0.0, 0.0, 0.0), (joint,), (Link((0.0, 0.0, 0.0), mass, (0.0, 0.0, 0.0), radius),))

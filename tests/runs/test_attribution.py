@@ -60,7 +60,7 @@ def test_attribution_curves_add_up_and_end_at_the_totals(trials: list[tuple[str,
 
 
 def test_trial_gains_the_hypervolume_it_adds_on_entry() -> None:
-    """(1, 1) adds nothing more to (1, 0) once that is there; before it, it would have."""
+    """(1, 1) adds nothing after (1, 0), but would have before it."""
     past = history([("", (16, 16)), ("", (20, 0)), ("", (8, 8)), ("rules", (4, 4)), ("bbo", (4, 0)), ("rules", (4, 4))])
     gains = hypervolume_gains(past)
     assert gains is not None

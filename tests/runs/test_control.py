@@ -210,7 +210,7 @@ def test_stop_cancels_calls_in_flight(chat_server: ChatServer, tmp_path: Path) -
 
 
 def test_only_hints_survive_an_earlier_session(tmp_path: Path) -> None:
-    """Also where that session came to no trial."""
+    """This holds even if that session had no trial."""
     out = tmp_path / "run"
     out.mkdir()
     hint = add_hint(out, "shorter links")
@@ -452,7 +452,7 @@ def prompts_with_hints(folder: Path) -> dict[str, str]:
 
 @pytest.mark.parametrize("asking", [{}, {"answer": "one-step", "memory": "own"}, {"prompt": "minus"}])
 def test_hint_enters_the_next_prompt_once(chat_server: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
-    """Whether the run is interrupted or not; in the transcript no other call has a word of hints."""
+    """This holds with and without an interrupt; no other recorded call has hints."""
     out = tmp_path / "run"
 
     def watch(progress: Progress) -> None:
@@ -495,7 +495,7 @@ def test_several_hints_form_a_list_and_later_ones_wait(chat_server: ChatServer, 
 def test_hint_lost_with_a_failed_call_enters_the_next_prompt(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One that the model refused does not: else it would be refused for ever."""
+    """A hint that the model refused is dropped, or every later prompt would be refused."""
     monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
     out = tmp_path / "run"
     answers: dict[int, Answer] = {4: (503, "{}"), 7: (400, "{}")}  # by trial
@@ -513,7 +513,7 @@ def test_hint_lost_with_a_failed_call_enters_the_next_prompt(
 
 
 def test_hint_of_an_interrupted_call_is_sent_again(chat_server: ChatServer, tmp_path: Path) -> None:
-    """With the same words; and once it was answered, the second call of the same proposal has no hint."""
+    """The prompt is the same; after the answer, the second call of the proposal has no hint."""
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
         run(out, asks(chat_server), watch=after(3, lambda: (add_hint(out, "first"), interrupt())))
@@ -549,7 +549,7 @@ def test_concurrent_calls_share_no_hint(chat_server: ChatServer, tmp_path: Path)
 
 
 def test_reused_hint_number_is_a_new_hint(chat_server: ChatServer, tmp_path: Path) -> None:
-    """Numbers begin anew where control.json was deleted."""
+    """Numbers restart after control.json is deleted."""
     out = tmp_path / "run"
 
     def watch(progress: Progress) -> None:
@@ -629,7 +629,7 @@ def test_run_with_a_template_without_hints_sends_them(chat_server: ChatServer, t
 
 
 def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: Path) -> None:
-    """The replay's own control.json adds nothing; and a replay can be replayed."""
+    """The replay ignores its own control.json, and can itself be replayed."""
 
     def answer(request: Request) -> Answer:
         n = len(chat_server.requests)
@@ -652,7 +652,7 @@ def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: P
 
 
 def test_manual_proposer_gets_no_hints(tmp_path: Path) -> None:
-    """Their question has to stay the same until it is answered."""
+    """A question must stay the same until it is answered."""
     out, folder = tmp_path / "run", tmp_path / "ask"
     for _ in range(2):
         with pytest.raises(AnswerPendingError):

@@ -44,7 +44,7 @@ def assert_same(one: History, other: History) -> None:
 def test_grown_history_equals_a_new_history(
     rows: list[tuple[object, tuple[int, int], float, str]], steps: list[int], found_at: int, data: st.DataObject
 ) -> None:
-    """Whatever was asked of it on the way; the reference point may be found on the way, too."""
+    """This holds whatever is computed in between, and whenever the reference point is found."""
     everything = [finished(i, d, tuple(map(float, v)), b, s) for i, (d, v, b, s) in enumerate(rows)]
     point = (3.5, 3.5)
     history = History(PROBLEM, (), 2)

@@ -139,7 +139,7 @@ def verdicts_of(folder: Path, history: History) -> dict[int, str]:
 
 
 def test_exported_runs_cover_all_trial_fields(run: Path) -> None:
-    """Or the comparison above would pass over parameters, attributes and notes that no trial has."""
+    """Otherwise the comparison above could miss parameters, attributes and notes."""
     with opened(run / STUDY_DB) as study:
         assert len({len(trial.params) for trial in study.trials}) > 1
         names = {name for trial in study.trials for name in trial.user_attrs}
@@ -241,7 +241,7 @@ def test_front_designs_have_urdf_artifacts(run: Path, tmp_path: Path) -> None:
 
 
 def test_exported_study_can_be_continued(plain: Path, tmp_path: Path) -> None:
-    """And an export never replaces what it added."""
+    """An export never replaces trials added to it."""
     database, problem = tmp_path / STUDY_DB, Problem(load_task("target-1"))
     export_study(plain, database)
     with opened(database) as study:
@@ -273,7 +273,7 @@ def test_nsga2_continues_from_the_parents_of_the_run(run: Path) -> None:
 
 
 def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
-    """And a stopped run is exported as far as it came, without the verdicts of its earlier end."""
+    """A stopped run is exported up to its last trial, without outdated verdicts."""
     problem, folder = Problem(load_task("target-1")), tmp_path / "run"
     optimize(problem, proposer="none", n_total=1, out=folder)
     assert not (folder / STUDY_DB).exists()

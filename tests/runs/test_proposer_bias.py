@@ -97,7 +97,7 @@ def test_designs_with_other_joints_are_not_repeats() -> None:
 
 
 def test_front_share_growth_is_detected() -> None:
-    """Every trial here is on the front as long as none is better in both."""
+    """Every trial is on the front while none is better in both objectives."""
     values = [(5.0, 1.0), (4.0, 2.0), (3.0, 3.0), (2.0, 4.0), (1.0, 5.0)]
 
     def share(sources: list[str]) -> tuple[float, float, bool]:

@@ -162,7 +162,7 @@ def test_restored_study_equals_uninterrupted_one() -> None:
 
 
 def test_resumed_sampler_does_not_repeat_draws() -> None:
-    """One seed for the whole run would: a sampler made anew begins at its beginning."""
+    """With one seed for the whole run, a new sampler would repeat its first draws."""
     first = fill(BlackBox(SPACE, "random", seed=0), 20)
     resumed = BlackBox(SPACE, "random", seed=0)
     resumed.restore(first)
@@ -171,7 +171,7 @@ def test_resumed_sampler_does_not_repeat_draws() -> None:
 
 
 def test_random_trials_are_independent_of_the_sampler() -> None:
-    """So that methods that are compared by seed begin alike."""
+    """Methods compared by seed therefore start equally."""
     a = fill(BlackBox(SPACE, "tpe", seed=3), 10)
     b = fill(BlackBox(SPACE, "random", seed=3), 10)
     assert [trial.design for trial in a] == [trial.design for trial in b]
@@ -196,7 +196,7 @@ def test_genetic_samplers_use_injected_designs_as_parents() -> None:
 
 
 def test_unreachable_target_is_a_finite_objective() -> None:
-    """FAILED trials would teach the sampler nothing."""
+    """The sampler learns nothing from FAILED trials."""
     problem = Problem(Task(name="far", targets=((50.0, 0.0, 0.0),)))
     box = BlackBox(SPACE, "tpe", seed=0)
     trial, design = box.draw(0, RANDOM)

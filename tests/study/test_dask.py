@@ -91,7 +91,7 @@ def numbers(run: Path) -> list[int]:
     ids=["tpe and refinements", "nsga2", "many quantities"],
 )
 def test_one_worker_gives_the_in_process_run(tmp_path: Path, shell: ShellCluster, settings: dict[str, Any]) -> None:
-    """To the bit, apart from seconds."""
+    """Runs are bit-identical, apart from seconds."""
     asked = {**SHORT, **settings}
     problem = asked.pop("problem")
     shell.only(2)
@@ -116,7 +116,7 @@ for out, workers in (("here", None), ("there", aw.Workers(1))):
 
 @pytest.mark.slow
 def test_script_without_a_main_guard_uses_a_local_worker(in_folder: Path) -> None:
-    """Its evaluator goes to the worker by value; the script itself is not run again there."""
+    """The evaluator is pickled by value; the script does not run again on the worker."""
     (in_folder / "script.py").write_text(SCRIPT)
     done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -189,7 +189,7 @@ def test_further_designs_of_an_answer_wait_for_their_blocks(seed: int, in_flight
 
 
 def test_permanent_fault_of_concurrent_calls_is_reported_once() -> None:
-    """However many questions under way meet it."""
+    """This holds for any number of calls in flight."""
 
     class Keyless(Proposer):
         name = "keyless"
@@ -207,7 +207,7 @@ def test_permanent_fault_of_concurrent_calls_is_reported_once() -> None:
 
 
 def test_interrupt_waits_for_answers_being_recorded() -> None:
-    """The study waits a moment for the threads that keep it."""
+    """The study waits briefly for the threads that record answers."""
 
     class Keeping(Proposer):
         name = "keeping"
@@ -275,7 +275,7 @@ def test_interrupted_run_pays_for_no_answer_twice(chat_server: ChatServer, tmp_p
 
 
 def test_interrupt_cancels_calls_in_flight(chat_server: ChatServer) -> None:
-    """While the server still holds its answers back."""
+    """The server still withholds its answers."""
     released = threading.Event()
 
     def answer(request: Request) -> Answer:

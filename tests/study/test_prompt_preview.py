@@ -148,7 +148,7 @@ def interrupted(out: Path, stop: int, server: ChatServer, in_flight: int | None)
 
 
 def test_prompt_after_an_interrupt_is_the_next_one_sent(chat_server: ChatServer, in_folder: Path) -> None:
-    """Two questions were under way, for trials 4 and 7; none was answered."""
+    """Two calls were in flight, for trials 4 and 7; neither was answered."""
     answered = threading.Event()
 
     def answer(request: Request) -> Answer:

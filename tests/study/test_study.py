@@ -132,7 +132,7 @@ class Repeating(Proposer):
 
 
 def test_duplicate_is_recorded_before_the_next_trial(tmp_path: Path) -> None:
-    """Else the next one would be drawn without it, and after a kill between the two with it."""
+    """Otherwise a kill between the two trials would change the next draw."""
     proposer = Repeating()
     run = optimize(PROBLEM, proposer=proposer, n_init=2, n_step=1, n_total=5, out=tmp_path / "run")
     assert proposer.shown == [(number, number) for number in range(2, 7)]
@@ -211,7 +211,7 @@ def test_resumed_run_equals_uninterrupted_one(
 
 @pytest.mark.parametrize("proposer", [pytest.param(name, marks=NEEDS_GP) for name in ("none", "rules")])
 def test_resumed_run_with_gp_equals_uninterrupted_one(tmp_path: Path, proposer: str) -> None:
-    """It draws by its model from the 11th trial on, some 0.3 s each: few trials, and a stop among them."""
+    """GP draws use the model from the 11th trial on and take 0.3 s each, so the run is short."""
     check_resume(tmp_path / "run", 12, proposer=proposer, sampler="gp", n_init=5, n_step=4, n_total=12)
 
 

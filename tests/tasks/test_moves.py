@@ -100,7 +100,7 @@ def test_tip_and_torque_along_a_move_agree_with_pinocchio(arms: list[Arm]) -> No
 
 
 def test_planar_move_matches_the_closed_form() -> None:
-    """Both elbows, by the law of cosines; the one that the arm begins with is the one that it keeps."""
+    """The law of cosines gives both elbows; the arm keeps its initial one."""
     a, b = 0.3, 0.25
     targets = np.array([[0.2, 0.0, 0.2], [0.35, 0.0, -0.2]])
     evaluation = evaluate([planar(a, b)], targets, moves=Moves(((0, 1),), 0.01))
@@ -127,7 +127,7 @@ def test_move_through_the_unreachable_centre_fails() -> None:
 
 
 def test_flip_is_reported_as_a_joint_jump() -> None:
-    """A line close by the axis of the base: the first joint has to make half a turn within some steps."""
+    """On a line close to the base axis, the first joint makes half a turn within a few steps."""
     links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (0.2, 0.3, 0.3))
     axes = ("z", "y", "y")
     arm = Arm((0.0, 0.0, 0.0), tuple(Joint("revolute", axis, -3.1, 3.1) for axis in axes), links)
@@ -141,7 +141,7 @@ def test_flip_is_reported_as_a_joint_jump() -> None:
 
 
 def test_moves_continue_from_sample_to_sample() -> None:
-    """As one would do it by hand, one move and one sample after the other; to the bit."""
+    """The result is bit-identical to solving sample after sample."""
     space = paper_space(5)
     arms = stack_designs(space, space.matrix(space.sample(40, 3)))
     targets, pairs = np.array(CORNERS), ((0, 1), (2, 1), (1, 0))
@@ -170,7 +170,7 @@ def test_moves_do_not_depend_on_the_batch() -> None:
 
 
 def test_mirrored_arms_mirror_their_moves() -> None:
-    """In the plane y = 0: what turns about x and z turns the other way."""
+    """Mirroring at y = 0 reverses rotations about x and z."""
     arms = moving_arms(60, 5, 8)
     flip = np.array([1.0, -1.0, 1.0])
 
@@ -193,7 +193,7 @@ def test_mirrored_arms_mirror_their_moves() -> None:
 
 
 def test_finer_steps_follow_the_line_no_worse() -> None:
-    """Of arms that follow a line at all, in distribution."""
+    """This holds in distribution for arms that can follow the line."""
     space = paper_space(6)
     arms = [space.arm(design) for design in space.sample(400, 1)]
     shares = []

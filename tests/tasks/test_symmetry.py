@@ -46,7 +46,7 @@ def test_target_2_has_its_known_symmetry_planes() -> None:
 
 
 def test_target_3_has_its_known_symmetry_planes() -> None:
-    """Its file has six digits, and is symmetric within 1e-6 m."""
+    """The file has six digits and is symmetric within 1e-6 m."""
     normals = symmetry_planes(load_task("target-3").target_positions)
     angles = np.degrees(np.arctan2(normals[:, 2], normals[:, 1])) % 180.0
     own = np.abs(normals[:, 0]) > 0.5
@@ -111,7 +111,7 @@ def test_point_moved_beyond_the_tolerance_breaks_symmetry() -> None:
 
 
 def test_line_has_its_bisecting_plane_and_a_point_none() -> None:
-    """Every place lies on one of the other planes through a line: they would say nothing."""
+    """Planes through a line contain every point and are therefore omitted."""
     line = np.array([[0.1, 0.2, 0.3]]) + np.arange(5)[:, None] * np.array([[0.0, 0.3, 0.4]])
     assert symmetry_planes(line) == pytest.approx(np.array([[0.0, 0.6, 0.8]]))
     assert len(symmetry_planes(np.vstack([line, line[4] + np.array([0.0, 0.9, 1.2])]))) == 0

@@ -136,7 +136,7 @@ def test_objectives_use_weights_and_tolerances() -> None:
 
 
 def test_verification_uses_the_same_targets() -> None:
-    """In float64 a design is as good as in the search, by and large, and its orientation counts."""
+    """Designs are about as good in float64 as in the search, and orientation counts."""
     problem = Problem(task(), paper_space(6))
     designs = problem.space.sample(30, 0)
     values = problem.evaluate(designs).values

@@ -69,7 +69,7 @@ def test_workspace_points_lie_in_their_region() -> None:
 
 
 def test_two_link_arm_reaches_a_spherical_shell() -> None:
-    """Two links whose first joints point anywhere reach all between |a - b| and a + b from their base."""
+    """Two links with spherical first joints reach all distances from |a - b| to a + b."""
     a, b = 0.45, 0.25
     links = tuple(uniform_link((0.0, 0.0, long), 0.1, 0.01) for long in (1e-4, a, b))
     joints = tuple(Joint("revolute", axis, -3.1, 3.1) for axis in ("z", "y", "y"))
@@ -95,7 +95,7 @@ def test_workspace_points_are_solved_like_targets() -> None:
 
 
 def test_longer_arms_cover_at_least_as_much() -> None:
-    """Twice as large an arm in a workspace of twice the size is the same."""
+    """Scaling arm and workspace together changes nothing."""
     space = paper_space(5)
     small = [space.arm(design) for design in space.sample(40, 1)]
     large = [

@@ -203,7 +203,7 @@ def test_processes_on_one_storage_share_proposals(chat_server: ChatServer, tmp_p
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 @pytest.mark.parametrize("genetic", [NSGAIISampler, NSGAIIISampler])
 def test_genetic_samplers_use_proposals_as_parents(genetic: type[NSGAIISampler]) -> None:
-    """They pass over enqueued trials that have no generation: with plain `enqueue_trial` no proposal is a parent."""
+    """Genetic samplers skip enqueued trials without a generation, so `enqueue_trial` alone gives no parents."""
 
     class Best(Told):
         def propose(self, study: optuna.Study, seed: int, number: int) -> StudyProposal:
@@ -265,7 +265,7 @@ def test_proposals_outside_the_space_are_refused(others: dict[str, Any], words: 
 
 
 def test_proposed_values_have_optuna_types() -> None:
-    """A step's float noise is moved onto the grid; numpy's numbers cannot be kept in a storage."""
+    """Values are rounded to the step, and numpy scalars converted, as storages cannot hold them."""
     study = tpe()
     proposer = Told(x=np.float64(7.0), y=np.int64(5))
     study.optimize(objective, n_trials=2, callbacks=[ProposalCallback(proposer, every=2)])
@@ -399,7 +399,7 @@ def origins(study: optuna.Study) -> list[float]:
 
 @pytest.mark.parametrize("callbacks", [1, 2])
 def test_proposer_is_called_separately_for_each_study(thinker: ChatServer, callbacks: int) -> None:
-    """Both ask for trials 3 and 7; so would a study that is taken up again."""
+    """Both studies request trials 3 and 7, as a resumed study would."""
     llm = llm_proposer(thinker.url, max_calls=4)
     made = [ProposalCallback(llm, 4, problem=PROBLEM) for _ in range(callbacks)]
     studies = [tpe(seed, directions=["minimize"] * 2) for seed in range(2)]

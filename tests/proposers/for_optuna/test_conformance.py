@@ -156,7 +156,7 @@ def test_failed_pruned_and_nan_trials_are_ignored() -> None:
 @pytest.mark.parametrize("value", [float("inf"), -float("inf"), 1e308, -1e308, 0.0])
 @pytest.mark.parametrize("n_objectives", [1, 3])
 def test_equal_and_infinite_values_are_handled(value: float, n_objectives: int) -> None:
-    """Where all are alike, or all infinite; one is not."""
+    """All values but one are equal or infinite."""
     study = optuna.create_study(directions=["maximize"] * n_objectives, sampler=RandomSampler(seed=0))
     callback = rules()
 
@@ -251,7 +251,7 @@ def test_infeasible_trials_are_not_parents() -> None:
 
 
 def test_stated_space_keeps_a_fixed_parameter() -> None:
-    """Optuna's enqueued trials go before its samplers, so a PartialFixedSampler alone does not bind proposals."""
+    """Enqueued trials bypass samplers, so PartialFixedSampler alone does not bind proposals."""
     study = optuna.create_study(sampler=TPESampler(seed=0))
     study.optimize(mixed, n_trials=5)
     study.sampler = PartialFixedSampler({"whole": 4}, study.sampler)

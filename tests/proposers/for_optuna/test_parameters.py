@@ -198,7 +198,7 @@ def test_answer_without_the_parameters_object_is_read() -> None:
 
 
 def test_missing_reason_is_empty() -> None:
-    """Not the word None; and what is not seen is not kept."""
+    """A missing reason is not the word None, and invisible characters are dropped."""
     parameters = [Parameter("C", "C", FloatDistribution(0.0, 9.0))]
     assert read_answer({"C": 1, "reason": None}, parameters, OBJECTIVES).reason == ""
     assert read_answer({"C": 1, "reason": "so\x1b[2J\u200b it is"}, parameters, OBJECTIVES).reason == "so it is"

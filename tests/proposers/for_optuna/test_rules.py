@@ -91,7 +91,7 @@ def trials(draw: st.DrawFn) -> tuple[dict[str, BaseDistribution], list[dict[str,
 def test_rules_stay_in_the_space_of_any_study(
     drawn: tuple[dict[str, BaseDistribution], list[dict[str, Any]], list[list[float]]], seed: int
 ) -> None:
-    """Any kinds, conditional at random, values up to infinity, equal trials: a proposal that Optuna's check passes."""
+    """For any parameter kinds, conditions and values, Optuna accepts the proposals."""
     space, rows, values = drawn
     study = optuna.create_study(directions=["minimize"] * len(values[0]))
     for row, value in zip(rows, values, strict=True):
@@ -136,7 +136,7 @@ def test_swapped_choice_brings_its_conditional_parameters() -> None:
 
 @pytest.mark.parametrize("direction", ["minimize", "maximize"])
 def test_trend_rule_descends(direction: str) -> None:
-    """Of a value that grows with x and falls with y, whatever z: x falls, y grows."""
+    """If the value grows with x and falls with y, then x falls and y grows."""
     rng = np.random.default_rng(0)
     sign = 1.0 if direction == "minimize" else -1.0
     study = optuna.create_study(direction=direction)
@@ -175,7 +175,7 @@ def test_feasible_trials_are_preferred_as_parents() -> None:
 
 
 def test_exhausted_space_repeats_designs_without_a_fault() -> None:
-    """Of eight points five are left for proposals to find; after that they have to come again."""
+    """Proposals find the remaining five of eight points, then repeat."""
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     callback = aw.ProposalCallback(aw.StudyRulesProposer(), every=1, first=3)
 
@@ -221,7 +221,7 @@ def test_trials_outside_a_changed_range_are_ignored() -> None:
 
 
 def test_stated_space_missing_from_the_study_is_reported() -> None:
-    """No trial lies in it, so there is nothing to make a proposal of; one from the space itself is refused."""
+    """No trial lies in the space, so proposals have no basis and are counted as faults."""
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     callback = aw.ProposalCallback(aw.StudyRulesProposer(space={"x": FloatDistribution(2.0, 5.0)}), every=5)
     study.optimize(lambda trial: trial.suggest_float("x", 0.0, 1.0), n_trials=15, callbacks=[callback])
@@ -246,7 +246,7 @@ def test_second_proposal_is_far_from_a_single_trial() -> None:
 
 
 def test_enqueued_trials_may_lie_outside_the_space() -> None:
-    """Of another kind of design that no trial has shown yet, or of a name that nobody suggests."""
+    """Enqueued trials may have unseen kinds of parameters or unknown names."""
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0))
     study.enqueue_trial({"kind": "a", "x": 0.5, "old": 3})
     study.enqueue_trial({"kind": "b", "y": 0.5})
