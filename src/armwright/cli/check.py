@@ -10,6 +10,7 @@ from armwright.cli.notes import unused_parts
 from armwright.cli.show_inputs import show_task
 from armwright.cli.streams import format_point
 from armwright.problem.problem import Problem
+from armwright.runs.config import record_objectives
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter
 from armwright.tasks.obstacles import Obstacle
@@ -26,10 +27,7 @@ def check_problem(problem: Problem) -> dict[str, Any]:
     space = problem.space
     return {
         "task": problem.task.model_dump(mode="json"),
-        "objectives": [
-            {"name": objective.name, "unit": objective.unit, "label": objective.label}
-            for objective in problem.objectives
-        ],
+        "objectives": [record.model_dump() for record in record_objectives(problem.objectives)],
         "constraints": list(problem.task.constraints),
         "reference_point": problem.reference_point,
         "space": {

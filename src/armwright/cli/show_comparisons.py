@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from armwright.cli.notes import payload_note
-from armwright.cli.streams import format_point, plain_table
+from armwright.cli.streams import format_point, list_files, plain_table
 from armwright.experiments.cells import Cell, Skipped
 from armwright.experiments.compare_arms import MEASURES, ArmComparison, ComparedArm
 from armwright.experiments.runner import CellOutcome
@@ -66,9 +66,9 @@ def show_comparison(console: Console, tables: Sequence[Path], figures: Sequence[
 
 def show_files(console: Console, tables: Sequence[Path], figures: Sequence[Path]) -> None:
     """Print the paths of tables and figures."""
-    console.print(f"tables: {tables[0].parent}/ ({', '.join(path.name for path in tables)})")
+    console.print(list_files("tables", tables))
     if figures:
-        console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+        console.print(list_files("figures", figures))
 
 
 def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]) -> None:

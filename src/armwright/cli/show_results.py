@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from armwright.cli.notes import payload_note, unused_parts
-from armwright.cli.streams import format_point, plain_table
+from armwright.cli.streams import format_point, list_files, plain_table
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.report.style import look
@@ -125,7 +125,7 @@ def _show_files(console: Console, folder: Path | None, figures: Sequence[Path]) 
         return
     console.print(f"results: {folder}/ (summary.json, front.csv, designs/NNNN/arm.urdf)")
     if figures:
-        console.print(f"figures: {figures[0].parent}/ ({', '.join(path.name for path in figures)})")
+        console.print(list_files("figures", figures))
         console.print(f"page: {folder / REPORT}")
 
 

@@ -53,6 +53,11 @@ def exit_interrupted(console: Console, kept: str) -> NoReturn:
     sys.exit(INTERRUPTED)
 
 
+def list_files(name: str, files: Sequence[Path]) -> str:
+    """Return a line that names files in one folder."""
+    return f"{name}: {files[0].parent}/ ({', '.join(file.name for file in files)})"
+
+
 def format_point(point: Sequence[float]) -> str:
     """Return a point as (x, y, z)."""
     return "(" + ", ".join(f"{value:g}" for value in point) + ")"

@@ -58,8 +58,7 @@ def _draw_text(title: str, text: str) -> Figure:
     lines = [part for whole in plain.splitlines() for part in textwrap.wrap(whole, LINE_LENGTH) or [""]]
     height = 0.7 + 0.148 * len(lines)
     figure = Figure(figsize=(8.0, height))
-    head: dict[str, Any] = {"fontsize": 9, "weight": "bold"}
-    body: dict[str, Any] = {"fontsize": 7.5, "family": "monospace", "linespacing": 1.2}
-    figure.text(0.02, 1 - 0.15 / height, textwrap.fill(title, 110), va="top", parse_math=False, **head)
-    figure.text(0.02, 1 - 0.5 / height, "\n".join(lines), va="top", parse_math=False, **body)
+    form: dict[str, Any] = {"va": "top", "parse_math": False}
+    figure.text(0.02, 1 - 0.15 / height, textwrap.fill(title, 110), fontsize=9, weight="bold", **form)
+    figure.text(0.02, 1 - 0.5 / height, "\n".join(lines), fontsize=7.5, family="monospace", linespacing=1.2, **form)
     return figure
