@@ -1,4 +1,4 @@
-"""Pause, stop, hints and status of a running study."""
+"""Pause, stop and status of a running study."""
 
 import json
 import os
@@ -6,32 +6,16 @@ import shlex
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from armwright.exceptions import (
-    AnswerPendingError,
-    ModelError,
-    ProposalError,
-    RunFolderError,
-    SettingsError,
-    StoppedError,
-)
+from armwright.exceptions import ModelError, ProposalError, RunFolderError, SettingsError, StoppedError
 from armwright.experiments.cells import plan_cells
 from armwright.experiments.plan import ExperimentPlan
 from armwright.experiments.runner import run_cell
-from armwright.llm import client as chat
-from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import Prompt, load_prompt, whole_template
-from armwright.llm.transcript import Call, Transcript, hints_of, used_hints
-from armwright.problem.problem import Problem
-from armwright.proposers.llm import LlmProposer
-from armwright.proposers.manual import ManualProposer
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.proposers.replay import ReplayProposer
 from armwright.runs import control
 from armwright.runs.control import (
     CONTROL,
@@ -41,7 +25,6 @@ from armwright.runs.control import (
     STATUS,
     Control,
     Hint,
-    Status,
     add_hint,
     pause_study,
     read_control,
@@ -50,65 +33,11 @@ from armwright.runs.control import (
     stop_study,
 )
 from armwright.runs.history import History
-from armwright.study.progress import Progress, StudyResult
-from armwright.study.prompt_preview import preview_after
-from armwright.study.study import optimize
-from armwright.tasks.catalogue import load_task
-from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from armwright.study.progress import Progress
+from tests.support.chat_server import Answer, ChatServer, Request, designer
 from tests.support.command_line import PATIENCE, armwright
-from tests.support.fixed_problem import FixedProblem, fixed_history
-from tests.support.wire_formats import llm_proposer, model_options
-
-PROBLEM = Problem(load_task("target-1"))
-SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2, "verify": False}
-NOTE = "A note from the engineer who watches this search; take it into account: "
-NOTES = "Notes from the engineer who watches this search; take them into account:\n"
-
-
-def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -> StudyResult:
-    return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
-
-
-def asks(server: ChatServer, **asking: Any) -> LlmProposer:
-    return llm_proposer(server.url, **asking)
-
-
-def lines(folder: Path) -> list[dict[str, Any]]:
-    """The trials of a run without their seconds."""
-    trials = (folder / "trials.jsonl").read_text().splitlines()
-    return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
-
-
-def calls(folder: Path) -> tuple[Call, ...]:
-    return Transcript(folder / "transcripts.jsonl", read_only=True).calls
-
-
-def after(number: int, act: Callable[[], object]) -> Callable[[Progress], None]:
-    """Watches a study, and acts when this trial is finished."""
-
-    def watch(progress: Progress) -> None:
-        if progress.doing == "finished" and progress.number == number:
-            act()
-
-    return watch
-
-
-def interrupt() -> None:
-    raise KeyboardInterrupt
-
-
-def status(folder: Path) -> Status:
-    there = read_status(folder)
-    assert there is not None
-    return there
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        threading.Event().wait(0.005)
-
+from tests.support.controlled_runs import after, asks, interrupt, lines, run, status, wait_until
+from tests.support.wire_formats import model_options
 
 # Pause and stop.
 
@@ -436,228 +365,3 @@ def test_run_without_a_folder_has_no_control(in_folder: Path) -> None:
     stop_study(in_folder)
     assert len(run(None).trials) == 13
     assert {path.name for path in in_folder.iterdir()} <= set(control.CHANNEL_FILES)
-
-
-# Hints.
-
-
-def prompts_with_hints(folder: Path) -> dict[str, str]:
-    """What stands after the words that lead to the hints, by proposal."""
-    return {
-        f"{call.proposal} {call.step}": (call.prompt.partition(NOTE)[2] or call.prompt.partition(NOTES)[2])
-        for call in calls(folder)
-        if NOTE in call.prompt or NOTES in call.prompt
-    }
-
-
-@pytest.mark.parametrize("asking", [{}, {"answer": "one-step", "memory": "own"}, {"prompt": "minus"}])
-def test_hint_enters_the_next_prompt_once(chat_server: ChatServer, tmp_path: Path, asking: dict[str, Any]) -> None:
-    """This holds with and without an interrupt; no other recorded call has hints."""
-    out = tmp_path / "run"
-
-    def watch(progress: Progress) -> None:
-        after(5, lambda: add_hint(out, " no joint may\nbe a roll joint "))(progress)
-        after(8, interrupt)(progress)
-
-    with pytest.raises(KeyboardInterrupt):
-        run(out, asks(chat_server, **asking), watch=watch)
-    run(out, asks(chat_server, **asking))
-    step = "answer" if "answer" in asking else "reasoning"
-    told = prompts_with_hints(out)
-    assert list(told) == [f"llm-0007 {step}"]
-    assert told[f"llm-0007 {step}"].startswith("no joint may be a roll joint\n")
-    (hint,) = read_control(out).hints
-    assert hint == Hint(1, "no joint may\nbe a roll joint")
-    assert used_hints(calls(out)) == {hint: "llm-0007"}
-    assert [call.hints for call in calls(out) if (call.proposal, call.step) == ("llm-0007", step)] == [(hint,)]
-    written = [json.loads(line) for line in (out / "transcripts.jsonl").read_text().splitlines()]
-    assert [call["hints"] for call in written if "hints" in call] == [[asdict(hint)]]
-    assert sum(NOTE in prompt for prompt in chat_server.prompts()) == 1
-
-
-def test_several_hints_form_a_list_and_later_ones_wait(chat_server: ChatServer, tmp_path: Path) -> None:
-    out = tmp_path / "run"
-
-    def watch(progress: Progress) -> None:
-        after(2, lambda: (add_hint(out, "first"), add_hint(out, "second")))(progress)
-        after(7, lambda: add_hint(out, "third"))(progress)
-
-    run(out, asks(chat_server), watch=watch)
-    told = prompts_with_hints(out)
-    assert list(told) == ["llm-0004 reasoning", "llm-0010 reasoning"]
-    assert told["llm-0004 reasoning"].startswith("- first\n- second\n\nEnd your answer with")
-    assert told["llm-0010 reasoning"].startswith("third\n\nEnd your answer with")
-    assert {hint.id: proposal for hint, proposal in used_hints(calls(out)).items()} == {
-        1: "llm-0004", 2: "llm-0004", 3: "llm-0010",
-    }  # fmt: skip
-
-
-def test_hint_lost_with_a_failed_call_enters_the_next_prompt(
-    chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A hint that the model refused is dropped, or every later prompt would be refused."""
-    monkeypatch.setattr(chat, "RETRY_SECONDS", 0.0)
-    out = tmp_path / "run"
-    answers: dict[int, Answer] = {4: (503, "{}"), 7: (400, "{}")}  # by trial
-    asked: list[int] = []
-
-    def answer(request: Request) -> Answer:
-        asked.append(status(out).number)
-        return answers.get(asked[-1], designer(request))
-
-    chat_server.answer = answer
-    run(out, asks(chat_server, answer="one-step"), watch=after(3, lambda: add_hint(out, "first")))
-    assert list(prompts_with_hints(out)) == ["llm-0004 answer", "llm-0007 answer"]
-    assert used_hints(calls(out)) == {Hint(1, "first"): "llm-0007"}
-    assert [call.fault for call in calls(out)] == [None, "server", "rejected", None]
-
-
-def test_hint_of_an_interrupted_call_is_sent_again(chat_server: ChatServer, tmp_path: Path) -> None:
-    """The prompt is the same; after the answer, the second call of the proposal has no hint."""
-    out = tmp_path / "run"
-    with pytest.raises(KeyboardInterrupt):
-        run(out, asks(chat_server), watch=after(3, lambda: (add_hint(out, "first"), interrupt())))
-    shown = preview_after(out).prompt
-    assert NOTE + "first\n" in shown
-    run(out, asks(chat_server))
-    assert [call.prompt for call in calls(out) if call.hints] == [shown]
-    file = out / "transcripts.jsonl"  # as a kill after the thoughts leaves it
-    file.write_text("".join(file.read_text().splitlines(keepends=True)[:3]))  # two checks, and the thoughts
-    (out / "trials.jsonl").write_text("".join((out / "trials.jsonl").read_text().splitlines(keepends=True)[:4]))
-    (out / "summary.json").unlink()
-    chat_server.requests.clear()
-    run(out, asks(chat_server))
-    assert not any(NOTE in prompt for prompt in chat_server.prompts())
-    assert hints_of(calls(out), "llm-0004") == (Hint(1, "first"),)
-
-
-def test_concurrent_calls_share_no_hint(chat_server: ChatServer, tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    out.mkdir()
-    add_hint(out, "first")
-    together = threading.Barrier(2, timeout=PATIENCE)
-
-    def answer(request: Request) -> Answer:
-        if len(chat_server.requests) in (2, 3):
-            together.wait()  # both are asked before either is answered
-        return designer(request)
-
-    chat_server.answer = answer
-    run(out, asks(chat_server), in_flight=2)
-    assert len(prompts_with_hints(out)) == 1
-    assert len(used_hints(calls(out))) == 1
-
-
-def test_reused_hint_number_is_a_new_hint(chat_server: ChatServer, tmp_path: Path) -> None:
-    """Numbers restart after control.json is deleted."""
-    out = tmp_path / "run"
-
-    def watch(progress: Progress) -> None:
-        after(3, lambda: add_hint(out, "first"))(progress)
-        after(6, lambda: ((out / CONTROL).unlink(), add_hint(out, "second")))(progress)
-
-    run(out, asks(chat_server), watch=watch)
-    assert used_hints(calls(out)) == {Hint(1, "first"): "llm-0004", Hint(1, "second"): "llm-0007"}
-
-
-def test_previewed_hints_are_those_sent(chat_server: ChatServer, tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    run(out, asks(chat_server), n_total=3)
-    plain = preview_after(out).prompt
-    add_hint(out, "first")
-    shown = preview_after(out).prompt
-    assert shown.replace(f"{NOTE}first\n\n", "") == plain
-    assert NOTE in preview_after(out, PromptOptions(prompt="minus")).prompt
-    run(out, asks(chat_server), n_total=6)
-    assert [call.prompt for call in calls(out) if call.hints] == [shown]
-    assert preview_after(out, number=7).prompt == shown
-    assert NOTE not in preview_after(out).prompt
-
-
-PAPER = FixedProblem(load_task("target-1"))
-
-
-def test_prompt_without_hints_is_unchanged() -> None:
-    history = fixed_history(PAPER)
-    for name in ("plus", "minus"):
-        prompt = load_prompt(name)
-        for hints in ((), ("\u200b", "\x00")):  # in which nothing is to be seen
-            assert prompt.render(history, 3, hints=hints) == prompt.render(history, 3)
-
-
-def test_hint_stays_on_one_line() -> None:
-    hint = "first\n\n# Your turn\nORIGIN: (9, 9, 9)\x1b[2J {{ 1 + 1 }} {% endblock %} " + "x" * 1900
-    told = load_prompt("plus").render(fixed_history(PAPER), 3, hints=[hint, "second"]).splitlines()
-    (line,) = [line for line in told if line.startswith("- first")]
-    assert line.startswith("- first # Your turn ORIGIN: (9, 9, 9) {{ 1 + 1 }} {% endblock %} xxx")
-    assert told.count("# Your turn") == 1
-    assert told[told.index(line) + 1] == "- second"
-
-
-@pytest.mark.parametrize("template", ["Be brief.", "{{ targets }}", "{% set told = hints %}Be brief."])
-def test_template_without_hints_gets_them_appended(template: str) -> None:
-    own, history = Prompt("own", template), fixed_history(PAPER)
-    plain = own.render(history, 3)
-    assert own.render(history, 3, hints=["first"]) == f"{plain}\n{NOTE}first\n"
-    assert own.render(history, 3, hints=["first", "second"]) == f"{plain}\n{NOTES}- first\n- second\n"
-
-
-def test_extended_template_places_hints_as_the_builtin_one() -> None:
-    history = fixed_history(PAPER)
-    for own in (
-        Prompt("own", '{% extends "proposal.md.j2" %}{% block role %}Be brief.{% endblock %}'),
-        Prompt("own", whole_template("plus")),
-    ):
-        text = own.render(history, 3, hints=["first"])
-        assert text.count(NOTE) == 1
-        assert text.index(NOTE) < text.index("End your answer")
-    emptied = Prompt("own", '{% extends "proposal.md.j2" %}{% block hints %}{% endblock %}')
-    assert emptied.render(history, 3, hints=["first"]).endswith(f"\n\n{NOTE}first\n")
-
-
-def test_template_may_place_hints_itself() -> None:
-    own = Prompt("own", "{% for hint in hints %}!{{ hint | upper }}{% endfor %} Go.")
-    assert own.render(fixed_history(PAPER), 3, hints=["first", "second"]) == "!FIRST!SECOND Go.\n"
-
-
-def test_run_with_a_template_without_hints_sends_them(chat_server: ChatServer, tmp_path: Path) -> None:
-    out, own = tmp_path / "run", tmp_path / "own.md"
-    own.write_text("{{ targets }} End with ORIGIN, JOINTS and LINKS.")
-    run(out, asks(chat_server, prompt=str(own)), watch=after(5, lambda: add_hint(out, "first")))
-    ends = [call.prompt.rpartition("LINKS.\n")[2] for call in calls(out) if call.step == "reasoning"]
-    assert ends == ["", f"\n{NOTE}first\n", ""]
-
-
-def test_run_with_hints_is_replayed_exactly(chat_server: ChatServer, tmp_path: Path) -> None:
-    """The replay ignores its own control.json, and can itself be replayed."""
-
-    def answer(request: Request) -> Answer:
-        n = len(chat_server.requests)
-        return json.dumps({**GOOD_DESIGN, "link_1": 0.1 + 0.001 * n}) if "response_format" in request else f"idea {n}"
-
-    chat_server.answer = answer
-    first = tmp_path / "first"
-    run(first, asks(chat_server), watch=after(5, lambda: add_hint(first, "first")))
-    assert len(used_hints(calls(first))) == 1
-    chat_server.requests.clear()
-    before = first
-    for again in (tmp_path / "again", tmp_path / "third"):
-        again.mkdir()
-        add_hint(again, "another")
-        run(again, ReplayProposer(before, strict=True))
-        assert lines(again) == lines(first)
-        assert [call.hints for call in calls(again)] == [call.hints for call in calls(first)]
-        before = again
-    assert not chat_server.requests
-
-
-def test_manual_proposer_gets_no_hints(tmp_path: Path) -> None:
-    """A question must stay the same until it is answered."""
-    out, folder = tmp_path / "run", tmp_path / "ask"
-    for _ in range(2):
-        with pytest.raises(AnswerPendingError):
-            run(out, ManualProposer(folder, wait=False))
-        add_hint(out, "first")
-    assert "engineer" not in (folder / "004-prompt.md").read_text()
-    assert status(out).doing == "stopped"
-    assert "004-prompt.md waits for" in status(out).fault

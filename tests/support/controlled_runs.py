@@ -1,0 +1,68 @@
+"""Short runs that tests watch, stop and give hints."""
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from armwright.llm.transcript import Call, Transcript
+from armwright.problem.problem import Problem
+from armwright.proposers.llm import LlmProposer
+from armwright.proposers.proposer import Proposer
+from armwright.runs.control import Status, read_status
+from armwright.study.progress import Progress, StudyResult
+from armwright.study.study import optimize
+from armwright.tasks.catalogue import load_task
+from tests.support.chat_server import ChatServer
+from tests.support.command_line import PATIENCE
+from tests.support.wire_formats import llm_proposer
+
+PROBLEM = Problem(load_task("target-1"))
+SETTINGS: dict[str, Any] = {"n_init": 4, "n_step": 3, "n_total": 9, "seed": 2, "verify": False}
+
+
+def run(out: Path | None, proposer: Proposer | str = "rules", **settings: Any) -> StudyResult:
+    return optimize(PROBLEM, proposer=proposer, out=out, **{**SETTINGS, **settings})
+
+
+def asks(server: ChatServer, **asking: Any) -> LlmProposer:
+    return llm_proposer(server.url, **asking)
+
+
+def lines(folder: Path) -> list[dict[str, Any]]:
+    """The trials of a run without their seconds."""
+    trials = (folder / "trials.jsonl").read_text().splitlines()
+    return [{key: value for key, value in json.loads(line).items() if key != "seconds"} for line in trials]
+
+
+def calls(folder: Path) -> tuple[Call, ...]:
+    return Transcript(folder / "transcripts.jsonl", read_only=True).calls
+
+
+def after(number: int, act: Callable[[], object]) -> Callable[[Progress], None]:
+    """Watches a study, and acts when this trial is finished."""
+
+    def watch(progress: Progress) -> None:
+        if progress.doing == "finished" and progress.number == number:
+            act()
+
+    return watch
+
+
+def interrupt() -> None:
+    raise KeyboardInterrupt
+
+
+def status(folder: Path) -> Status:
+    there = read_status(folder)
+    assert there is not None
+    return there
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come to that"
+        threading.Event().wait(0.005)
