@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Literal, cast, get_args
+from typing import Any, Literal, Self, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,16 @@ FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_
 ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
 
 
+class _PerArm:
+    """Arrays over arms, of which a slice is the same of fewer arms."""
+
+    def __getitem__(self, part: slice) -> Self:
+        values = vars(self).items()
+        return type(self)(**{name: None if value is None else value[part] for name, value in values})
+
+
 @dataclass(frozen=True)
-class Actuation:
+class Actuation(_PerArm):
     """Actuators of N arms of up to D joints.
 
     Attributes:
@@ -39,12 +47,9 @@ class Actuation:
     speed: Array
     price: Array
 
-    def __getitem__(self, part: slice) -> "Actuation":
-        return Actuation(self.effort[part], self.speed[part], self.price[part])
-
 
 @dataclass(frozen=True)
-class Bodies:
+class Bodies(_PerArm):
     """Rigid bodies of the links of N arms of up to D joints, in float64 whatever the precision of the arms.
 
     A link is a solid cylinder that carries a point mass at its end (`armwright.robot.arm.Link`).
@@ -86,12 +91,9 @@ class Bodies:
             tensor += mass[..., None, None] * (squared - lever[..., :, None] * lever[..., None, :])
         return tensor
 
-    def __getitem__(self, part: slice) -> "Bodies":
-        return Bodies(**{field.name: getattr(self, field.name)[part] for field in fields(self)})
-
 
 @dataclass(frozen=True)
-class ArmArrays:
+class ArmArrays(_PerArm):
     """N arms of up to D joints. A shorter arm ends with fixed joints that have neither length nor mass.
 
     All floats that the kernels read are of one precision; the others are float64.
@@ -117,11 +119,6 @@ class ArmArrays:
 
     def __len__(self) -> int:
         return len(self.base)
-
-    def __getitem__(self, part: slice) -> "ArmArrays":
-        values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
-        cut: dict[str, Any] = {name: None if value is None else value[part] for name, value in values.items()}
-        return ArmArrays(**cut)
 
     @property
     def precision(self) -> Precision:

@@ -83,20 +83,18 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
     ]
     for row in rows:
         unit, force = ("m", "N") if row.kind == "prismatic" else ("rad", "N m")
-        fixed = row.kind == "fixed"
-        cells = [
-            str(row.number),
-            "fixed" if fixed else f"{row.kind}, {row.axis}",
+        share = "" if row.utilisation is None else f" ({row.utilisation:.0%})"
+        motion = [
+            f"{row.kind}, {row.axis}",
             row.actuator or "–",
-            "" if fixed else f"{row.lower:.3f} to {row.upper:.3f} {unit}",
-            "" if fixed else f"{row.used[0]:.3f} to {row.used[1]:.3f} {unit}",
-            ""
-            if fixed
-            else f"{row.torque:.4g} {force}" + ("" if row.utilisation is None else f" ({row.utilisation:.0%})"),
-            "" if fixed else str(row.target),
-            f"{1e3 * row.length:.1f} mm",
-            f"{1e3 * row.mass:.4g} g",
+            f"{row.lower:.3f} to {row.upper:.3f} {unit}",
+            f"{row.used[0]:.3f} to {row.used[1]:.3f} {unit}",
+            f"{row.torque:.4g} {force}{share}",
+            str(row.target),
         ]
+        if row.kind == "fixed":
+            motion = ["fixed", row.actuator or "–", "", "", "", ""]
+        cells = [str(row.number), *motion, f"{1e3 * row.length:.1f} mm", f"{1e3 * row.mass:.4g} g"]
         lines.append(f"| {' | '.join(cells)} |")
     length, mass = sum(row.length for row in rows), sum(row.mass for row in rows)
     lines += ["", f"Together {1e3 * length:.1f} mm of links, {1e3 * mass:.4g} g."]
