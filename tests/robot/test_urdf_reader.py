@@ -189,7 +189,7 @@ def test_urdf_limits_are_converted(file: Path) -> None:
     read = read_urdf(file)
     assert (read.arm.joints[0].lower, read.arm.joints[0].upper) == (-2 * np.pi, 2 * np.pi)
     assert read.arm.joints[0].effort is None
-    assert any("turns from -20 to 7 rad" in note for note in read.notes)
+    assert any("rotates from -20 to 7 rad" in note for note in read.notes)
 
 
 def test_axes_are_snapped_within_tolerance(file: Path) -> None:

@@ -23,7 +23,8 @@ def clearances(
     """Compute the self-clearance and the obstacle clearance of arms in postures.
 
     These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. They are
-    negative for overlaps, and infinite if there is nothing to hit. The tool does not count: it is made to touch.
+    negative for overlaps, and infinite without obstacles or links to compare. The tool is ignored, since it is made to
+    touch.
 
     Args:
         arms: N arms of up to D joints.

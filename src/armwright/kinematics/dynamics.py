@@ -1,6 +1,6 @@
 """Inverse dynamics by recursive Newton-Euler, in numpy and float64, and torques along timed straight lines.
 
-A posture q(s) belongs to each share s of a line, and s(t) is the same for all arms. With s' = ds/dt
+Each fraction s of a line has a posture q(s), and s(t) is the same for all arms. With s' = ds/dt
 
     torque(t) = gravity(s) + drag(s) s'² + push(s) s'',   push = M q_s,   drag = M q_ss + C(q, q_s) q_s
 
@@ -20,7 +20,7 @@ from armwright.kinematics.paths import Paths, largest_of
 from armwright.robot.arm import GRAVITY
 from armwright.tasks.moves import Moves, MoveTiming, time_samples
 
-DAMPING = 0.005  # share of an arm's size, docs/method.md §17
+DAMPING = 0.005  # relative to an arm's size, docs/method.md §17
 CHUNK = 2**12  # postures whose arrays stay in the cache of a core
 
 
@@ -131,7 +131,7 @@ def _chunk_drives(arms: ArmArrays, paths: Paths, chunk: slice, line: Array, timi
 
 
 def _path_derivatives(arms: ArmArrays, q: Array, frames: Frames, line: Array) -> tuple[Array, Array]:
-    """Return q_s and q_ss (N, S, D), the derivatives of the joints by the share of the line.
+    """Return q_s and q_ss (N, S, D), the derivatives of the joints by the fraction of the line.
 
     line: (S, 3) from its start to its end [m].  A joint at a limit that it would be driven beyond stays there.
     """

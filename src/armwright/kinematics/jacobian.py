@@ -15,24 +15,23 @@ def jacobians(arms: ArmArrays, q: Array) -> Array:
 
 def jacobian_of(arms: ArmArrays, frames: Frames) -> Array:
     """Return the (N, K, 3, D) derivative of the tip position by the joints, from known frames."""
-    turning = np.cross(frames.axis, frames.tip[:, :, None] - frames.position)
-    return np.where(_translates(arms), frames.axis, turning).swapaxes(-1, -2)
+    rotational = np.cross(frames.axis, frames.tip[:, :, None] - frames.position)
+    return np.where(_translates(arms), frames.axis, rotational).swapaxes(-1, -2)
 
 
 def jacobian_rate(arms: ArmArrays, frames: Frames, velocity: Array) -> Array:
     """Return the (N, K, 3, D) rate of the Jacobian while the joints move at `velocity` (N, K, D)."""
     translates = _translates(arms)
     along = frames.axis * velocity[..., None]
-    turning = np.cumsum(np.where(translates, 0.0, along), axis=2)  # (N, K, D, 3) angular velocity of each link
-    spin = np.zeros(turning.shape)  # of the link that each joint stands on
-    spin[:, :, 1:] = turning[:, :, :-1]
+    omega = np.cumsum(np.where(translates, 0.0, along), axis=2)  # (N, K, D, 3) angular velocity of each link
+    parent_omega = np.zeros(omega.shape)  # of the link before each joint
+    parent_omega[:, :, 1:] = omega[:, :, :-1]
     lever = frames.tip[:, :, None] - frames.position
-    share = np.where(translates, along, np.cross(along, lever))  # of each joint in the tip's velocity
-    # The tip's velocity relative to a joint: from the spin of the joint's link and from the joints after it.
-    after = np.cumsum(share[:, :, ::-1], axis=2)[:, :, ::-1] - share
-    moving = np.cross(turning, lever) + after
-    rotated = np.cross(spin, frames.axis)
-    rate = np.where(translates, rotated, np.cross(rotated, lever) + np.cross(frames.axis, moving))
+    tip_velocity = np.where(translates, along, np.cross(along, lever))  # that each joint contributes
+    later_joints = np.cumsum(tip_velocity[:, :, ::-1], axis=2)[:, :, ::-1] - tip_velocity
+    relative_velocity = np.cross(omega, lever) + later_joints  # of the tip relative to the joint
+    axis_rate = np.cross(parent_omega, frames.axis)
+    rate = np.where(translates, axis_rate, np.cross(axis_rate, lever) + np.cross(frames.axis, relative_velocity))
     return rate.swapaxes(-1, -2)
 
 

@@ -1,4 +1,4 @@
-"""The physical arm: a base position, then joints and links in turn."""
+"""The physical arm: a base position, then alternating joints and links."""
 
 import math
 from dataclasses import dataclass

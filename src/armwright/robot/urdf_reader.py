@@ -61,7 +61,7 @@ def read_urdf(path: str | Path, tip: str | None = None, base_link: str | None = 
     Args:
         path: The URDF file.
         tip: The link whose origin should reach the targets; by default the last one before a gripper.
-        base_link: The link that stands on the ground; by default the root of the robot.
+        base_link: The link that is fixed to the ground; by default the root of the robot.
 
     Raises:
         ArmError: If the file is not a URDF, or has no serial arm that can be computed.
@@ -160,7 +160,7 @@ def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list
         return Joint("prismatic", AXES[axis], lower, upper, actuator)
     if max(-lower, upper) > LARGEST_ANGLE:
         if max(-lower, upper) > LARGEST_ANGLE + 1e-2:
-            notes.append(f"{joint.name} turns from {lower:.4g} to {upper:.4g} rad; ±2π of it is used")
+            notes.append(f"{joint.name} rotates from {lower:.4g} to {upper:.4g} rad; ±2π of it is used")
         lower, upper = max(lower, -LARGEST_ANGLE), min(upper, LARGEST_ANGLE)
     return Joint("revolute", AXES[axis], lower, upper, actuator)
 
