@@ -55,6 +55,7 @@ class RunFolder:
     def __enter__(self) -> Self:
         with naming_write_errors(self.path, KEPT):
             self.path.mkdir(parents=True, exist_ok=True)
+        with naming_write_errors(self.path / LOCK, KEPT):
             try:
                 self._lock.acquire(timeout=LOCK_SECONDS)
             except Timeout as fault:
