@@ -159,7 +159,7 @@ REFUSED = {
     "no name": (answer_with(task={"name": None}), "task: name: Field required"),
     "payloads": (answer_with(task={"payload": [0.5, 0.5]}), "payload: expected 1 or 6 values [kg], got 2"),
     "unknown objective": (answer_with(task={"objectives": ["torqe"]}), 'unknown objective "torqe"'),
-    "reference point": (answer_with(task={"reference_point": [1.0, 1.0]}), "the problem minimises 3"),
+    "reference point": (answer_with(task={"reference_point": [1.0, 1.0]}), "reference_point: expected 3 values"),
     "unknown actuator": (answer_with(space={"actuators": ["XM430-W351"]}), 'unknown actuator "XM430-W351"'),
     "actuators missing": (json.dumps({**FULL, "space": None}), "needs actuators"),
     "price missing": (answer_with(space={"actuators": ["MG996R"]}), "objective price needs the price of every"),
