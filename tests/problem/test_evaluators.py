@@ -36,8 +36,8 @@ def raising(fault: BaseException) -> aw.Evaluator:
 def test_evaluator_defines_the_objectives() -> None:
     problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
     assert [(o.name, o.unit, o.label, o.description) for o in problem.objectives] == [
-        ("reach", "m", "Reach", "How far it reaches."),
-        ("joints_used", "", "Joints used", "How far it reaches."),
+        ("reach", "m", "Reach", "Return the reach of the arm."),
+        ("joints_used", "", "Joints used", "Return the reach of the arm."),
     ]
     designs = SPACE.sample(4, 0)
     ours = aw.Problem(WHOLE, SPACE, objectives=(LENGTH,))
