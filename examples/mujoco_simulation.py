@@ -17,7 +17,7 @@ import numpy as np
 import armwright as aw
 
 STIFFNESS, DAMPING = 2.0, 0.05  # [N m/rad], [N m s/rad]; the paper's arms weigh some ten grams
-LARGEST_TORQUE = 0.5  # [N m]
+MAX_TORQUE = 0.5  # [N m]
 SECONDS = 1.0  # for each target
 
 
@@ -34,7 +34,7 @@ def follow(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
     for target, posture in zip(task.target_positions, postures, strict=True):
         for _ in range(round(SECONDS / model.opt.timestep)):
             torque = STIFFNESS * (posture - data.qpos) - DAMPING * data.qvel
-            data.qfrc_applied[:] = np.clip(torque, -LARGEST_TORQUE, LARGEST_TORQUE)
+            data.qfrc_applied[:] = np.clip(torque, -MAX_TORQUE, MAX_TORQUE)
             work += float(np.abs(data.qfrc_applied * data.qvel).sum()) * model.opt.timestep
             mujoco.mj_step(model, data)
         distance += float(np.linalg.norm(data.site_xpos[tip] - target))

@@ -53,7 +53,7 @@ LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 
 FOLLOWED = [page for page in PAGES if commands(page)]
-LONGEST_WAIT = 900.0  # [s] for a command; only one that waits forever takes this long
+MAX_WAIT = 900.0  # [s] for a command; only one that waits forever takes this long
 
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
 SHORT = "--n-total 40 --no-figures"
@@ -174,7 +174,7 @@ def shell(line: str, folder: Path, where: str) -> subprocess.CompletedProcess[st
         capture_output=True,
         text=True,
         stdin=subprocess.DEVNULL,
-        timeout=LONGEST_WAIT,
+        timeout=MAX_WAIT,
     )
     assert done.returncode == 0, f"{where}: {line}\n{done.stdout}{done.stderr}"
     assert "Traceback" not in done.stderr, f"{where}: {line}\n{done.stderr}"

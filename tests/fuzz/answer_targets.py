@@ -11,7 +11,7 @@ import yaml
 import armwright as aw
 from armwright.problem.problem import Problem
 from tests import ROOT
-from tests.fuzz.problem_targets import MOST_POSTURES, RICH_SPACE, RICH_TASK, a_problem, n_postures, rich_problem
+from tests.fuzz.problem_targets import MAX_POSTURES, RICH_SPACE, RICH_TASK, a_problem, n_postures, rich_problem
 from tests.fuzz.target import DefectError, any_of, folder
 
 
@@ -121,6 +121,6 @@ def run_draft(data: bytes) -> None:
                 path.unlink()
             if outside or len(inside) > 2:
                 raise DefectError(f"written elsewhere: {outside} {inside}")
-    if n_postures(draft.problem) <= MOST_POSTURES:
+    if n_postures(draft.problem) <= MAX_POSTURES:
         draft.problem.evaluate(draft.problem.space.sample(1, 0))
     json.dumps(draft.record(), allow_nan=False)

@@ -12,7 +12,7 @@ from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from tests.fuzz.target import DefectError, file_of, folder
 
-MOST_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and is no other code
+MAX_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and is no other code
 
 
 RICH_TASK = b"""\
@@ -89,7 +89,7 @@ def used(problem: Problem) -> None:
     for design in designs:
         if problem.space.design(design.params) != design:
             raise DefectError(f"a design that is not in its space: {design.params}")
-    if n_postures(problem) <= MOST_POSTURES:
+    if n_postures(problem) <= MAX_POSTURES:
         problem.evaluate(designs)
     load_prompt("plus").render(History(problem, [], 1, problem.reference_point), 0)
 

@@ -18,7 +18,7 @@ from armwright.exceptions import ArmwrightError
 from tests import ROOT
 from tests.fuzz.mutation import changed
 
-LONGEST_REFUSAL = 3000  # characters
+MAX_REFUSAL_LENGTH = 3000  # characters
 
 
 class DefectError(AssertionError):
@@ -58,7 +58,7 @@ def check(target: Target, data: bytes) -> bool:
 
 def check_words(refusal: ArmwrightError) -> None:
     words = str(refusal)
-    if len(words) > LONGEST_REFUSAL:
+    if len(words) > MAX_REFUSAL_LENGTH:
         raise DefectError(f"a refusal of {len(words)} characters: {words[:200]!r}") from refusal
     if not words or not words.isprintable():
         raise DefectError(f"a refusal that is no line: {words[:500]!r}") from refusal

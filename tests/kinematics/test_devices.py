@@ -162,7 +162,7 @@ def test_results_do_not_depend_on_chunks(monkeypatch: pytest.MonkeyPatch) -> Non
     matrix = asked.space.matrix(asked.space.sample(100, 3))
     whole = asked.evaluate_matrix(matrix).values
     assert np.array_equal(whole, asked.evaluate(asked.space.designs(matrix)).values)
-    monkeypatch.setitem(solve.LARGEST_CHUNK, "cpu", 1)
+    monkeypatch.setitem(solve.MAX_CHUNK, "cpu", 1)
     monkeypatch.setitem(problem.POSTURES_AT_ONCE, "cpu", 200)
     assert np.array_equal(asked.evaluate_matrix(matrix).values, whole)
     assert asked.evaluate_matrix(matrix[:0]).values.shape == (0, 2)

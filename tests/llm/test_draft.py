@@ -15,9 +15,9 @@ import armwright as aw
 from armwright.exceptions import FailureError, ModelError, SettingsError
 from armwright.llm import client
 from armwright.llm.draft import DRAFTS, Draft
-from armwright.llm.draft_prompt import LONGEST_DESCRIPTION, draft_prompt, draft_schema
+from armwright.llm.draft_prompt import MAX_DESCRIPTION_LENGTH, draft_prompt, draft_schema
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
+from armwright.llm.prompt import MAX_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.problem.objectives import OBJECTIVES
 from armwright.robot.actuators import catalogue
@@ -348,7 +348,7 @@ def test_empty_and_overlong_descriptions_are_refused(chat_server: ChatServer, de
     with pytest.raises(SettingsError, match="the description is empty"):
         aw.draft(description, options)
     with pytest.raises(SettingsError, match="expected at most 10,000"):
-        aw.draft("w" * (LONGEST_DESCRIPTION + 1), options)
+        aw.draft("w" * (MAX_DESCRIPTION_LENGTH + 1), options)
     assert chat_server.requests == []
 
 
@@ -422,4 +422,4 @@ def test_draft_prompt_covers_all_file_keys() -> None:
     assert names == list(catalogue())
     assert all(f"- {name} (" in prompt for name in names)
     assert "prefixItems" not in json.dumps(schema["$defs"]["Task"])
-    assert estimated_tokens(prompt + json.dumps(schema)) < MOST_TOKENS
+    assert estimated_tokens(prompt + json.dumps(schema)) < MAX_TOKENS

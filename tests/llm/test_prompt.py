@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from armwright.llm.answer import answer_schema
 from armwright.llm.feedback import Feedback
 from armwright.llm.model_options import ANSWERS, PromptOptions
-from armwright.llm.prompt import MOST_TOKENS, Prompt, builtin_template, estimated_tokens, load_prompt, parameters_prompt
+from armwright.llm.prompt import MAX_TOKENS, Prompt, builtin_template, estimated_tokens, load_prompt, parameters_prompt
 from armwright.llm.prompt_values import VARIABLES, spread
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
@@ -445,7 +445,7 @@ def test_prompt_of_any_problem_is_complete_and_bounded(
     prompt = load_prompt(data.draw(st.sampled_from(["plus", "minus"])))
     text = prompt.render(history, seed, options)
     assert text == prompt.render(history, seed, options)
-    assert estimated_tokens(text) <= MOST_TOKENS
+    assert estimated_tokens(text) <= MAX_TOKENS
     for name, (low, high) in {
         "origin_x": space.origin_x,
         "origin_y": space.origin_y,
@@ -478,16 +478,16 @@ def test_longest_prompt_is_bounded() -> None:
     history = fixed_history(problem, 30, proposals=told)
     for answer in ANSWERS:
         text = load_prompt("plus").render(history, 0, PromptOptions(memory="own", proposals=100, answer=answer))
-        assert estimated_tokens(text) <= MOST_TOKENS
+        assert estimated_tokens(text) <= MAX_TOKENS
         assert "of them, spread evenly" in text
         assert "理由" in text
 
 
 def test_shortening_an_overlong_template_terminates() -> None:
     own = Prompt(
-        "own", '{% extends "proposal.md.j2" %}{% block role %}' + "word " * (2 * MOST_TOKENS) + "{% endblock %}"
+        "own", '{% extends "proposal.md.j2" %}{% block role %}' + "word " * (2 * MAX_TOKENS) + "{% endblock %}"
     )
-    assert estimated_tokens(own.render(fixed_history(PAPER), 0)) > MOST_TOKENS
+    assert estimated_tokens(own.render(fixed_history(PAPER), 0)) > MAX_TOKENS
 
 
 @pytest.mark.parametrize(("n_front", "n_others"), [(1, 13), (2, 12)])

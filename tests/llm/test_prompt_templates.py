@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armwright.exceptions import SettingsError
-from armwright.llm.prompt import LARGEST_TEMPLATE, Prompt, load_prompt
+from armwright.llm.prompt import MAX_TEMPLATE, Prompt, load_prompt
 from armwright.tasks.catalogue import load_task
 from tests.support.fixed_problem import FixedProblem, fixed_history
 
@@ -119,7 +119,7 @@ def test_unrenderable_template_is_refused(template: str, message: str) -> None:
 
 def test_file_that_is_not_a_template_is_refused(tmp_path: Path) -> None:
     (tmp_path / "latin").write_bytes(b"caf\xe9")
-    (tmp_path / "large").write_bytes(b"x" * (LARGEST_TEMPLATE + 1))
+    (tmp_path / "large").write_bytes(b"x" * (MAX_TEMPLATE + 1))
     (tmp_path / "plus").write_text("my own", encoding="utf-8")
     for name, message in (
         ("latin", "is not a text file in UTF-8"),

@@ -12,7 +12,7 @@ from armwright.kinematics.ik import solve_postures
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_reader import SNAP, UrdfArm, read_urdf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.robot.urdf_xml import LARGEST_FILE
+from armwright.robot.urdf_xml import MAX_FILE
 from tests.support.robots import any_arm, robot, with_frames_anyhow
 
 # name: joints, the largest error of the tip [m]. Some files write 1.5708 for a right angle; their axes are moved by it.
@@ -252,7 +252,7 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(file: Path, number: i
 
 
 def test_missing_and_oversized_files_are_refused(file: Path) -> None:
-    file.write_bytes(b" " * (LARGEST_FILE + 1))
+    file.write_bytes(b" " * (MAX_FILE + 1))
     with pytest.raises(ArmError, match="at most 4,096 KiB"):
         read_urdf(file)
     with pytest.raises(ArmError, match="cannot read"):

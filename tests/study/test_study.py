@@ -351,7 +351,7 @@ def test_progress_reports_hypervolume_and_front_size() -> None:
     [{"seed": 2**31}, {"n_step": 0}, {"n_init": 0}, {"n_total": 0}, {"seed": -1}, {"n_total": 1.5}, {"n_step": True}],
 )
 def test_settings_out_of_range_are_refused(settings: dict[str, int]) -> None:
-    with pytest.raises(SettingsError, match=f"{next(iter(settings))} = "):
+    with pytest.raises(SettingsError, match=f"{next(iter(settings))}: "):
         optimize(PROBLEM, proposer="none", **settings)
 
 

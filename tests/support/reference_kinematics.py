@@ -16,7 +16,7 @@ from armwright.robot.arm import Arm
 Array = NDArray[np.float64]
 
 UPDATES = 100
-LONGEST_STEP = 0.1  # [m]
+MAX_STEP = 0.1  # [m]
 MANIPULABILITY_LIMIT = 0.1  # [m³]
 DAMPING = 0.001  # [m²]
 DEGREE = np.pi / 180.0  # [rad]
@@ -115,7 +115,7 @@ def update(arms: Chains, targets: Array, q: Array, h_before: Array) -> tuple[Arr
     Jt = np.swapaxes(J, -1, -2)
     e = targets - tip(arms, q)
     length = np.linalg.norm(e, axis=-1, keepdims=True)
-    dx = np.where(length > LONGEST_STEP, LONGEST_STEP * e / np.maximum(length, LONGEST_STEP), e)
+    dx = np.where(length > MAX_STEP, MAX_STEP * e / np.maximum(length, MAX_STEP), e)
     m = np.sqrt(np.maximum(0.0, np.linalg.det(J @ Jt)))
     k = np.where(m < MANIPULABILITY_LIMIT, DAMPING * (1 - m / MANIPULABILITY_LIMIT) ** 2, 0.0)
     h = limit_gradient(arms, q)

@@ -10,7 +10,7 @@ from armwright.tasks.targets import AXIS, TargetArrays
 from tests.support import reference_kinematics as reference
 from tests.support.reference_kinematics import Array, Chains
 
-LONGEST_TURN = 0.5  # [rad]
+MAX_TURN = 0.5  # [rad]
 
 
 def tool(arms: Chains, q: Array, axis: Array, side: Array) -> Array:
@@ -62,7 +62,7 @@ def update(
     angular = np.einsum("...ba,...bd->...ad", frame, angular_jacobian(arms, q))
     for t, rows in enumerate(target_arrays.n_angular):
         J = np.concatenate([linear[:, t], angular[:, t, :rows]], axis=-2)
-        dx = np.concatenate([_short(e[:, t], reference.LONGEST_STEP), _short(turn[:, t], LONGEST_TURN)[:, :rows]], -1)
+        dx = np.concatenate([_short(e[:, t], reference.MAX_STEP), _short(turn[:, t], MAX_TURN)[:, :rows]], -1)
         Jt = np.swapaxes(J, -1, -2)
         m = np.sqrt(np.maximum(0.0, np.linalg.det(J @ Jt)))
         limit = reference.MANIPULABILITY_LIMIT

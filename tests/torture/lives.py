@@ -23,7 +23,7 @@ import psutil
 
 LOOK_SECONDS = 0.003
 SHARES = {"start": 0.15, "search": 0.45, "results": 0.4}  # of the kills
-MOST_KILLS = 12  # of one run
+MAX_KILLS = 12  # of one run
 STRIDE = 0.25  # of the whole search, the most between two kills in it
 SIGNALS = {"INT": [signal.SIGINT], "INT INT": [signal.SIGINT] * 2, "TERM": [signal.SIGTERM]}
 COST = {"seconds", "call_seconds"}  # what differs between equal runs
@@ -153,7 +153,7 @@ def kill_often(scenario: Scenario, place: Path, kills: int, seed: str) -> Counte
     fell: Counter[str] = Counter()
     while fell.total() - fell["ended"] < kills:
         folder = place / f"run{fell['ended']}"
-        left = min(chance.randint(1, MOST_KILLS), kills - fell.total() + fell["ended"])
+        left = min(chance.randint(1, MAX_KILLS), kills - fell.total() + fell["ended"])
         while True:
             command = Command(scenario, folder)
             landed = _kill_once(command, chance, times) if left else ""

@@ -13,7 +13,7 @@ from armwright.kinematics.chunks import in_chunks
 from armwright.kinematics.devices import Device, load_clearance
 from armwright.tasks.obstacles import SHAPES, Obstacle
 
-LARGEST_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
+MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
 SMALLEST_CHUNK = 256  # postures; smaller chunks cost a thread more time than they save
 
 
@@ -43,7 +43,7 @@ def clearances(
     def measure(chunk: slice) -> None:
         distances[:, chunk] = _distances(arms[chunk], q[chunk], solids, wp, kernels, device)
 
-    size = LARGEST_CHUNK[device] // t
+    size = MAX_CHUNK[device] // t
     if device == "cpu":
         size = min(size, max(-(-n // 8), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)

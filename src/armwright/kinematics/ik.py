@@ -37,7 +37,7 @@ MANY_ARMS = 1000  # for fewer arms compiling that variant costs more than it sav
 BUFFERED_ARMS = 256  # chunks up to this size reuse buffers: allocating them takes as long as solving a hundred arms
 MAX_BUFFERS = 8  # per thread
 SMALLEST_CHUNK = 32  # groups of targets; smaller chunks cost a thread more time than they save
-LARGEST_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: the cache of a core; memory of any GPU
+MAX_CHUNK: dict[Device, int] = {"cpu": 2**22, "cuda": 2**30}  # [bytes]: the cache of a core; memory of any GPU
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def solve_postures(
                 values[chunk, part] = solved
 
     groups = -(-t // LANES[device])
-    size = max(1, LARGEST_CHUNK[device] // _bytes_of_one(arms, groups, LANES[device]))
+    size = max(1, MAX_CHUNK[device] // _bytes_of_one(arms, groups, LANES[device]))
     if device == "cpu":
         size = min(size, max(-(-n // (4 * cores())), -(-SMALLEST_CHUNK // groups)))
     in_chunks(solve, n, size, device)
@@ -204,7 +204,7 @@ def _thread_buffers(arms: ArmArrays, columns: NDArray[Any], updates: int, kind: 
 
 def _buffered_arms(arms: ArmArrays, groups: int, lanes: int) -> int:
     """Return how many arms fit into buffers: the more targets, the fewer, down to none."""
-    return min(BUFFERED_ARMS, LARGEST_CHUNK["cpu"] // _bytes_of_one(arms, groups, lanes))
+    return min(BUFFERED_ARMS, MAX_CHUNK["cpu"] // _bytes_of_one(arms, groups, lanes))
 
 
 def _bytes_of_one(arms: ArmArrays, groups: int, lanes: int) -> int:

@@ -20,10 +20,10 @@ from armwright.problem.problem import Problem
 from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, exact
 from armwright.text import one_line, without_thoughts
 
-LONGEST_ANSWER = 100_000  # characters that are read, from the end
-MOST_OBJECTS = 1000  # braces tried as JSON, from the end of a free answer
-LONGEST_REASON = 300  # characters
-LONGEST_VALUE = 60  # characters of a value or a name in an error
+MAX_ANSWER_LENGTH = 100_000  # characters that are read, from the end
+MAX_OBJECTS = 1000  # braces tried as JSON, from the end of a free answer
+MAX_REASON_LENGTH = 300  # characters
+MAX_VALUE_LENGTH = 60  # characters of a value or a name in an error
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
         content = _decoder.decode(text.strip())
         if isinstance(content, dict):
             return read_answers(cast("dict[str, Any]", content), problem, proposals)
-    text = without_thoughts(text)[-LONGEST_ANSWER:]
+    text = without_thoughts(text)[-MAX_ANSWER_LENGTH:]
     names = {"designs", "origin", "joints", "links", *(parameter.name for parameter in problem.space.parameters)}
     objects, incomplete = _objects(text, names)
     last_object = objects[-1][0] if objects else -1
@@ -112,9 +112,9 @@ def read_text(text: str, problem: Problem, proposals: int = 1) -> list[Answer]:
 
 def last_json_object(text: str) -> str:
     """Return the last JSON object of a text as it is written there, or the text if it holds none."""
-    text = text[-LONGEST_ANSWER:]
+    text = text[-MAX_ANSWER_LENGTH:]
     last, end = text, 0
-    for brace in islice(re.finditer(r"\{", text), MOST_OBJECTS):
+    for brace in islice(re.finditer(r"\{", text), MAX_OBJECTS):
         if brace.start() >= end:
             with suppress(ValueError, RecursionError):
                 _, end = _decoder.raw_decode(text, brace.start())
@@ -160,8 +160,8 @@ def _read_all(designs: Sequence[Any], problem: Problem) -> list[Answer]:
 
 
 def _read(content: Mapping[str, Any], problem: Problem) -> Answer:
-    content = expand_lists({one_line(str(key), LONGEST_VALUE).lower(): value for key, value in content.items()})
-    reason = one_line(_as_text(content.pop("reason", None) or ""), LONGEST_REASON)
+    content = expand_lists({one_line(str(key), MAX_VALUE_LENGTH).lower(): value for key, value in content.items()})
+    reason = one_line(_as_text(content.pop("reason", None) or ""), MAX_REASON_LENGTH)
     names = [f"expected_{objective.name}" for objective in problem.objectives]
     values: Any = content.pop("expected", None)  # a list in place of the single values
     if isinstance(values, (list, tuple)) and len(cast("list[Any]", values)) == len(names):
@@ -205,7 +205,7 @@ def _number(value: Any, unit: str = "") -> Any:
 def _short(value: Any) -> Any:
     """Shorten a value that will be refused, so that the error fits on one line."""
     text = _as_text(value)
-    short = one_line(text, LONGEST_VALUE)
+    short = one_line(text, MAX_VALUE_LENGTH)
     return value if short == text else short
 
 
@@ -241,7 +241,7 @@ def _objects(text: str, names: set[str]) -> tuple[list[tuple[int, dict[str, Any]
     # Trailing commas and comments are common; blanks in their place keep the positions.
     text = re.sub(r'//[^"\n]*$', lambda comment: " " * len(comment[0]), text, flags=re.MULTILINE)
     text = re.sub(r",(?=\s*[}\]])", " ", text)
-    braces = [match.start() for match in re.finditer(r'\{\s*"', text)][-MOST_OBJECTS:]
+    braces = [match.start() for match in re.finditer(r'\{\s*"', text)][-MAX_OBJECTS:]
     objects: list[tuple[int, dict[str, Any]]] = []
     end, incomplete = 0, -1
     for position in braces:

@@ -17,7 +17,7 @@ LISTS = {  # lists with a value per module, and the prefix of their parameters
 GROUPS = ("origin", "mount", *LISTS)
 NOTHING = "-"  # in a list, for a module without such a value
 JOINT_NAMES = {description.partition(",")[0]: kind for kind, description in JOINT_DESCRIPTIONS.items()}  # "yaw": "Y"
-LONGEST_LINE = 2000  # characters; longer lines are ignored
+MAX_LINE_LENGTH = 2000  # characters; longer lines are ignored
 
 _MINUS = str.maketrans({"−": "-", "﹣": "-", "-": "-", "＋": "+"})
 _NUMBER = r"(?<![\w.])[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|(?:nan|inf(?:inity)?)(?![A-Za-z]))"
@@ -57,7 +57,7 @@ def designs_in_lines(text: str) -> tuple[int, list[dict[str, Any]]]:
     designs: list[dict[str, Any]] = []
     last = -1
     for position, name, line in _named_lines(text):
-        values = _values(name, line) if len(line) <= LONGEST_LINE else None
+        values = _values(name, line) if len(line) <= MAX_LINE_LENGTH else None
         if values is None:
             continue
         if name == "origin":

@@ -9,7 +9,7 @@ from pydantic import Field
 from armwright.exceptions import ProposalError
 from armwright.runs.control import Hint
 
-MOST_REQUESTS = 3  # per question: an invalid answer goes back with the reason, at most twice
+MAX_REQUESTS = 3  # per question: an invalid answer goes back with the reason, at most twice
 FINAL = frozenset({"key", "quota", "unknown_model", "budget"})  # faults that a repeated call does not cure
 
 Count = Annotated[int, Field(ge=0, lt=2**53)]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 
 from armwright.exceptions import ProposalError
-from armwright.llm.backend import MOST_REQUESTS
+from armwright.llm.backend import MAX_REQUESTS
 from armwright.llm.transcript import Call, n_requests, total_cost
 
 
@@ -87,7 +87,7 @@ class CallBudget:
 
     def _left(self, reserved: int) -> int:
         """Return the requests left for the next prompt while this many are reserved for others."""
-        left = MOST_REQUESTS
+        left = MAX_REQUESTS
         if self.max_calls is not None:
             left = min(left, self.max_calls - n_requests(self._calls) - reserved)
         if self.max_cost is not None:
@@ -97,7 +97,7 @@ class CallBudget:
             if rest <= 0.0:
                 left = 0
             elif not priced:
-                left = min(left, MOST_REQUESTS - reserved)
+                left = min(left, MAX_REQUESTS - reserved)
             elif each:
                 left = min(left, math.floor(rest / each + 1e-9) - reserved)  # 5 of 5 despite rounding
         return left

@@ -19,7 +19,7 @@ from armwright.files import replace_surrogates
 from armwright.llm.answer import last_json_object
 from armwright.llm.backend import (
     CHECK,
-    MOST_REQUESTS,
+    MAX_REQUESTS,
     CallError,
     Interrupted,
     LlmBackend,
@@ -52,7 +52,7 @@ with requires_extra("llm", "a language model"):
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
 
 CHECK_SECONDS = 60.0  # timeout of a check; a local server may have to load the model first
-REASKS = MOST_REQUESTS - 1  # after an invalid answer
+REASKS = MAX_REQUESTS - 1  # after an invalid answer
 RETRIES = 2  # after a fault that may pass
 RETRY_SECONDS = 0.5  # before the first retry, unless the server states it; doubled before the next
 

@@ -27,7 +27,7 @@ from armwright.exceptions import (
     TaskError,
 )
 from armwright.files import naming_write_errors, replace_file
-from armwright.llm.backend import MOST_REQUESTS, CallError, OutputFormat, Question
+from armwright.llm.backend import MAX_REQUESTS, CallError, OutputFormat, Question
 from armwright.llm.budget import CallBudget
 from armwright.llm.configuration import ConfiguredModel, configuration_path, configured_model
 from armwright.llm.draft_prompt import draft_prompt, draft_schema
@@ -46,9 +46,9 @@ from armwright.yaml_documents import check_document, dump_document, parse_docume
 DRAFTS = "drafts.jsonl"  # transcript of the calls, next to the files
 ANSWER_TOKENS = 2000  # estimated length of an answer
 N_TRIED = 64  # designs evaluated to check that objectives, actuators and targets fit together
-LONGEST_NOTE, LONGEST_COMMAND = 1000, 4000  # characters in a file's comment
-LONGEST_LINE, MOST_LINES = 400, 40  # of assumptions and of questions
-LONGEST_FAULT = 600  # characters
+MAX_NOTE_LENGTH, MAX_COMMAND_LENGTH = 1000, 4000  # characters in a file's comment
+MAX_LINE_LENGTH, MAX_LINES = 400, 40  # of assumptions and of questions
+MAX_FAULT_LENGTH = 600  # characters
 WIDTH = 110  # of comments
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -137,7 +137,7 @@ class Drafter(LlmSession):
         cost = describe_cost(configured.options, given, ANSWER_TOKENS)
         return (
             f"asking {self._by()}{configured.place}, named by {configured.named_by}: about {given:,} tokens in, "
-            f"{ANSWER_TOKENS:,} out, up to {MOST_REQUESTS} times; {cost}"
+            f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
         )
 
     def summary(self) -> ProposerSummary:
@@ -227,10 +227,10 @@ class Drafter(LlmSession):
 
     def _failure(self, fault: ProposalError) -> ModelError:
         answered = isinstance(fault, CallError) and fault.reply.answer.strip()
-        ways = "Describe it in other words" if answered else "Check the model, its key and base_url"
+        advice = "Describe it in other words" if answered else "Check the model, its key and base_url"
         return ModelError(
-            f"no draft: {one_line(str(fault), LONGEST_FAULT).rstrip('.')}. {self._kept() if answered else ''}{ways}; "
-            "armwright init my-task.yaml writes a task to edit without a model",
+            f"no draft: {one_line(str(fault), MAX_FAULT_LENGTH).rstrip('.')}. {self._kept() if answered else ''}{advice}"
+            "; armwright init my-task.yaml writes a task to edit without a model",
             final=fault.kind if fault.final else None,
         )
 
@@ -287,20 +287,20 @@ def _document(content: Any, schema: type[Model], error: type[ArmwrightError], wh
 def _lines(content: Any) -> tuple[str, ...]:
     """Return the sentences of a list in an answer."""
     lines = cast("list[Any]", content) if isinstance(content, list) else [content or ""]
-    return tuple(one_line(str(line), LONGEST_LINE) for line in lines[:MOST_LINES] if str(line).strip())
+    return tuple(one_line(str(line), MAX_LINE_LENGTH) for line in lines[:MAX_LINES] if str(line).strip())
 
 
 def _head(draft: Draft, description: str, command: str) -> str:
     """Return the comment at the top of a file."""
     lines = [
         "A draft that nobody has checked: check the numbers before you run it.",
-        f"From the description: {one_line(description, LONGEST_NOTE)}",
+        f"From the description: {one_line(description, MAX_NOTE_LENGTH)}",
         f"Drafted by {one_line(draft.by, 200)} on {date.today().isoformat()}, armwright {version('armwright')}.",
         *(f"Assumed: {line}" for line in draft.assumptions),
         *(f"Open question: {line}" for line in draft.questions),
     ]
     wrapped = [piece for line in lines for piece in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
-    wrapped.append(f"Run it with:  {one_line(command, LONGEST_COMMAND)}")
+    wrapped.append(f"Run it with:  {one_line(command, MAX_COMMAND_LENGTH)}")
     return "".join(f"# {line}\n" for line in wrapped) + "\n"
 
 

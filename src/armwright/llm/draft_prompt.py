@@ -16,7 +16,7 @@ from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
 from armwright.tasks.task import MAX_TARGETS, Task
 from armwright.text import end_of, fence
 
-LONGEST_DESCRIPTION = 10_000  # characters; longer ones hold points, which `armwright init --from` reads
+MAX_DESCRIPTION_LENGTH = 10_000  # characters; longer ones hold points, which `armwright init --from` reads
 
 
 class DraftAnswer(BaseModel):
@@ -38,9 +38,9 @@ def draft_prompt(description: str) -> str:
     shown = end_of(description.strip(), len(description))
     if not shown.strip():
         raise SettingsError('the description is empty; try armwright draft "reach the corners of a 0.5 m cube"')
-    if len(description) > LONGEST_DESCRIPTION:
+    if len(description) > MAX_DESCRIPTION_LENGTH:
         raise SettingsError(
-            f"the description has {len(description):,} characters; expected at most {LONGEST_DESCRIPTION:,}. "
+            f"the description has {len(description):,} characters; expected at most {MAX_DESCRIPTION_LENGTH:,}. "
             "armwright init --from FILE reads points"
         )
     space = DesignSpace()

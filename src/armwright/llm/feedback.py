@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from armwright.llm.answer import LONGEST_REASON
+from armwright.llm.answer import MAX_REASON_LENGTH
 from armwright.llm.answer_format import NOTHING, module_lists
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
@@ -128,7 +128,7 @@ def proposal_records(history: History, name: str) -> list[Record]:
             "e_all": vector(trial.values, at.objectives),
             "violated": _violated(history, trial.number),
             "on_front": trial.number in front,
-            "reason": one_line(trial.reason, LONGEST_REASON) or "not said",
+            "reason": one_line(trial.reason, MAX_REASON_LENGTH) or "not said",
         }
         for trial in history
         if trial.source == name

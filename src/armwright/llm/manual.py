@@ -12,7 +12,7 @@ from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question,
 
 LOOK_EVERY = 0.5  # [s]
 ENDINGS = ("md", "json", "txt")  # of an answer's file
-LARGEST_FILE = 10_000_000  # characters
+MAX_FILE = 10_000_000  # characters
 
 
 class ManualBackend(LlmBackend):
@@ -100,7 +100,7 @@ class ManualBackend(LlmBackend):
     def _read(self, file: Path) -> str:
         try:
             with open(file, encoding="utf-8-sig", errors="replace") as content:
-                return content.read(LARGEST_FILE)
+                return content.read(MAX_FILE)
         except OSError as fault:
             raise FailureError(f"cannot read {file}: {fault.strerror or fault}") from fault
 

@@ -17,7 +17,7 @@ ANSWERS = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
 OUTPUTS = ("auto", "tool", "native", "prompted")
 ORIGINS = ("model", "scripted")
 ON_FAILURE = ("stop", "continue")
-MOST_PROPOSALS = 100  # per call
+MAX_PROPOSALS = 100  # per call
 MODEL_SECONDS = 120.0  # default timeout
 DIRECT = ("model", "prompt", "max_cost")  # fields with a command-line option of their own
 
@@ -43,7 +43,7 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     prompt: str = "plus"
     memory: str = "none"
     answer: str = "two-step"
-    proposals: int = Field(default=1, ge=1, le=MOST_PROPOSALS)
+    proposals: int = Field(default=1, ge=1, le=MAX_PROPOSALS)
 
     @model_validator(mode="before")
     @classmethod

@@ -15,7 +15,7 @@ from armwright.exceptions import SettingsError, did_you_mean
 from armwright.files import read_text
 from armwright.llm.feedback import Feedback, proposal_records
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt_values import MOST_TARGETS, VARIABLES, common_values, shown_values
+from armwright.llm.prompt_values import MAX_TARGETS, VARIABLES, common_values, shown_values
 from armwright.llm.template_sandbox import Sandbox, render
 from armwright.problem.problem import Problem
 from armwright.runs.control import MAX_HINT_LENGTH
@@ -24,11 +24,11 @@ from armwright.text import end_of, fence, one_line, without_thoughts
 
 PROMPTS = ("plus", "minus")
 
-MOST_TOKENS = 12_000  # longer prompts show fewer targets, designs and earlier proposals
-FEWEST_TARGETS = 4  # shown
-MOST_PROPOSED, FEWEST_PROPOSED = 20, 4  # earlier proposals shown
-LONGEST_ANALYSIS = 40_000  # characters from the end of a free answer that the second call reads
-LARGEST_TEMPLATE = 256 * 1024  # [bytes]
+MAX_TOKENS = 12_000  # longer prompts show fewer targets, designs and earlier proposals
+MIN_TARGETS = 4  # shown
+MAX_PROPOSED, MIN_PROPOSED = 20, 4  # earlier proposals shown
+MAX_ANALYSIS_LENGTH = 40_000  # characters from the end of a free answer that the second call reads
+MAX_TEMPLATE = 256 * 1024  # [bytes]
 DEFAULTS = PromptOptions()
 
 
@@ -79,7 +79,7 @@ class Prompt:
     ) -> str:
         """Return the prompt for the next design.
 
-        Fewer targets, designs and proposals are shown until the prompt has at most about MOST_TOKENS, unless hints and
+        Fewer targets, designs and proposals are shown until the prompt has at most about MAX_TOKENS, unless hints and
         the template itself are longer.
 
         Args:
@@ -98,11 +98,11 @@ class Prompt:
             "n_proposed": len(proposed),
             "hints": [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))],  # visible ones
         }
-        most = MOST_TARGETS, max(len(feedback.front), len(feedback.others)), MOST_PROPOSED
+        most = MAX_TARGETS, max(len(feedback.front), len(feedback.others)), MAX_PROPOSED
         while True:
             text = self._with_hints({**common, **shown_values(history, feedback, proposed, *most)})
             fewer = _fewer(*most)
-            if estimated_tokens(text) <= MOST_TOKENS or fewer == most:
+            if estimated_tokens(text) <= MAX_TOKENS or fewer == most:
                 return text
             most = fewer
 
@@ -143,7 +143,7 @@ def load_prompt(name: str | Path) -> Prompt:
         raise SettingsError(
             f'unknown prompt "{name}".{did_you_mean(str(name), PROMPTS)} Prompts: {", ".join(PROMPTS)}, or a file'
         )
-    text = read_text(path, LARGEST_TEMPLATE, SettingsError)
+    text = read_text(path, MAX_TEMPLATE, SettingsError)
     # A file called "plus" must not pass for the built-in prompt.
     return Prompt(path.name if path.name not in PROMPTS else f"./{path.name}", text)
 
@@ -186,7 +186,7 @@ def parameters_prompt(problem: Problem, answer: str, options: PromptOptions = DE
 
 def fenced(answer: str) -> dict[str, str]:
     """Return the end of a free answer, without its thoughts, and a fence that does not occur in it."""
-    material = end_of(without_thoughts(answer).strip() or answer, LONGEST_ANALYSIS)
+    material = end_of(without_thoughts(answer).strip() or answer, MAX_ANALYSIS_LENGTH)
     return {"answer": material, "fence": fence(material)}
 
 
@@ -202,9 +202,9 @@ def estimated_tokens(text: str) -> int:
 
 def _fewer(targets: int, designs: int, proposed: int) -> tuple[int, int, int]:
     """Return the next smaller numbers to show; targets are reduced first."""
-    if targets > FEWEST_TARGETS:
-        return max(FEWEST_TARGETS, 3 * targets // 4), designs, max(FEWEST_PROPOSED, 3 * proposed // 4)
-    return targets, max(1, designs - 1), FEWEST_PROPOSED
+    if targets > MIN_TARGETS:
+        return max(MIN_TARGETS, 3 * targets // 4), designs, max(MIN_PROPOSED, 3 * proposed // 4)
+    return targets, max(1, designs - 1), MIN_PROPOSED
 
 
 def _tidy(text: str) -> str:

@@ -32,8 +32,8 @@ from armwright.tasks.targets import REACHED, describe_targets
 from armwright.tasks.task import IN_ORDER, Task
 from armwright.text import one_line
 
-MOST_TARGETS = 64  # shown
-LONGEST_DESCRIPTION = 2_000  # characters of a task's description
+MAX_TARGETS = 64  # shown
+MAX_DESCRIPTION_LENGTH = 2_000  # characters of a task's description
 
 # Variables of a template, as `armwright prompt --variables` lists them.
 VARIABLES = {
@@ -130,7 +130,7 @@ def _task_values(problem: Problem) -> dict[str, Any]:
     return {
         "gravity": GRAVITY,
         "task": task,
-        "description": one_line(task.description, LONGEST_DESCRIPTION),
+        "description": one_line(task.description, MAX_DESCRIPTION_LENGTH),
         "payload": _describe_payload(task),
         "obstacles": [obstacle.describe() for obstacle in task.obstacles],
         "collisions": problem.uses(*CLEARANCE_QUANTITIES),
@@ -194,8 +194,8 @@ def _describe_times(task: Task) -> str:
 
 
 def _sample(items: Sequence[str]) -> tuple[str, str]:
-    """Join at most MOST_TARGETS of the items; the second text says if some are omitted."""
-    shown = spread(len(items), MOST_TARGETS)
+    """Join at most MAX_TARGETS of the items; the second text says if some are omitted."""
+    shown = spread(len(items), MAX_TARGETS)
     return ", ".join(items[i] for i in shown), "" if len(shown) == len(items) else f" (some of {len(items)})"
 
 

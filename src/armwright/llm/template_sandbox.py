@@ -11,7 +11,7 @@ from jinja2.utils import Cycler, Joiner
 
 from armwright.spaces.parameters import exact
 
-LARGEST_PROMPT = 1_000_000  # characters
+MAX_PROMPT = 1_000_000  # characters
 _CALLABLE = (str, list, tuple, Mapping, Macro, BlockReference, LoopContext, Cycler, Joiner)
 
 
@@ -47,13 +47,13 @@ def render(template: Template, values: Mapping[str, Any]) -> str:
     """Return the text of a template.
 
     Raises:
-        TemplateRuntimeError: The text is longer than LARGEST_PROMPT.
+        TemplateRuntimeError: The text is longer than MAX_PROMPT.
     """
     pieces: list[str] = []
     length = 0
     for piece in template.generate(values):
         length += len(piece)
-        if length > LARGEST_PROMPT:
-            raise TemplateRuntimeError(f"it is longer than {LARGEST_PROMPT:,} characters")
+        if length > MAX_PROMPT:
+            raise TemplateRuntimeError(f"it is longer than {MAX_PROMPT:,} characters")
         pieces.append(piece)
     return "".join(pieces)

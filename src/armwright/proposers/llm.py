@@ -6,8 +6,8 @@ from typing import Any
 from armwright.llm.budget import CallBudget
 from armwright.llm.feedback import N_PARETO, N_RANDOM
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import MOST_TOKENS, estimated_tokens, parameters_prompt
-from armwright.llm.prompt_values import MOST_TARGETS
+from armwright.llm.prompt import MAX_TOKENS, estimated_tokens, parameters_prompt
+from armwright.llm.prompt_values import MAX_TARGETS
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
 from armwright.runs.history import History
@@ -57,7 +57,7 @@ class LlmProposer(PromptedProposer):
             tokens = sum(call.input_tokens for call in calls), sum(call.output_tokens for call in calls)
             return tokens[0] // len(proposals), tokens[1] // len(proposals)
         given = min(
-            MOST_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + _feedback_tokens(problem)
+            MAX_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + _feedback_tokens(problem)
         )
         written = self.options.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
         if self.options.form == "then-schema":
@@ -67,7 +67,7 @@ class LlmProposer(PromptedProposer):
 
 def _feedback_tokens(problem: Problem) -> int:
     """Estimate the tokens of a full prompt's feedback without evaluating designs, which may be slow."""
-    joints, targets = problem.space.max_joints, min(len(problem.task.targets), MOST_TARGETS)
+    joints, targets = problem.space.max_joints, min(len(problem.task.targets), MAX_TARGETS)
     numbers = targets * (len(problem.objectives) + 3 + joints) + 2 * joints + len(problem.objectives) + 3
     return (N_PARETO + N_RANDOM) * (TOKENS_A_NUMBER * numbers + TOKENS_A_DESIGN)
 

@@ -8,7 +8,7 @@ import numpy as np
 T = TypeVar("T")
 
 MIDDLE = (0.35, 0.65)  # shares of a gap between which a rule fills it
-FIRST_SPREAD, MORE_SPREAD, MOST_CHANGES = 0.01, 1.5, 20
+FIRST_SPREAD, MORE_SPREAD, MAX_CHANGES = 0.01, 1.5, 20
 
 
 def draw_gap(sizes: Sequence[float], rng: np.random.Generator) -> int:
@@ -29,7 +29,7 @@ def change_until_new(value: T, is_tried: Callable[[T], bool], change: Callable[[
         change: returns a value, changed by a spread given as a share of the parameters' scale.
     """
     spread = FIRST_SPREAD
-    for _ in range(MOST_CHANGES):
+    for _ in range(MAX_CHANGES):
         if not is_tried(value):
             break
         value = change(value, spread)

@@ -23,7 +23,7 @@ PULL = 0.1  # base displacement [m] if all targets are missed in one direction
 REACHED = 0.005  # error [m] below which a target no longer pulls the base
 BENT = 0.35  # mean angle [rad] above which a joint is bent
 TRIM = 0.8  # scale of a trimmed link
-LEAST_SCALE, MOST_SCALE = 0.4, 1.6
+LEAST_SCALE, MAX_SCALE = 0.4, 1.6
 # Prior gain of each rule, as a share of the hypervolume.
 EXPECTED = {"fill": 0.01, "trim": 0.002, "swap": 0.002}
 
@@ -127,7 +127,7 @@ def fill(history: History, inside: list[FrontMember], rng: np.random.Generator) 
     sides = [side for side in (low, high) if side is not None]
     side = sides[int(rng.integers(len(sides)))]
     torque = share * gap.more + (1.0 - share) * gap.less
-    scale = float(np.clip(np.sqrt(torque / max(side.values[1], 1e-9)), LEAST_SCALE, MOST_SCALE))
+    scale = float(np.clip(np.sqrt(torque / max(side.values[1], 1e-9)), LEAST_SCALE, MAX_SCALE))
     design = scaled(history, side, scale)
     return design, f"fills {gap.description}: trial {side.number} at {scale:.2f} of its size; {describe(design)}"
 

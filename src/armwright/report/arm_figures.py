@@ -22,7 +22,7 @@ from armwright.tasks.obstacles import Ground
 from armwright.tasks.targets import AXIS
 
 ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
-MOST_PANELS = 12
+MAX_PANELS = 12
 
 # Lines
 MISS: Any = {"color": MISSED, "linewidth": 1.2, "linestyle": (0, (2, 2))}  # from the tip to a target not reached
@@ -50,7 +50,7 @@ def draw_arm(history: History, title: str, member: FrontMember) -> Figure:
     """Draw one design with a panel for each target; of more than 12 targets, 12 spread evenly over the list."""
     evaluation = history.evaluation([member.number])
     n = len(evaluation.targets)
-    shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MOST_PANELS))})
+    shown = sorted({round(i) for i in np.linspace(0, n - 1, min(n, MAX_PANELS))})
     columns = min(4, max(2, math.ceil(math.sqrt(len(shown)))))
     rows = -(-len(shown) // columns)
     height = 3.1 * rows + 1.2

@@ -33,7 +33,7 @@ from armwright.report.style import BEST_KNOWN, FRONT, MISSED, TARGET, line, look
 from armwright.runs.history import BBO, RANDOM
 from armwright.runs.results import FIGURES
 
-MOST_SHOWN = 12  # most tasks in the figure of targets
+MAX_SHOWN = 12  # most tasks in the figure of targets
 COLUMNS = 3  # panels side by side
 MARKERS = 5  # markers on a curve
 
@@ -82,7 +82,7 @@ def _drawn(comparison: Comparison, curves: Sequence[Curves], samples: Sequence[s
             if methods:
                 yield f"hypervolume-{figure.name}", draw_curves(comparison, methods, figure.title)
         yield "time-to", draw_times(comparison, with_curves)
-    for task in comparison.tasks[: MOST_SHOWN if plane else 0]:
+    for task in comparison.tasks[: MAX_SHOWN if plane else 0]:
         yield f"attainment-{task}", draw_attainment(comparison, task)
     if any(run.proposer for run in comparison.runs):
         yield "attribution", draw_attribution_shares(comparison)
@@ -110,7 +110,7 @@ def _details(comparison: Comparison, samples: Sequence[str]) -> Iterator[tuple[s
 
 def draw_targets(comparison: Comparison) -> Figure:
     """Draw the targets of each task in space."""
-    shown = comparison.tasks[:MOST_SHOWN]
+    shown = comparison.tasks[:MAX_SHOWN]
     columns = min(len(shown), COLUMNS + 1)
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(3.2 * columns, 3.3 * rows))

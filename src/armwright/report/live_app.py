@@ -31,7 +31,7 @@ from armwright.runs.control import add_hint, pause_study, resume_study, stop_stu
 
 POLL = 0.25  # [s] between two checks of the run folder
 HEARTBEAT = 15.0  # [s] between events while nothing changes
-LARGEST_BODY = 64 * 1024  # largest POST [bytes]
+MAX_BODY = 64 * 1024  # largest POST [bytes]
 HEADERS = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -129,7 +129,7 @@ class _Handlers:
         try:
             async for part in request.stream():
                 body += part
-                if len(body) > LARGEST_BODY:
+                if len(body) > MAX_BODY:
                     return PlainTextResponse("request too long", status_code=413)
         except ClientDisconnect:
             return Response(status_code=400)  # nobody receives it

@@ -10,7 +10,7 @@ from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.runs.history import History
 
 STEPS = ("reasoning", "answer", "parameters")  # transcript steps that contain a model's reasons, the best first
-LONGEST_REASONS = 5_200  # characters; longer text loses its middle
+MAX_REASONS_LENGTH = 5_200  # characters; longer text loses its middle
 LINE_LENGTH = 104  # characters
 
 
@@ -46,9 +46,9 @@ def draw_reasons(run: RunSummary, history: History, solutions: tuple[int, int] |
 
 
 def _shortened(text: str) -> str:
-    if len(text) <= LONGEST_REASONS:
+    if len(text) <= MAX_REASONS_LENGTH:
         return text
-    half = LONGEST_REASONS // 2
+    half = MAX_REASONS_LENGTH // 2
     return f"{text[:half].rstrip()}\n\n[… {len(text) - 2 * half:,} characters …]\n\n{text[-half:].lstrip()}"
 
 

@@ -21,7 +21,7 @@ from armwright.robot.arm import AXES, Arm, Joint, Link
 Reason = Literal["Adjacent", "Never", "Always"]
 
 MARGIN = 1e-6  # [m]; files have ten digits, and float64 rounds
-MOST_BOXES = 50_000  # per pair; beyond it the search for a proof ends
+MAX_BOXES = 50_000  # per pair; beyond it the search for a proof ends
 
 
 def disabled_collision_pairs(arm: Arm) -> dict[tuple[int, int], Reason]:
@@ -43,7 +43,7 @@ def disabled_collision_pairs(arm: Arm) -> dict[tuple[int, int], Reason]:
 
 
 def _proven(arm: Arm, first: int, second: int) -> Reason | None:
-    """Return Never or Always; None if neither holds or can be proven with MOST_BOXES boxes."""
+    """Return Never or Always; None if neither holds or can be proven with MAX_BOXES boxes."""
     joints = arm.joints[first + 1 : second + 1]
     links = arm.links[first : second + 1]
     moving = [j for j, joint in enumerate(joints) if joint.kind != "fixed"]
@@ -54,7 +54,7 @@ def _proven(arm: Arm, first: int, second: int) -> Reason | None:
     inner = _inset(links[0]) + _inset(links[-1]) - MARGIN
     centres, halves = ((lower + upper) / 2)[None], ((upper - lower) / 2)[None]  # (B, D)
     done, open_reasons = 0, {"Never", "Always"}
-    while len(centres) and done + len(centres) <= MOST_BOXES:
+    while len(centres) and done + len(centres) <= MAX_BOXES:
         done += len(centres)
         apart, near = _distances(joints, links, moving, centres)
         if np.any(apart <= outer):

@@ -20,7 +20,7 @@ from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, Vector
 from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document, rotation_about
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
-LARGEST_ANGLE = 2 * math.pi  # [rad]
+MAX_ANGLE = 2 * math.pi  # [rad]
 RADIUS = 0.04  # [m], for drawings, if the file has no cylinder
 FINGERS = 2  # longest chain of joints of a branch that counts as a finger
 GRIPPER = re.compile("grip|jaw|finger", re.IGNORECASE)  # names of a last joint that belongs to a gripper
@@ -152,16 +152,16 @@ def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list
     if joint.effort:
         actuator = Actuator(joint.name, 0.0, abs(joint.effort), joint.speed or None)
     if joint.kind == "continuous":
-        return Joint("revolute", AXES[axis], -LARGEST_ANGLE, LARGEST_ANGLE, actuator)
+        return Joint("revolute", AXES[axis], -MAX_ANGLE, MAX_ANGLE, actuator)
     lower, upper = (joint.lower or 0.0) - zero, (joint.upper or 0.0) - zero
     if sign < 0.0:
         lower, upper = -upper, -lower
     if joint.kind == "prismatic":
         return Joint("prismatic", AXES[axis], lower, upper, actuator)
-    if max(-lower, upper) > LARGEST_ANGLE:
-        if max(-lower, upper) > LARGEST_ANGLE + 1e-2:
+    if max(-lower, upper) > MAX_ANGLE:
+        if max(-lower, upper) > MAX_ANGLE + 1e-2:
             notes.append(f"{joint.name} rotates from {lower:.4g} to {upper:.4g} rad; ±2π of it is used")
-        lower, upper = max(lower, -LARGEST_ANGLE), min(upper, LARGEST_ANGLE)
+        lower, upper = max(lower, -MAX_ANGLE), min(upper, MAX_ANGLE)
     return Joint("revolute", AXES[axis], lower, upper, actuator)
 
 

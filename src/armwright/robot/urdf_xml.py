@@ -16,7 +16,7 @@ from armwright.arrays import Array
 from armwright.exceptions import ArmError
 from armwright.files import read_bytes
 
-LARGEST_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
+MAX_FILE = 4 * 1024 * 1024  # [bytes]; the largest of 60 common robots has 0.2 MB
 DEEPEST = 50  # nested elements; a URDF needs 6
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
@@ -96,7 +96,7 @@ class UrdfDocument:
 
 def read_document(path: Path) -> UrdfDocument:
     """Read the links and joints of a URDF file; raise ArmError if it is not one."""
-    return parse_document(read_bytes(path, LARGEST_FILE, ArmError), str(path))
+    return parse_document(read_bytes(path, MAX_FILE, ArmError), str(path))
 
 
 def parse_document(data: bytes, where: str) -> UrdfDocument:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from armwright.exceptions import ModelError, ProposalError, SettingsError
 from armwright.llm.model_options import ModelOptions, PromptOptions
-from armwright.llm.prompt import MOST_TOKENS, estimated_tokens
+from armwright.llm.prompt import MAX_TOKENS, estimated_tokens
 from armwright.llm.transcript import Transcript
 from armwright.proposers.for_optuna.callback import ProposalCallback
 from armwright.proposers.for_optuna.llm import StudyLlmProposer
@@ -309,7 +309,7 @@ def test_long_prompt_shows_fewer_trials() -> None:
             trial.set_user_attr(name, value)
         study.tell(trial, float(number))
     text = shown(study, 0, memory="own")
-    assert MOST_TOKENS / 2 < estimated_tokens(text) <= MOST_TOKENS
+    assert MAX_TOKENS / 2 < estimated_tokens(text) <= MAX_TOKENS
     assert text.count("\n- x") == 150
     assert len(re.findall(r"## The best trials\n\nTrial 0 ", text)) == 1
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 from optuna.distributions import CategoricalDistribution, IntDistribution
 
 from armwright.exceptions import DesignError
-from armwright.llm.answer import LONGEST_REASON, answer_json, object_schema, response_schema
+from armwright.llm.answer import MAX_REASON_LENGTH, answer_json, object_schema, response_schema
 from armwright.llm.model_options import PromptOptions
 from armwright.proposers.for_optuna.parameter_values import choice_texts, json_value, read_value
 from armwright.proposers.for_optuna.parameters import Parameter, unknown_parameter
@@ -16,7 +16,7 @@ from armwright.proposers.for_optuna.proposer import StudyProposal
 from armwright.text import one_line
 
 OTHER_KEYS = ("parameters", "reasoning", "reason", "expected")  # keys of an answer that are no parameters
-MOST_ERRORS = 10  # reported at once
+MAX_ERRORS = 10  # reported at once
 LEFT_OUT = ("", "null", "none", "n/a", "-")  # values that models write for conditional parameters they leave out
 
 
@@ -66,8 +66,8 @@ def read_answer(
     if not params and not errors:
         errors = ["no parameter is given"]
     if errors:
-        raise DesignError("; ".join(errors[:MOST_ERRORS]))
-    reason = one_line(str(content.get("reason") or ""), LONGEST_REASON)
+        raise DesignError("; ".join(errors[:MAX_ERRORS]))
+    reason = one_line(str(content.get("reason") or ""), MAX_REASON_LENGTH)
     return StudyProposal(params, "", reason, _expected(content.get("expected"), objectives))
 
 

@@ -14,7 +14,7 @@ from armwright.proposers.for_optuna.parameter_values import checked_value, descr
 
 Space = Mapping[str, BaseDistribution]
 
-MOST_NAMES = 30  # listed in an error
+MAX_NAMES = 30  # listed in an error
 _KEY = re.compile(r"[A-Za-z0-9_.-]{1,64}")  # property names that every vendor accepts
 
 
@@ -112,7 +112,7 @@ def checked_params(params: Mapping[str, Any], given: Space, observed: Space) -> 
 
 def unknown_parameter(name: str, names: Collection[str]) -> DesignError:
     """Return the error for a name that is not one of `names`."""
-    listed = ", ".join(list(names)[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")
+    listed = ", ".join(list(names)[:MAX_NAMES]) + (", …" if len(names) > MAX_NAMES else "")
     return DesignError(f'unknown parameter "{name}".{did_you_mean(name, names)} Parameters: {listed}')
 
 

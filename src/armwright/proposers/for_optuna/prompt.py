@@ -11,12 +11,12 @@ from optuna.trial import FrozenTrial, TrialState
 
 from armwright.llm.feedback import N_PARETO, N_RANDOM, draw_in_order
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import MOST_PROPOSED, MOST_TOKENS, estimated_tokens, fenced, rendered
+from armwright.llm.prompt import MAX_PROPOSED, MAX_TOKENS, estimated_tokens, fenced, rendered
 from armwright.proposers.for_optuna.parameter_values import value_text
 from armwright.proposers.for_optuna.parameters import Parameter, unique_keys
 from armwright.proposers.for_optuna.study_view import best_trials, given_params
 
-FEWEST_PROPOSED = 1
+MIN_PROPOSED = 1
 DIRECTIONS = {StudyDirection.MINIMIZE: "minimised", StudyDirection.MAXIMIZE: "maximised"}
 
 
@@ -48,7 +48,7 @@ def study_prompt(
 ) -> str:
     """Return the prompt for the next trial.
 
-    Fewer trials are shown until the prompt has at most about MOST_TOKENS, unless description and parameters alone are
+    Fewer trials are shown until the prompt has at most about MAX_TOKENS, unless description and parameters alone are
     longer.
 
     Args:
@@ -82,7 +82,7 @@ def study_prompt(
         "expected": options.expects,
         "form": options.form,
     }
-    most_shown, most_proposed = N_PARETO + N_RANDOM, MOST_PROPOSED
+    most_shown, most_proposed = N_PARETO + N_RANDOM, MAX_PROPOSED
     while True:
         others = other_records[: most_shown // 2]
         shown = {
@@ -91,9 +91,9 @@ def study_prompt(
             "proposed": own_records[-most_proposed:],
         }
         text = rendered("study.md.j2", {**common, **shown})
-        if estimated_tokens(text) <= MOST_TOKENS or (most_shown, most_proposed) == (1, FEWEST_PROPOSED):
+        if estimated_tokens(text) <= MAX_TOKENS or (most_shown, most_proposed) == (1, MIN_PROPOSED):
             return text
-        most_shown, most_proposed = max(1, most_shown - 1), max(FEWEST_PROPOSED, 3 * most_proposed // 4)
+        most_shown, most_proposed = max(1, most_shown - 1), max(MIN_PROPOSED, 3 * most_proposed // 4)
 
 
 def _sample(
