@@ -48,6 +48,7 @@ def test_design_and_refine_draw_their_figures(in_folder: Path) -> None:
         assert {"hypervolume.png", "front.png", "arms.pdf"} <= drawn
 
 
+@pytest.mark.slow
 def test_robust_and_refine_every(in_folder: Path) -> None:
     done = armwright(
         "optimize", "target-1", *SHORT, "--robust", "--refine-every", "3", "--proposer", "none", "--out", "r", "--json"

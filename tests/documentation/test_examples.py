@@ -43,6 +43,7 @@ def told(server: ChatServer) -> tuple[str, ...]:
         "7-compare-arms",
     ],
 )
+@pytest.mark.slow
 def test_example_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
     task = next(EXAMPLES.glob(f"{number}*task.yaml"), EXAMPLES / f"{number}.yaml")
     space = EXAMPLES / f"{number}-space.yaml"

@@ -172,6 +172,7 @@ def test_incomparable_runs_are_refused(runs: Path, tmp_path: Path) -> None:
         compare_summaries([])
 
 
+@pytest.mark.slow
 def test_runs_with_different_reference_points_share_their_maximum(tmp_path: Path) -> None:
     task = Task(name="mine", targets=load_task("shelf").targets)
     stated = task.model_copy(update={"reference_point": (0.5, 9.0)})

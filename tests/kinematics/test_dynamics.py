@@ -222,6 +222,7 @@ def test_torques_of_nonredundant_arms_match_finite_differences() -> None:
         assert np.abs(theirs - ours).max() < 0.005 * np.abs(theirs).max()
 
 
+@pytest.mark.slow
 def test_finer_step_gives_the_same_torques() -> None:
     """This includes redundant arms, whose samples drift: each posture determines its own torques."""
     space = paper_space(6)

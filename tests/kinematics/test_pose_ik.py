@@ -114,6 +114,7 @@ def test_single_updates_in_float64_agree_with_the_reference(dof: int, rows: int)
 
 @KINDS
 @pytest.mark.parametrize("dof", [3, 6, 7])
+@pytest.mark.slow
 def test_single_updates_in_float32_agree_with_float64(dof: int, rows: int) -> None:
     """Within 2e-4 rad but for 1 in 200: arms near a singular posture, or with a joint near its limit."""
     arms = tooled_arms(1000, dof, 6)

@@ -261,6 +261,7 @@ def test_truncated_answer_is_refused(
 
 
 @pytest.mark.parametrize(("n_total", "flagged"), [(9, True), (10, False)])
+@pytest.mark.slow
 def test_run_with_more_than_a_tenth_of_fallbacks_is_flagged(
     chat_server: ChatServer, ask: Callable[..., Any], n_total: int, flagged: bool
 ) -> None:
@@ -347,6 +348,7 @@ TYPES = st.sampled_from(["application/json", "text/event-stream", "text/html", "
 # The vendor's client leaves the stream of a broken answer to the garbage collector, which may come at a bad time.
 @pytest.mark.filterwarnings("ignore:.*async_generator:pytest.PytestUnraisableExceptionWarning")
 @both_formats
+@pytest.mark.slow
 def test_arbitrary_responses_are_answers_or_faults(
     chat_server: ChatServer, monkeypatch: pytest.MonkeyPatch, wire: str
 ) -> None:

@@ -468,6 +468,7 @@ def test_prompt_of_any_problem_is_complete_and_bounded(
     assert "None" not in text
 
 
+@pytest.mark.slow
 def test_longest_prompt_is_bounded() -> None:
     """8 joints, 10,000 targets, 40 earlier proposals with long reasons in any script, 100 proposals at once."""
     space = paper_space(8).model_copy(update={"link": (0.030123456789, 0.300123456789)})

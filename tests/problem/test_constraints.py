@@ -284,6 +284,7 @@ def test_run_counts_only_feasible_designs(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
+@pytest.mark.slow
 def test_killed_constrained_run_resumes_identically(tmp_path: Path, sampler: str) -> None:
     """A kill leaves whole lines and a part of one."""
     how: dict[str, Any] = {"proposer": "rules", "sampler": sampler, "n_total": 24, "seed": 3}

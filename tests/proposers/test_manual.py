@@ -49,6 +49,7 @@ def pending(folder: Path, out: Path, **how: str) -> AnswerPendingError:
     return waits.value
 
 
+@pytest.mark.slow
 def test_command_line_accepts_answers_one_by_one(in_folder: Path) -> None:
     command = (
         *("optimize", "target-1", "--proposer", "manual:ask", *model_options(wait=False)),

@@ -159,6 +159,7 @@ def interrupted_at(stop: int) -> Callable[[Progress], None]:
 
 
 @pytest.mark.parametrize("stop", [4, 6])
+@pytest.mark.slow
 def test_interrupted_replay_resumes(in_pairs: ChatServer, tmp_path: Path, stop: int) -> None:
     """This includes a stop within a call of two designs: no recorded call is used twice."""
     first = recorded(in_pairs, tmp_path / "first", {"proposals": 2})

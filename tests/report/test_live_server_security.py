@@ -169,6 +169,7 @@ def test_endless_body_is_refused_early(served: tuple[Path, int, str]) -> None:
     assert not read_control(folder).paused
 
 
+@pytest.mark.slow
 def test_slow_clients_do_not_block_others(served: tuple[Path, int, str]) -> None:
     folder, port, token = served
     begun = lines("POST /control HTTP/1.1", *right(port, token), "Content-Length: 18") + b'{"action":'

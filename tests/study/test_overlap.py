@@ -254,6 +254,7 @@ def test_invalid_in_flight_is_refused() -> None:
 
 
 @pytest.mark.parametrize("stop", [6, 13])
+@pytest.mark.slow
 def test_interrupted_run_pays_for_no_answer_twice(chat_server: ChatServer, tmp_path: Path, stop: int) -> None:
     def proposer() -> LlmProposer:
         return llm_proposer(chat_server.url)

@@ -186,6 +186,7 @@ def test_template_variables_are_listed() -> None:
 
 
 @pytest.mark.parametrize("name", ["plus", "minus"])
+@pytest.mark.slow
 def test_copied_template_gives_the_same_prompt(in_folder: Path, name: str) -> None:
     whole = shown("--template", "--prompt", name)[0]
     (in_folder / "own.md").write_text(whole, encoding="utf-8")

@@ -25,6 +25,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, int
     reader, writer = (os.fdopen(end, mode) for end, mode in zip(os.pipe(), ("rb", "wb"), strict=True))
     with pytest.MonkeyPatch.context() as patch, reader, writer:
         patch.setattr(live, "LINGER", 0.1)  # not 0: it would end with its first page
+        patch.setattr(live, "GRACE", 0.1)
         # It ends with the study that `writer` stands for.
         server = threading.Thread(target=live.serve, args=(folder, addresses.put), kwargs={"study": reader})
         server.start()

@@ -192,6 +192,7 @@ def test_mirrored_arms_mirror_their_moves() -> None:
     assert alike.mean() > 0.85, "but for the few arms for which the solver is chaotic"
 
 
+@pytest.mark.slow
 def test_finer_steps_follow_the_line_no_worse() -> None:
     """This holds in distribution for arms that can follow the line."""
     space = paper_space(6)

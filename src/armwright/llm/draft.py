@@ -228,9 +228,10 @@ class Drafter(LlmSession):
     def _failure(self, fault: ProposalError) -> ModelError:
         answered = isinstance(fault, CallError) and fault.reply.answer.strip()
         advice = "Describe it in other words" if answered else "Check the model, its key and base_url"
+        reason = one_line(str(fault), MAX_FAULT_LENGTH).rstrip(".")
         return ModelError(
-            f"no draft: {one_line(str(fault), MAX_FAULT_LENGTH).rstrip('.')}. {self._kept() if answered else ''}{advice}"
-            "; armwright init my-task.yaml writes a task to edit without a model",
+            f"no draft: {reason}. {self._kept() if answered else ''}{advice}; "
+            "armwright init my-task.yaml writes a task to edit without a model",
             final=fault.kind if fault.final else None,
         )
 
