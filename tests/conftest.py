@@ -1,12 +1,14 @@
 """Shared fixtures, the two tiers of the suite, and isolation from the user's home.
 
 `make test` runs what is not slow, `make test-all` the rest. A test is slow if it is marked so, lies in one of
-SLOW_FOLDERS or uses one of SLOW_FIXTURES. A test that is not slow fails if it starts a process.
+SLOW_FOLDERS or uses one of SLOW_FIXTURES; of a test marked fast_cases, all but the first cases are. A test that is not
+slow fails if it starts a process.
 """
 
 import gc
 import signal
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -81,7 +83,13 @@ def pytest_collection_finish() -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark slow tests, and put them first, so that no worker is left alone with them at the end."""
+    seen: Counter[str] = Counter()
     for item in items:
+        limit = item.get_closest_marker("fast_cases")
+        case_of = item.nodeid.partition("[")[0]
+        seen[case_of] += 1
+        if limit is not None and seen[case_of] > limit.args[0]:
+            item.add_marker(pytest.mark.slow)
         folders = item.path.relative_to(Path(__file__).parent).parts
         if SLOW_FOLDERS.intersection(folders) or SLOW_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.slow)

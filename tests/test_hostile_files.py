@@ -139,6 +139,7 @@ def run(tmp_path: Path) -> Path:
     ],
     ids=str,
 )  # fmt: skip
+@pytest.mark.fast_cases(3)
 def test_damaged_summary_is_made_again(run: Path, place: tuple[str, ...], value: object) -> None:
     summary = json.loads((run / "summary.json").read_text())
     within = summary

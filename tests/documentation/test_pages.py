@@ -96,6 +96,7 @@ def parsed(arguments: Sequence[str]) -> None:
 
 
 @pytest.mark.parametrize("page", FOLLOWED)
+@pytest.mark.fast_cases(3)
 def test_documented_commands_and_options_exist(page: str) -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))

@@ -141,6 +141,7 @@ def test_clearance_of_one_link_agrees_with_coal(kind: str) -> None:
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 @pytest.mark.parametrize("dof", [3, 6, 8])
+@pytest.mark.fast_cases(3)
 def test_clearance_of_whole_arms_agrees_with_coal(dof: int, precision: Precision) -> None:
     rng = np.random.default_rng(dof)
     arms = [*moving_arms(12, dof, 1), *(paper_space(dof).arm(design) for design in paper_space(dof).sample(12, 1))]

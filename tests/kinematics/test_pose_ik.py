@@ -97,6 +97,7 @@ def test_angle_errors_agree_with_pinocchio(rows: int) -> None:
 
 @KINDS
 @pytest.mark.parametrize("dof", [1, 2, 4, 5, 6, 7, 8])
+@pytest.mark.fast_cases(3)
 def test_single_updates_in_float64_agree_with_the_reference(dof: int, rows: int) -> None:
     """Within 1e-8 rad, without exception, and 1 + H within 1e-12 of itself: arms with fewer joints than rows, too."""
     arms = tooled_arms(200, dof, 5)

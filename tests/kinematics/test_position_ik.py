@@ -53,6 +53,7 @@ def load(arm: Arm) -> float:
 
 @MAKERS
 @DOFS
+@pytest.mark.fast_cases(3)
 def test_tip_and_torque_agree_with_pinocchio_and_mujoco(dof: int, arms_of: ArmMaker) -> None:
     """8 x 2 x 20 arms: tip within 1e-5 m; torque within 1e-4 of its norm (or of 1 % of the arm's load if larger).
 
@@ -73,6 +74,7 @@ def test_tip_and_torque_agree_with_pinocchio_and_mujoco(dof: int, arms_of: ArmMa
 
 @MAKERS
 @DOFS
+@pytest.mark.fast_cases(3)
 def test_reference_agrees_with_pinocchio_and_mujoco(dof: int, arms_of: ArmMaker) -> None:
     """8 x 2 x 20 arms: the reference's tip, position Jacobian and torque, in float64.
 
@@ -140,6 +142,7 @@ def test_planar_two_link_arm() -> None:
 
 @MAKERS
 @DOFS
+@pytest.mark.fast_cases(3)
 def test_single_updates_agree_with_the_reference(dof: int, arms_of: ArmMaker) -> None:
     """dq = J# dx + (I - J# J) y from random (q, H before): within 1e-4 rad, and 1 + H within 5e-5 of itself.
 

@@ -79,6 +79,7 @@ def giving(answer: Answer) -> Callable[[Request], Answer]:
 
 
 @spread(IN_ANY_FORM)
+@pytest.mark.fast_cases(3)
 def test_answers_are_read_in_any_form(
     chat_server: ChatServer, ask: Callable[..., StudyResult], wire: str, output: str, case: str
 ) -> None:
@@ -100,6 +101,7 @@ def test_text_around_an_answer_is_ignored(
 
 @every_output
 @both_formats
+@pytest.mark.fast_cases(3)
 def test_one_step_answers_hold_reasoning_and_design(
     chat_server: ChatServer, ask: Callable[..., StudyResult], tmp_path: Path, wire: str, output: str
 ) -> None:
@@ -112,6 +114,7 @@ def test_one_step_answers_hold_reasoning_and_design(
 
 
 @spread(REFUSED)
+@pytest.mark.fast_cases(3)
 def test_refused_values_are_requested_again_with_the_reason(
     chat_server: ChatServer, ask: Callable[..., StudyResult], tmp_path: Path, wire: str, output: str, case: str
 ) -> None:
@@ -142,6 +145,7 @@ def test_refused_answers_are_recorded_with_the_text_around_them(
 
 @every_output
 @both_formats
+@pytest.mark.fast_cases(3)
 def test_corrected_answers_are_accepted(
     chat_server: ChatServer, ask: Callable[..., StudyResult], wire: str, output: str
 ) -> None:

@@ -100,6 +100,7 @@ class Session(LlmSession):
 
 
 @pytest.mark.parametrize(("most", "proposals"), [(1, 0), (2, 0), (3, 1), (5, 2), (50, 4)])
+@pytest.mark.fast_cases(3)
 def test_max_calls_bounds_the_requests_of_a_run(chat_server: ChatServer, most: int, proposals: int) -> None:
     seen: list[Progress] = []
     result = run(llm_proposer(chat_server.url, model="m", max_calls=most), seen=seen)

@@ -182,6 +182,7 @@ REFUSED_FAST = ("no task", "unknown key", "payloads", "actuators missing", "pric
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in REFUSED_FAST else pytest.mark.slow) for name in REFUSED]
 )
+@pytest.mark.fast_cases(3)
 def test_invalid_draft_is_returned_with_the_reason_and_not_written(
     chat_server: ChatServer, tmp_path: Path, name: str
 ) -> None:
@@ -238,6 +239,7 @@ def test_line_breaks_in_a_description_stay_in_the_comment(chat_server: ChatServe
 
 
 @pytest.mark.parametrize(("kind", "name"), [(kind, next(iter(faults))) for kind, faults in FAULTS.items()])
+@pytest.mark.fast_cases(3)
 def test_model_faults_are_one_line_and_write_no_task(
     chat_server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, name: str
 ) -> None:

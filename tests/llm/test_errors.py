@@ -106,6 +106,7 @@ def sources(run: StudyResult) -> Sequence[str]:
 
 
 @every_fault
+@pytest.mark.fast_cases(3)
 def test_fault_before_the_first_trial_is_a_one_line_error(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,
@@ -130,6 +131,7 @@ def test_fault_before_the_first_trial_is_a_one_line_error(
 
 
 @every_fault
+@pytest.mark.fast_cases(3)
 def test_later_fault_becomes_a_counted_black_box_trial(
     chat_server: ChatServer,
     monkeypatch: pytest.MonkeyPatch,

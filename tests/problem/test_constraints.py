@@ -329,6 +329,7 @@ def test_trial_without_violations_is_damaged(tmp_path: Path) -> None:
         read_run(tmp_path / "run")
 
 
+@pytest.mark.slow
 def test_replay_has_identical_violations(chat_server: ChatServer, tmp_path: Path) -> None:
     def answer(request: Request) -> Answer:
         if "response_format" not in request:

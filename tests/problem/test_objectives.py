@@ -77,7 +77,7 @@ def short(problem: Problem, n_total: int, out: Path | None = None) -> StudyResul
 @pytest.mark.parametrize(
     "problem",
     [
-        one(OPEN),
+        pytest.param(one(OPEN), marks=pytest.mark.slow),
         three(bounded(5.0, 5.0, 60.0)),
         pytest.param(one(bounded(5.0)), marks=pytest.mark.slow),
         pytest.param(three(OPEN), marks=pytest.mark.slow),

@@ -427,6 +427,7 @@ def test_page_with_ten_thousand_designs(tmp_path: Path, tab: Tab) -> None:
     assert tab.faults == []
 
 
+@pytest.mark.slow
 def test_report_without_trials_is_refused(run: Path, tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_text((run / "config.yaml").read_text())
     with pytest.raises(RunFolderError, match="nothing to report"):

@@ -134,6 +134,7 @@ def test_coaxial_links_never_collide_beyond_a_neighbour() -> None:
 
 
 @pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.fast_cases(3)
 def test_pinocchio_loads_pairs_and_home_posture(arm: Arm) -> None:
     geometry, text = Geometry(arm), to_srdf(arm)
     before = geometry.pairs()

@@ -66,6 +66,7 @@ def test_tip_has_the_tool_orientation_at_zero(tip: Callable[[Arm, Array], Array]
 
 @EVERY_FORMAT
 @pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.fast_cases(3)
 def test_exported_tip_pose_matches_the_arm(arm: Arm, tip: Callable[[Arm, Array], Array]) -> None:
     for q in postures(arm, 3):
         pose = tip(arm, q)

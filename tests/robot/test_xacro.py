@@ -36,11 +36,13 @@ def assert_same(urdf: str, arm: Arm, prefix: str = "") -> None:
 
 @EVERY_ARM
 @pytest.mark.parametrize("mass_per_metre", [0.0, 0.7])
+@pytest.mark.fast_cases(3)
 def test_xacro_defaults_to_the_urdf(arm: Arm, mass_per_metre: float) -> None:
     assert_same(processed(to_xacro(arm, mass_per_metre=mass_per_metre)), arm)
 
 
 @EVERY_ARM
+@pytest.mark.fast_cases(3)
 def test_xacro_and_urdf_agree_in_yourdfpy_and_mujoco(arm: Arm) -> None:
     text = processed(to_xacro(arm))
     seen, ours = (yourdfpy.URDF.load(io.BytesIO(urdf.encode())).robot for urdf in (text, to_urdf(arm)))

@@ -50,6 +50,7 @@ def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 @pytest.mark.parametrize("space", [MIXED, *map(load_space, builtin_spaces())], ids=lambda space: space.name)
+@pytest.mark.fast_cases(3)
 def test_stacked_designs_equal_stacked_arms_to_the_bit(space: DesignSpace, precision: Any) -> None:
     designs = space.sample(300, 7)
     one = stack_designs(space, space.matrix(designs), precision)

@@ -276,6 +276,7 @@ def test_paper_tasks_have_a_best_known_front() -> None:
 
 
 @pytest.mark.parametrize("name", known_tasks())
+@pytest.mark.fast_cases(3)
 def test_best_known_fronts_are_reproducible_fronts(name: str) -> None:
     """Their designs are in the space, none dominates another, and most give their values on this machine, too.
 

@@ -133,6 +133,7 @@ def test_black_box_waits_when_a_block_ahead() -> None:
 @pytest.mark.parametrize(("n_step", "n_total", "in_flight", "per_call"), [
     (5, 23, 1, 1), (5, 40, 3, 1), (1, 12, 4, 1), (4, 30, 2, 3), (30, 20, 2, 1), (2, 9, 1, 4),
 ])  # fmt: skip
+@pytest.mark.fast_cases(3)
 def test_ratio_does_not_depend_on_the_order_of_answers(
     seed: int, n_step: int, n_total: int, in_flight: int, per_call: int
 ) -> None:
@@ -172,6 +173,7 @@ def test_failed_call_becomes_a_black_box_trial() -> None:
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("in_flight", "per_call"), [(1, 3), (2, 3), (4, 2)])
+@pytest.mark.fast_cases(3)
 def test_further_designs_of_an_answer_wait_for_their_blocks(seed: int, in_flight: int, per_call: int) -> None:
     proposer = Held(per_call)
     releasing = Releasing(proposer, seed)

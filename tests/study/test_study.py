@@ -201,6 +201,7 @@ def qmc(seed: int) -> BaseSampler:
         )
     ],
 )
+@pytest.mark.fast_cases(3)
 def test_resumed_run_equals_uninterrupted_one(
     tmp_path: Path, sampler: str | SamplerFactory, proposer: Proposer | str, stop: int
 ) -> None:

@@ -86,6 +86,7 @@ def rules(every: int = 3, **settings: Any) -> aw.ProposalCallback:
 
 @pytest.mark.parametrize("objective", [mixed, two])
 @pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.fast_cases(3)
 def test_every_sampler_accepts_proposals_of_every_parameter_kind(
     sampler: Callable[..., BaseSampler], objective: Callable[[optuna.Trial], Any]
 ) -> None:
@@ -155,6 +156,7 @@ def test_failed_pruned_and_nan_trials_are_ignored() -> None:
 
 @pytest.mark.parametrize("value", [float("inf"), -float("inf"), 1e308, -1e308, 0.0])
 @pytest.mark.parametrize("n_objectives", [1, 3])
+@pytest.mark.fast_cases(3)
 def test_equal_and_infinite_values_are_handled(value: float, n_objectives: int) -> None:
     """All values but one are equal or infinite."""
     study = optuna.create_study(directions=["maximize"] * n_objectives, sampler=RandomSampler(seed=0))
