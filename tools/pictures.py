@@ -1,0 +1,170 @@
+"""Make the pictures of README and docs again; some two minutes on two cores, and a browser.
+
+python tools/pictures.py            # all of them
+python tools/pictures.py page.png   # one
+"""
+
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+EXAMPLES = ROOT / "examples"
+FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+Shot = Callable[[Path, Page, Path], None]
+
+
+def armwright(folder: Path, *arguments: object) -> None:
+    """Run an armwright command in a folder."""
+    command = [Path(sys.executable).with_name("armwright"), *map(str, arguments)]
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+
+
+def once(folder: Path, run: str, *arguments: object) -> Path:
+    """Run a command unless its run folder is there."""
+    if not (folder / run).exists():
+        armwright(folder, *arguments, "--out", run)
+    return folder / run
+
+
+def open_report(page: Page, run: Path, size: tuple[int, int], at: str = "", dark: bool = False) -> None:
+    """Open the report of a run, and wait until it is drawn."""
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.emulate_media(color_scheme="dark" if dark else "light")
+    page.goto((run / "report.html").as_uri() + at)
+    page.locator("#loading").wait_for(state="hidden")
+    page.wait_for_timeout(1500)  # the 3D view and the plots are drawn
+
+
+def target_2(folder: Path) -> Path:
+    """Return the run that most pictures show."""
+    return once(folder, "runs/target-2", "optimize", "target-2", "--seed", 0)
+
+
+def report(folder: Path, page: Page, file: Path) -> None:
+    """Show the top of a report."""
+    open_report(page, target_2(folder), (1280, 1290), "#design=120&target=2")
+    page.screenshot(path=file)
+
+
+def dark_report(folder: Path, page: Page, file: Path) -> None:
+    """Compare two designs in the dark theme."""
+    open_report(page, target_2(folder), (1280, 800), "#design=50", dark=True)
+    page.locator("#compare").click()
+    page.goto(page.url.partition("#")[0] + "#design=101")
+    page.wait_for_timeout(1000)
+    page.screenshot(path=file)
+
+
+def live_report(folder: Path, page: Page, file: Path) -> None:
+    """Show a run in progress."""
+    command = [Path(sys.executable).with_name("armwright"), "optimize", "target-3", "--n-total", "2000", "--live"]
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as study:
+        assert study.stdout is not None
+        address = next(found[0] for line in study.stdout if (found := re.search(r"http://\S+", line)))
+        page.set_viewport_size({"width": 900, "height": 760})
+        page.emulate_media(color_scheme="light")
+        page.goto(address)
+        page.locator("#iteration-value", has_text=re.compile("1[2-9]\\d|[2-9]\\d\\d")).wait_for()
+        page.screenshot(path=file)
+        page.locator("#stop").click()
+        page.goto("about:blank")
+        study.kill()
+
+
+def tutorial(folder: Path, page: Page, file: Path) -> None:
+    """Show the report of the tutorial's second search."""
+    text = (DOCS / "tutorial.md").read_text()
+    for name, key in (("feeder.yaml", "name: feeder"), ("space.yaml", "name: servo-arm")):
+        block = next(b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if b.startswith(key))
+        (folder / name).write_text(block)
+    command = ["design", "feeder.yaml", "--space", "space.yaml", "--robust", "--budget", 10000]
+    open_report(page, once(folder, "runs/robust", *command), (1280, 760), "#design=1&target=1")
+    page.screenshot(path=file)
+
+
+def arm_of(task: str, space: str, search: tuple[object, ...], at: str) -> Shot:
+    """Return a picture of the 3D view of an example."""
+
+    def shot(folder: Path, page: Page, file: Path) -> None:
+        run = once(folder, f"runs/{task}", search[0], EXAMPLES / task, "--space", EXAMPLES / space, *search[1:])
+        open_report(page, run, (1280, 1290), at)
+        page.locator("#arm-box").screenshot(path=file)
+
+    return shot
+
+
+def arms(folder: Path, page: Page, file: Path) -> None:
+    """Show four designs of one run."""
+    shutil.copy(target_2(folder) / "figures/arms.png", file)
+
+
+def dashboard(folder: Path, page: Page, file: Path) -> None:
+    """Show an exported study in Optuna's dashboard."""
+    run = once(folder, "runs/target-1", "optimize", "target-1", "--seed", 0)
+    if not (run / "study.db").exists():
+        armwright(folder, "export", run, "--format", "optuna")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [Path(sys.executable).with_name("optuna-dashboard"), f"sqlite:///{run}/study.db"]
+    options = ["--artifact-dir", run / "artifacts", "--port", str(port)]
+    with subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
+        address = f"http://127.0.0.1:{port}/dashboard"
+        for _ in range(100):
+            try:
+                urllib.request.urlopen(address)
+                break
+            except OSError:
+                time.sleep(0.1)
+        page.set_viewport_size({"width": 1300, "height": 900})
+        page.emulate_media(color_scheme="light")
+        page.goto(f"{address}/studies/1")
+        page.get_by_text("Pareto Front").first.wait_for()
+        page.wait_for_timeout(2500)
+        page.screenshot(path=file)
+        server.terminate()
+
+
+PICTURES: dict[str, Shot] = {
+    "arms.png": arms,
+    "page.png": report,
+    "page-dark.png": dark_report,
+    "page-live.png": live_report,
+    "tutorial.png": tutorial,
+    "example-shelf.png": arm_of(
+        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", ("design", "--budget", 60000), "#design=3&target=9"
+    ),
+    "example-obstacles.png": arm_of(
+        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", ("optimize",), "#design=111&target=3"
+    ),
+    "dashboard.png": dashboard,
+}
+
+
+def main() -> None:
+    """Make the pictures that the command line names, or all."""
+    names = sys.argv[1:] or list(PICTURES)
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
+    with tempfile.TemporaryDirectory() as temporary, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=list(FLAGS))
+        for name in names:
+            page = browser.new_page()
+            PICTURES[name](Path(temporary), page, DOCS / name)
+            page.close()
+            print(name, flush=True)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
