@@ -27,6 +27,7 @@ from armwright.experiments.plan import (
 )
 from armwright.experiments.runner import run_cell
 from armwright.llm.model_options import ModelOptions
+from armwright.llm.recording_file import shipped_recordings
 from armwright.tasks.catalogue import builtin_tasks
 from tests.support.chat_server import ChatServer
 
@@ -156,6 +157,19 @@ def test_cells_without_a_model_are_skipped_with_a_reason(tmp_path: Path) -> None
     cells, skipped = plan_cells(with_model(plan_of(methods=methods), ModelOptions(model="gpt-x")), tmp_path, tmp_path)
     assert not skipped
     assert {cell.plan.model_options.model for cell in cells if cell.method == "llm"} == {"gpt-x"}
+
+
+def test_replayed_methods_run_the_cells_with_a_recording(tmp_path: Path) -> None:
+    plan = builtin_experiments()["recorded"]
+    cells, skipped = plan_cells(plan, tmp_path, tmp_path)
+    replayed = {(cell.method, cell.replay) for cell in cells if cell.replay}
+    assert {name for _, name in replayed} == set(shipped_recordings())
+    assert all(f"--proposer=replay:{cell.replay}" in cell.command for cell in cells if cell.replay)
+    assert len(cells) == 2 * 3 * 5 + len(replayed)
+    assert {one.reason for one in skipped} == {
+        "there is no {task}-minus-seed{seed}",
+        "there is no {task}-plus-n5-seed{seed}",
+    }
 
 
 @pytest.mark.slow

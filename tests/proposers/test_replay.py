@@ -12,6 +12,7 @@ import pytest
 
 from armwright.exceptions import ReplayError, RunFolderError, SettingsError
 from armwright.llm.model_options import ModelOptions
+from armwright.llm.recording_file import find_recording
 from armwright.llm.transcript import Call, Transcript
 from armwright.problem.problem import Problem
 from armwright.proposers.factory import choose_proposer
@@ -323,3 +324,55 @@ def test_recording_is_never_changed(varied: ChatServer, tmp_path: Path) -> None:
     optimize(PROBLEM, proposer=ReplayProposer(tmp_path / "first"), **SETTINGS)
     assert file.read_bytes() == before
     assert len(Transcript(file, read_only=True).calls) == 9
+
+
+# Shipped recordings of a real model
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "mean", "last"),
+    [
+        ("target-1-plus-seed0", 9.06, 9.83),
+        ("target-2-plus-n5-seed0", 19.35, 20.36),
+        ("target-3-minus-seed0", 19.65, 21.10),
+    ],
+)
+def test_shipped_recording_reaches_its_recorded_hypervolume(name: str, mean: float, last: float) -> None:
+    """Rounding differs between processors, so other black-box designs may be drawn; the model's stay the same."""
+    recording = find_recording(name)
+    assert recording is not None
+    study = recording.config.study
+    run = optimize(
+        recording.config.problem,
+        proposer=ReplayProposer(name),
+        n_init=study.n_init,
+        n_step=study.n_step,
+        n_total=study.n_total,
+        seed=recording.config.seed,
+        verify=False,
+    )
+    proposed = [trial for trial in run.trials if trial.source == "llm"]
+    assert [trial.proposal for trial in proposed] == [call.proposal for call in recording.calls]
+    assert all(trial.reason for trial in proposed)
+    assert float(run.hypervolume.mean()) == pytest.approx(mean, rel=0.03)
+    assert float(run.hypervolume[-1]) == pytest.approx(last, rel=0.03)
+    assert run.summary["proposer"]["calls"] == len(proposed)
+
+
+def test_prompts_of_a_recording_are_shown_as_they_were(tmp_path: Path) -> None:
+    recording = find_recording("target-1-plus-seed0")
+    assert recording is not None
+    # With another seed, today's prompts differ from the recorded ones.
+    settings = {**SETTINGS, "n_init": 10, "n_step": 10}
+    run = optimize(PROBLEM, proposer=ReplayProposer("target-1-plus-seed0"), out=tmp_path / "run", **settings)
+    calls = Transcript(tmp_path / "run/transcripts.jsonl").calls
+    assert [(call.prompt, call.answer) for call in calls] == [
+        (c.prompt, c.answer) for c in recording.calls[: len(calls)]
+    ]
+    assert len(calls) == sum(trial.source == "llm" for trial in run.trials) == 2
+
+
+def test_unknown_recording_is_refused_with_a_suggestion() -> None:
+    with pytest.raises(ReplayError, match="Did you mean"):
+        choose_proposer("replay:target-1-plus-seed9")

@@ -12,6 +12,7 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.experiments.plan import ExperimentPlan, MethodPlan
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import PROMPTS
+from armwright.llm.recording_file import shipped_recordings
 from armwright.llm.transcript import TRANSCRIPTS
 from armwright.tasks.catalogue import load_task
 
@@ -23,7 +24,7 @@ MAX_CELLS = 100_000
 class Cell:
     """One run of an experiment: a method on a task with a seed, in its own folder.
 
-    task, space: names or absolute paths. replay: a recorded run to replay instead of asking a model.
+    task, space: names or absolute paths. replay: a recording, or the folder of a recorded run, to replay.
     """
 
     method: str
@@ -36,7 +37,7 @@ class Cell:
     n_total: int
     robust: bool
     folder: Path
-    replay: Path | None = None
+    replay: str | None = None
 
     @property
     def description(self) -> str:
@@ -120,7 +121,7 @@ def plan_cells(
         )
         if seed == plan.seed_list[0] and not cell.command.isprintable():
             raise SettingsError(f"{cell.command}: a name in it has a character that is not printable")
-        cell, reason = _with_model_source(cell, replay)
+        cell, reason = _with_model_source(cell, folder, replay)
         if reason:
             skipped.append(Skipped(cell, reason))
         else:
@@ -128,14 +129,21 @@ def plan_cells(
     return ready, skipped
 
 
-def _with_model_source(cell: Cell, replay: Path | None) -> tuple[Cell, str]:
+def _with_model_source(cell: Cell, folder: Path, replay: Path | None) -> tuple[Cell, str]:
     """Return the cell with its model or replay; or the reason why it has neither."""
+    recording = cell.plan.recording(cell.task_name, cell.seed)
+    if recording is not None:
+        if recording not in shipped_recordings():
+            recording = str((folder / recording).resolve())
+            if not Path(recording).exists():
+                return cell, f"there is no {cell.plan.proposer.removeprefix('replay:')}"
+        return replace(cell, replay=recording), ""
     if not cell.plan.needs_a_model:
         return cell, ""
     if replay is not None:
         recorded = replay.resolve() / RUNS / cell.method / cell.task_name / f"seed{cell.seed}"
         if (recorded / TRANSCRIPTS).is_file():
-            return replace(cell, replay=recorded), ""
+            return replace(cell, replay=str(recorded)), ""
         return cell, f"{replay} has no recorded run of it"
     if cell.plan.model_options.model is None:
         return cell, "no language model is configured; use --model, or --replay DIR for recorded runs"

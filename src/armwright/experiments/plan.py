@@ -24,7 +24,8 @@ Count = Annotated[int, Field(ge=1, le=2**31 - 1)]
 class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A method: the options of `armwright optimize`, or, with `design`, the budget of `armwright design`.
 
-    label: name in tables and figures.
+    label: name in tables and figures. proposer: as in `armwright optimize`; `replay:NAME` may contain {task} and
+        {seed}, and runs the cells for which there is such a recording.
     """
 
     label: str = Field(min_length=1, max_length=40)
@@ -40,7 +41,12 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """True if it needs a language model, or a recorded run of one."""
         return self.design is None and self.proposer == "llm"
 
-    def choose_proposer(self, replay: Path | None = None) -> Choice:
+    def recording(self, task: str, seed: int) -> str | None:
+        """Return the recording that it replays for a task and a seed; None if it replays none."""
+        kind, _, name = self.proposer.partition(":")
+        return name.format(task=task, seed=seed) if kind == "replay" else None
+
+    def choose_proposer(self, replay: str | None = None) -> Choice:
         """Return its proposer; with a recorded run, that of the replay."""
         if replay is not None:
             return choose_proposer(f"replay:{replay}")
@@ -49,9 +55,14 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @model_validator(mode="after")
     def _check_proposer(self) -> Self:
         allowed = tuple(name for name in PROPOSERS if name != "auto")
-        if self.proposer not in allowed:
+        if self.proposer.startswith("replay:"):
+            try:
+                self.recording("target-1", 0)
+            except (LookupError, ValueError) as fault:
+                raise ValueError(f"{self.proposer}: expected {{task}} and {{seed}} as the only fields") from fault
+        elif self.proposer not in allowed:
             raise ValueError(
-                f'unknown proposer "{self.proposer}"; available: {", ".join(allowed)}.'
+                f'unknown proposer "{self.proposer}"; available: {", ".join(allowed)}, replay:NAME.'
                 f"{did_you_mean(self.proposer, allowed)}"
             )
         return self

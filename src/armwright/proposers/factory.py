@@ -105,10 +105,11 @@ def _proposer(
         from armwright.proposers.replay import ReplayProposer
 
         replayed = ReplayProposer(place, options.replay_strict, options)
-        recording = replayed.recording
+        calls, model = replayed.replayed.calls, replayed.replayed.model
+        settings = f", recorded with {replayed.recording.options}" if replayed.recording else ""
         return replayed, (
-            f"{replayed.name}, replayed from {place} ({len(recording.calls)} recorded calls to {recording.model}, "
-            f"origin {recording.origin}; no network)"
+            f"{replayed.name}, replayed from {place} ({len(calls)} recorded calls to {model}, origin "
+            f"{replayed.replayed.origin}{settings}; no network)"
         )
     if kind == "manual":
         from armwright.proposers.manual import ManualProposer

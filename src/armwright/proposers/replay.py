@@ -1,4 +1,4 @@
-"""Replay of the proposals of a recorded run."""
+"""Replay of the proposals of a recorded run: a run folder, its transcript, or a shipped recording."""
 
 import json
 import os
@@ -8,11 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError
+from armwright.exceptions import DesignError, ProposalError, ReplayError, SettingsError, did_you_mean
+from armwright.llm.backend import Question
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording import ReplayBackend
-from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of
+from armwright.llm.recording_file import find_recording, shipped_recordings
+from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of, last_call
 from armwright.proposers.prompted import LAST_STEPS, PromptedProposer
 from armwright.proposers.proposer import Proposal
 from armwright.runs.config import RunConfig
@@ -26,41 +28,41 @@ from armwright.yaml_documents import check_document
 
 
 class ReplayProposer(PromptedProposer):
-    """Replays the transcripts of a run folder, or of a transcripts.jsonl, without network or cost.
+    """Replays the transcript of a run, or a recording, without network or cost.
 
     With the settings of the recorded run, on the same machine with the same versions, the run is equal to the bit.
 
     Args:
-        source: run folder or transcripts file.
-        strict: treat a prompt that differs from the recorded one as an error; otherwise it is reported.
+        source: run folder, transcripts file, recording, or name of a shipped recording.
+        strict: treat a prompt that differs from the recorded one as an error; otherwise it is reported. Recordings are
+            shown with the prompts that they hold, whatever today's templates say.
         options: prompt and memory of a transcript without its config.yaml. Options that contradict the record are
             refused.
     """
 
     def __init__(self, source: str | Path, strict: bool = False, options: PromptOptions | None = None) -> None:
-        self.source = Path(source)
-        folder = self.source if self.source.is_dir() else self.source.parent
-        file = folder / TRANSCRIPTS if self.source.is_dir() else self.source
-        if not os.path.isfile(file):
-            raise ReplayError(f"there is no {file} to replay; give a run folder or its {TRANSCRIPTS}")
-        calls = Transcript(file, read_only=True).calls
+        self.source = str(source)
+        self.recording = find_recording(self.source)
+        recorded: RunConfig | None
+        if self.recording is not None:
+            file, calls, recorded = Path(self.source), self.recording.calls, self.recording.config
+            self._trials: Sequence[FinishedTrial] = ()
+        else:
+            file, calls, recorded, self._trials = _read_transcript(Path(source))
         if not any(call.proposal for call in calls):
             raise ReplayError(f"{file} holds no proposal")
         name = next(call.proposal for call in calls if call.proposal).rpartition("-")[0]
-        recorded = read_config(folder) if (folder / CONFIG).is_file() else None
         prompt, then = _as_recorded(file, recorded, calls, options or PromptOptions())
-        super().__init__(ReplayBackend(calls, file, strict), then, name, prompt=prompt)
-        self.recording: ReplayBackend = self.backend  # pyright: ignore[reportAttributeAccessIssue]
-        has_trials = recorded is not None and (folder / TRIALS).is_file()
-        self._trials: Sequence[FinishedTrial] = read_run(folder)[1].trials if has_trials else ()
+        self.replayed = ReplayBackend(calls, file, strict)
+        super().__init__(self.replayed, then, name, prompt=prompt)
 
     def settings(self) -> Mapping[str, Any]:
         """Return the source of the replay, and how it was asked."""
-        return {"replay": str(self.source), **super().settings()}
+        return {"replay": self.source, **super().settings()}
 
     def check(self) -> None:
         """Replay the recorded check, so that the summary is the same; it cannot fail."""
-        if any(call.step == "check" and call.fault is None for call in self.recording.calls):
+        if any(call.step == "check" and call.fault is None for call in self.replayed.calls):
             super().check()
 
     def recorded_trials(self) -> Sequence[FinishedTrial]:
@@ -69,7 +71,7 @@ class ReplayProposer(PromptedProposer):
 
     def summary(self) -> ProposerSummary:
         """Return the summary of the replayed calls."""
-        notes = {"replay": str(self.source), "differing_prompts": len(self.recording.differing)}
+        notes = {"replay": self.source, "differing_prompts": len(self.replayed.differing)}
         return replace(super().summary(), notes=notes)
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
@@ -78,28 +80,34 @@ class ReplayProposer(PromptedProposer):
         try:
             proposals = super().propose(history, seed, number)
         except DesignError as error:
-            raise ReplayError(f"{self.recording.source}: the answer for {identity} was changed: {error}") from error
+            raise ReplayError(f"{self.replayed.source}: the answer for {identity} was changed: {error}") from error
         except ProposalError as error:
             if error.kind != "missing":
                 raise
             recorded = ProposalError(*self._why_missing(number))
             recorded.known = error.known
             raise recorded from error
-        if identity not in self.recording.differing:
+        if identity not in self.replayed.differing:
             return proposals
         note = f"the prompt for {identity} differs from the recorded one"
         return [replace(proposals[0], note=note), *proposals[1:]]
 
+    def question(self, history: History, seed: int, number: int) -> Question:
+        """Return the next question for trial `number`; that of a recording as it was put then."""
+        question = super().question(history, seed, number)
+        call = last_call(self.replayed.calls, question.proposal, question.step) if self.recording else None
+        return question if call is None else replace(question, prompt=call.prompt)
+
     def next_hints(self, number: int) -> tuple[Hint, ...]:
         """Return the hints of the recorded question; there are no new ones."""
-        return hints_of(self.recording.calls, self.identity(number))
+        return hints_of(self.replayed.calls, self.identity(number))
 
     def _why_missing(self, number: int) -> tuple[str, str]:
         recorded = next((t for t in self._trials if t.fault and t.request is not None and t.request[0] == number), None)
         if recorded is not None:  # never asked or not answered: no budget, or a model that was given up
             assert recorded.fault is not None
             return recorded.fault, f"recorded: {recorded.fault}"
-        return "missing", f"{self.recording.source} holds no proposal for trial {number}; check n_init and n_step"
+        return "missing", f"{self.replayed.source} holds no proposal for trial {number}; check n_init and n_step"
 
 
 def recorded_options(config: RunConfig | None) -> tuple[Prompt | None, PromptOptions]:
@@ -152,3 +160,18 @@ def _designs(answer: str) -> int:
     with suppress(ValueError, TypeError, KeyError):  # one design, or a transcript edited by hand
         return max(1, len(json.loads(answer)["designs"]))
     return 1
+
+
+def _read_transcript(source: Path) -> tuple[Path, Sequence[Call], RunConfig | None, Sequence[FinishedTrial]]:
+    """Return the transcript of a run with its calls, and the run's settings and trials as far as they are there."""
+    folder = source if source.is_dir() else source.parent
+    file = folder / TRANSCRIPTS if source.is_dir() else source
+    if not os.path.isfile(file):
+        raise ReplayError(
+            f"there is no {file} to replay.{did_you_mean(source.name, shipped_recordings())} Give a run folder, its "
+            f"{TRANSCRIPTS}, or a recording: {', '.join(shipped_recordings())}"
+        )
+    calls = Transcript(file, read_only=True).calls
+    config = read_config(folder) if (folder / CONFIG).is_file() else None
+    trials = read_run(folder)[1].trials if config is not None and (folder / TRIALS).is_file() else ()
+    return file, calls, config, trials

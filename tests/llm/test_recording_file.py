@@ -1,0 +1,75 @@
+"""Recordings of runs with a language model: packing, reading, damage."""
+
+import json
+import lzma
+from pathlib import Path
+
+import pytest
+
+from armwright.exceptions import ReplayError
+from armwright.llm.recording_file import ENDING, find_recording, pack_recording, read_recording, shipped_recordings
+
+
+def lines_of(name: str) -> list[bytes]:
+    return lzma.decompress(shipped_recordings()[name].read_bytes()).splitlines(keepends=True)
+
+
+def packed(folder: Path, lines: list[bytes]) -> Path:
+    file = folder / f"mine{ENDING}"
+    file.write_bytes(lzma.compress(b"".join(lines)))
+    return file
+
+
+def test_shipped_recordings_are_complete_and_small() -> None:
+    shipped = shipped_recordings()
+    assert {name.partition("-plus")[0] for name in shipped} >= {"target-1", "target-2", "target-3"}
+    assert sum(len(file.read_bytes()) for file in shipped.values()) < 1_000_000
+    for name, file in shipped.items():
+        recording = read_recording(file)
+        study = recording.config.study
+        due = range(study.n_init, study.n_trials, study.n_step)
+        assert [call.proposal for call in recording.calls] == [f"llm-{number:04d}" for number in due], name
+        assert all(call.prompt and call.answer and call.origin == "model" for call in recording.calls)
+        assert "Its name and settings are not stated" in recording.provenance
+        assert name.endswith(f"seed{recording.config.seed}")
+
+
+def test_packed_recording_equals_the_original(tmp_path: Path) -> None:
+    recording = find_recording("target-2-plus-seed1")
+    assert recording is not None
+    file = tmp_path / f"target-2-plus-seed1{ENDING}"
+    file.write_bytes(pack_recording(recording))
+    assert find_recording(str(file)) == recording
+
+
+def test_damaged_and_missing_lines_are_one_error(tmp_path: Path) -> None:
+    lines = lines_of("target-1-plus-seed0")
+    with pytest.raises(ReplayError, match=r"19 of its 20 calls; restore the file"):
+        read_recording(packed(tmp_path, lines[:7] + lines[8:]))
+    for damaged in ([], [b"{}\n", *lines[1:]], [*lines[:5], lines[5][:40] + b"\n", *lines[6:]]):
+        with pytest.raises(ReplayError, match="is damaged; restore the file"):
+            read_recording(packed(tmp_path, damaged))
+    file = packed(tmp_path, lines)
+    file.write_bytes(file.read_bytes()[:2000])
+    with pytest.raises(ReplayError, match="cannot read the recording"):
+        read_recording(file)
+
+
+def test_files_that_are_no_recording_are_one_error(tmp_path: Path) -> None:
+    with pytest.raises(ReplayError, match="cannot read the recording"):
+        find_recording(str(tmp_path / f"none{ENDING}"))
+    text = tmp_path / f"text{ENDING}"
+    text.write_text("no xz")
+    with pytest.raises(ReplayError, match="cannot read the recording"):
+        find_recording(str(text))
+
+
+def test_a_folder_of_the_same_name_precedes_a_shipped_recording(in_folder: Path) -> None:
+    assert find_recording("target-1-plus-seed0") is not None
+    (in_folder / "target-1-plus-seed0").mkdir()
+    assert find_recording("target-1-plus-seed0") is None
+
+
+def test_headers_state_the_settings_of_their_run() -> None:
+    header = json.loads(lines_of("target-2-plus-n5-seed0")[0])
+    assert (header["config"]["method"]["n_step"], header["config"]["task"]["name"]) == (5, "target-2")
