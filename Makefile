@@ -6,8 +6,10 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constr
 
 .PHONY: demo test test-all torture check gp docs docs-serve format bench package fuzz audit clean
 
-demo: .venv/.run  ## search an arm for the task target-1 and say where the results lie
-	$(BIN)/armwright optimize target-1 --seed 0
+demo: .venv/.run  ## replay a language model's proposals for target-1, then design an arm with real motors
+	$(BIN)/armwright optimize target-1 --proposer replay:target-1-plus-seed0 --out runs/demo-model
+	$(BIN)/armwright design examples/2-assembly-task.yaml --space examples/2-assembly-space.yaml --out runs/demo-arm
+	$(BIN)/armwright pick runs/demo-arm --where "worst_error<=0.001" --where "torque_utilisation<1" --by torque_utilisation
 
 test: .venv/.test  ## the fast tests: two minutes on two cores, without browser and other processes
 	$(BIN)/python -m pytest -m "not slow"

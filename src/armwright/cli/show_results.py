@@ -176,7 +176,7 @@ def _front_table(history: History, robust: set[int] | None) -> Table:
         right=("#", *objectives), title=f"Pareto front of {history.problem.task.name}", gap=1,
     )  # fmt: skip
     for column in table.columns:
-        column.no_wrap = str(column.header) != "links [m]"
+        column.no_wrap = str(column.header) not in geometry
     reference = history.reference_point or (math.inf,) * len(objectives)
     inside = [m for m in history.front if all(np.less(m.values, reference))] or history.front
     shown: list[int] = np.unique(np.linspace(0, len(inside) - 1, MAX_ROWS).round().astype(int)).tolist()

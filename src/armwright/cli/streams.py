@@ -13,6 +13,8 @@ from rich.text import Text
 
 from armwright.cli.signals import INTERRUPTED
 
+WIDE = 1000  # [characters]
+
 
 class _Console(Console):
     """A console that reports a closed pipe as any stream does; rich would end the process silently."""
@@ -23,7 +25,10 @@ class _Console(Console):
 
 def open_console(is_json: bool = False) -> Console:
     """Return a console on stdout, or on stderr if another program reads stdout; plain text unless it is a terminal."""
-    return _Console(stderr=is_json, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    console = _Console(stderr=is_json, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    if not console.is_terminal:
+        console.width = WIDE  # tables in files and pipes are whole
+    return console
 
 
 def print_json(content: Any) -> None:

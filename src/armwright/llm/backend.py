@@ -1,4 +1,4 @@
-"""What answers questions: a model (client.py), a recording of one (recording.py) or a person (manual.py)."""
+"""What answers questions: a model (client.py), a recording of one (replay_backend.py) or a person (manual.py)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

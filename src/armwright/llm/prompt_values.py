@@ -68,7 +68,7 @@ VARIABLES = {
     "target_low": "smallest x, y and z of all targets",
     "target_high": "largest x, y and z of all targets",
     "updates": "updates of the inverse kinematics per start",
-    "objectives": "objectives, each with symbol, label, unit, description, over (sum, max, mean square or arm)",
+    "objectives": "objectives, each with symbol, label, unit, description, over (sum, max, min, rms or arm)",
     "constraints": "constraints, each with quantity (as an objective), relation, bound",
     "n_feasible": "number of feasible designs",
     "cases": "variants of the task whose worst case counts, as text; empty if there are none",

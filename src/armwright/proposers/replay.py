@@ -12,8 +12,8 @@ from armwright.exceptions import DesignError, ProposalError, ReplayError, Settin
 from armwright.llm.backend import Question
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
-from armwright.llm.recording import ReplayBackend
 from armwright.llm.recording_file import find_recording, shipped_recordings
+from armwright.llm.replay_backend import ReplayBackend
 from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of, last_call
 from armwright.proposers.prompted import LAST_STEPS, PromptedProposer
 from armwright.proposers.proposer import Proposal

@@ -8,7 +8,7 @@ from typing import Any
 from armwright.exceptions import SettingsError
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import estimated_tokens, load_prompt
-from armwright.llm.recording import ReplayBackend
+from armwright.llm.replay_backend import ReplayBackend
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
 from armwright.proposers.replay import recorded_options
