@@ -75,6 +75,8 @@ class Outcomes:
 
 def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
     """Return the largest of each objective and violation, each by itself, of the same designs in several cases."""
+    if len(outcomes) == 1:
+        return outcomes[0]
     return Outcomes(np.max([o.values for o in outcomes], axis=0), np.max([o.violations for o in outcomes], axis=0))
 
 

@@ -98,8 +98,8 @@ class _Columns:
     """
 
     def __init__(self, space: DesignSpace, matrix: Array) -> None:
-        self._space, self._matrix = space, matrix
-        self._column = {parameter.name: i for i, parameter in enumerate(space.parameters)}
+        self._matrix, self._parameters = matrix, space.parameters
+        self._column = {parameter.name: i for i, parameter in enumerate(self._parameters)}
         self.n, self.modules = len(matrix), space.max_joints
         self.present = np.ones((self.n, self.modules), dtype=bool)
         if "n_joints" in self._column:
@@ -113,7 +113,7 @@ class _Columns:
 
     def _indices(self, name: str, index: Any) -> Any:
         """Return the (N,) `index` of each design's choice."""
-        choices = cast("CategoricalParameter", self._space.parameters[self._column[name]]).choices
+        choices = cast("CategoricalParameter", self._parameters[self._column[name]]).choices
         return np.array([index(choice) for choice in choices])[self._matrix[:, self._column[name]].astype(np.intp)]
 
     def choices(self, kind: str, index: Any, default: str) -> Indices:
