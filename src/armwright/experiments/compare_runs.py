@@ -39,12 +39,15 @@ class MethodResult:
 
 @dataclass(frozen=True)
 class Contrast:
-    """E_hv of a method against the baseline on a task, paired by seed; p_holm: corrected for all contrasts."""
+    """E_hv of a method against the baseline on a task, paired by seed.
+
+    p_holm: corrected for all contrasts that have enough pairs for a test; None with fewer pairs.
+    """
 
     method: str
     task: str
     test: PairedTest
-    p_holm: float
+    p_holm: float | None
 
 
 @dataclass(frozen=True)
@@ -148,8 +151,8 @@ class Comparison:
                 if method != self.baseline and seeds:
                     test = paired_test([e_hv[seed] for seed in seeds], [baseline[seed] for seed in seeds])
                     tests.append((method, task, test))
-        corrected = holm([test.p for _, _, test in tests])
-        return [Contrast(*test, float(p)) for test, p in zip(tests, corrected, strict=True)]
+        corrected = iter(holm([test.p for *_, test in tests if can_reject(test.n)]).tolist())
+        return [Contrast(*found, next(corrected) if can_reject(found[-1].n) else None) for found in tests]
 
     @cached_property
     def overall(self) -> list[OverallContrast]:

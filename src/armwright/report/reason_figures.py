@@ -59,6 +59,6 @@ def _draw_text(title: str, text: str) -> Figure:
     height = 0.7 + 0.148 * len(lines)
     figure = Figure(figsize=(8.0, height))
     form: dict[str, Any] = {"va": "top", "parse_math": False}
-    figure.text(0.02, 1 - 0.15 / height, textwrap.fill(title, 110), fontsize=9, weight="bold", **form)
+    figure.text(0.02, 1 - 0.15 / height, textwrap.fill(title, 90), fontsize=9, weight="bold", **form)
     figure.text(0.02, 1 - 0.5 / height, "\n".join(lines), fontsize=7.5, family="monospace", linespacing=1.2, **form)
     return figure

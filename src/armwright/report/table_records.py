@@ -94,9 +94,9 @@ def _flat(name: str, value: Interval | None) -> dict[str, float | None]:
     return {name: value.mean, f"{name}_low": value.low, f"{name}_high": value.high}
 
 
-def _test_fields(contrast: Contrast | OverallContrast) -> dict[str, float]:
-    test = contrast.test
-    return {"better": test.better, "effect": test.effect, "p": test.p, "p_holm": contrast.p_holm}
+def _test_fields(contrast: Contrast | OverallContrast) -> dict[str, float | None]:
+    test, p_holm = contrast.test, contrast.p_holm
+    return {"better": test.better, "effect": test.effect, "p": None if p_holm is None else test.p, "p_holm": p_holm}
 
 
 def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:

@@ -168,8 +168,8 @@ def _contrast_section(comparison: Comparison) -> str:
     if comparison.is_undecidable:
         fewest = min(contrast.test.n for contrast in comparison.contrasts)
         caption += (
-            "\n\n**With fewer than six seeds, no test can reject at 5 %**: the smallest possible p is "
-            f"{least_p(fewest):.4g} (seeds in common: {fewest}). `--seeds 20` is enough for most differences."
+            "\n\n**With fewer than six seeds, no test can reject at 5 %**, so no p is shown (seeds in common: "
+            f"{fewest}, smallest possible p: {least_p(fewest):.4g}). `--seeds 20` is enough for most differences."
         )
     rows = [
         [
@@ -279,9 +279,9 @@ def _interval(value: Interval, scale: float = 1.0, unit: str = "", decimals: int
     return f"{mean}{unit} [{low}, {high}]"
 
 
-def _test_cells(test: PairedTest, p_holm: float) -> list[str]:
+def _test_cells(test: PairedTest, p_holm: float | None) -> list[str]:
     """Return the cells of TEST_COLUMNS."""
-    ps = (f"{p:.4f}" if p >= 1e-4 else f"{p:.1e}" for p in (test.p, p_holm))
+    ps = ("–", "–") if p_holm is None else (f"{p:.4f}" if p >= 1e-4 else f"{p:.1e}" for p in (test.p, p_holm))
     return [f"{test.better} of {test.n}", f"{test.effect:+.2f}", *ps]
 
 
