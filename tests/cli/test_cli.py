@@ -19,6 +19,7 @@ from armwright.cli.progress import study_progress
 from armwright.cli.show_results import show_result
 from armwright.llm import client as chat
 from armwright.problem.problem import Problem
+from armwright.proposers.replay import ReplayProposer
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests.support.chat_server import Answer, ChatServer, Request, designer
@@ -461,6 +462,17 @@ def test_progress_is_shown_in_a_terminal(width: int) -> None:
     assert "iteration 7/7" in shown
     assert "hypervolume" in shown
     assert "None" not in shown
+
+
+def test_reasons_of_a_model_are_shown_as_they_enter() -> None:
+    console = Console(file=io.StringIO(), width=500, markup=False, highlight=False)
+    proposer = ReplayProposer("target-1-plus-seed0")
+    with study_progress(console) as watch:
+        run = optimize(Problem(load_task("target-1")), proposer=proposer, n_init=10, n_step=10, n_total=11, watch=watch)
+    reasons = [f"trial {t.number}, language model: {t.reason}" for t in run.trials if t.source == "llm"]
+    assert len(reasons) == 2
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert [line for line in lines if "language model: " in line] == reasons
 
 
 @pytest.mark.slow

@@ -27,6 +27,8 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
         def watch(progress: StudyProgress) -> None:
             if progress.note:
                 console.print(_note(progress))
+            if progress.reason and progress.source != "rules":  # the rules are explained in the report
+                console.print(f"trial {progress.number}, {look(progress.source).label}: {progress.reason}")
             source, done = look(progress.source).label, progress.iteration
             volume = "-" if progress.hypervolume is None else f"{progress.hypervolume:.3f}"
             failed = f"  failed {sum(progress.faults.values())}" if progress.faults else ""

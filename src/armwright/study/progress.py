@@ -29,6 +29,7 @@ class Progress:
         fault: kind of the fault of this trial.
         faults: faults of all trials so far, by kind.
         note: message for the user, reported once.
+        reason: reason of the proposer for this trial's design.
     """
 
     doing: Activity
@@ -42,6 +43,7 @@ class Progress:
     fault: str | None = None
     faults: Mapping[str, int] = field(default_factory=dict[str, int])
     note: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True)

@@ -336,7 +336,7 @@ class Study:
         note = "" if pending.slot is None else pending.slot.note
         if trial.failure:
             note = f"trial {trial.number}: {trial.failure}"
-        self._report("finished", trial.number, trial.source, fault=trial.fault, note=note)
+        self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)
 
     def _history(self) -> History:
         """Return the finished trials; extends the last history, so that the cost does not grow with the trials."""
@@ -358,7 +358,14 @@ class Study:
         self._report("proposing", number, self._proposer.name, note=self._proposer.announce(number))
 
     def _report(
-        self, doing: Activity, number: int, source: str = "", *, fault: str | None = None, note: str = ""
+        self,
+        doing: Activity,
+        number: int,
+        source: str = "",
+        *,
+        fault: str | None = None,
+        note: str = "",
+        reason: str = "",
     ) -> None:
         if self._watch is None:
             return
@@ -375,6 +382,7 @@ class Study:
                 fault=fault,
                 faults=self._faults.copy(),
                 note=note,
+                reason=reason,
             )
         )
 
