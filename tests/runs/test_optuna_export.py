@@ -6,9 +6,10 @@ import shlex
 import socket
 import subprocess
 import sys
+import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 from tests.support.browser import Tab
+from tests.support.command_line import PATIENCE
 
 SPACE = DesignSpace.model_validate({"name": "some", "joints": [2, 4], "actuators": ["XL430-W250", "XM430-W350"]})
 TASK = Task.model_validate(
@@ -357,6 +359,11 @@ def dashboard(command: list[str], port: int) -> Iterator[str]:
             assert server.stdout is not None
             while b"Listening" not in (line := server.stdout.readline()):
                 assert line, "it did not begin"
+            deadline = time.monotonic() + PATIENCE
+            while True:  # it says so before it accepts connections
+                with suppress(ConnectionRefusedError), socket.create_connection(("127.0.0.1", port)):
+                    break
+                assert time.monotonic() < deadline, "it accepts no connection"
             yield f"http://127.0.0.1:{port}/dashboard"
         finally:
             server.kill()
