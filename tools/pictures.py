@@ -1,7 +1,7 @@
 """Make the pictures of README and docs again; some two minutes on two cores, and a browser.
 
-python tools/pictures.py            # all of them
-python tools/pictures.py page.png   # one
+python -m tools.pictures            # all of them
+python -m tools.pictures page.png   # one
 """
 
 import re
@@ -15,12 +15,13 @@ import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
+
+from tests.support import browser
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
-FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 Shot = Callable[[Path, Page, Path], None]
 
 
@@ -155,15 +156,15 @@ PICTURES: dict[str, Shot] = {
 def main() -> None:
     """Make the pictures that the command line names, or all."""
     names = sys.argv[1:] or list(PICTURES)
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
-    with tempfile.TemporaryDirectory() as temporary, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=list(FLAGS))
+    program = browser.program()
+    if program is None:
+        raise SystemExit(f"found no browser; expected one of {', '.join(browser.NAMES)}")
+    with tempfile.TemporaryDirectory() as temporary, browser.browser(program) as started:
         for name in names:
-            page = browser.new_page()
+            page = started.new_page()
             PICTURES[name](Path(temporary), page, DOCS / name)
             page.close()
             print(name, flush=True)
-        browser.close()
 
 
 if __name__ == "__main__":

@@ -392,4 +392,4 @@ def test_move_time_on_the_command_line(in_folder: Path) -> None:
     (in_folder / "line.yaml").write_text(f"{text}move_time: 2\n")
     again = CliRunner().invoke(app, words)
     assert isinstance(again.exception, RunConflictError)
-    assert "move_time: 1.5 there, 2" in str(again.exception)
+    assert "move_time: 1.5 stored, 2.0 requested" in str(again.exception)

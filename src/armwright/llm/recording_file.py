@@ -21,7 +21,7 @@ from armwright.llm.transcript import Call
 from armwright.runs.config import RunConfig
 
 ENDING = ".jsonl.xz"
-LARGEST_RECORDING = 64 * 1024 * 1024  # [bytes] of text, far above the largest run
+MAX_RECORDING = 64 * 1024 * 1024  # [bytes] of text, far above the largest run
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def read_recording(file: Path | Traversable) -> Recording:
     """
     try:
         with file.open("rb") as packed, lzma.open(packed) as content:
-            text = content.read(LARGEST_RECORDING)
+            text = content.read(MAX_RECORDING)
     except (OSError, EOFError, lzma.LZMAError) as fault:
         raise ReplayError(f"cannot read the recording {file}: {fault}") from fault
     lines = text.split(b"\n")[:-1]

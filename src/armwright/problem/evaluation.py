@@ -68,6 +68,9 @@ class Evaluation(Scene):
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
     device: Device = "cpu"
 
+    def __post_init__(self) -> None:
+        """Check nothing: the scene was checked before the arms were evaluated in it."""
+
     def __len__(self) -> int:
         return len(self.q)
 

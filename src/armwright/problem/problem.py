@@ -235,7 +235,7 @@ class Problem:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
         for rows in (matrix, *(perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
             yield self.physics(rows)
-            for case in range(1, len(self.task.cases)):
+            for case in range(1, self.task.n_cases):
                 yield self.physics_of_arms(stack_designs(self.space, rows), case)
 
     @property
