@@ -75,7 +75,7 @@ def n_postures(problem: Problem) -> int:
     task = problem.task
     moves = sum(task.straight_moves.steps(task.target_positions)) + len(task.straight_moves)
     parts = len(task.targets) * (1 + task.restarts) + moves + sum(region.points for region in task.workspace)
-    return parts * task.n_cases
+    return parts * len(problem.scenes)
 
 
 def used(problem: Problem) -> None:

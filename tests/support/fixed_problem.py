@@ -46,7 +46,7 @@ class FixedProblem(Problem):
         error = np.linalg.norm(reached - targets, axis=-1)
         angle = np.zeros_like(error)
         evaluation = Evaluation(
-            **vars(self.scene()),
+            **vars(self.scenes[0]),
             arms=arms,
             q=q,
             reached=reached,

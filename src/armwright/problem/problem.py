@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -194,13 +195,14 @@ class Problem:
 
     def physics_of_arms(self, arms: ArmArrays, case: int = 0) -> Evaluation:
         """Return the kinematics and statics of arms at all targets, in one case of the task."""
-        return evaluate_arrays(arms, self.scene(case), self.device)
+        return evaluate_arrays(arms, self.scenes[case], self.device)
 
-    def scene(self, case: int = 0) -> Scene:
-        """Return the targets and surroundings of one case of the task."""
+    @cached_property
+    def scenes(self) -> tuple[Scene, ...]:
+        """Return the targets and surroundings of each case of the task."""
         task = self.task
-        points, payloads = task.cases[case]
-        return Scene(points, payloads, task.target_arrays, task.obstacles, task.straight_moves, task.workspace)
+        shared = (task.target_arrays, task.obstacles, task.straight_moves, task.workspace)
+        return tuple(Scene(points, payloads, *shared) for points, payloads in task.cases)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.
@@ -235,10 +237,10 @@ class Problem:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
         for rows in (matrix, *(perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
             yield self.physics(rows)
-            for case in range(1, self.task.n_cases):
+            for case in range(1, len(self.scenes)):
                 yield self.physics_of_arms(stack_designs(self.space, rows), case)
 
-    @property
+    @cached_property
     def _postures(self) -> int:
         """Return the largest number of postures of one arm."""
         task = self.task

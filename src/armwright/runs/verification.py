@@ -91,5 +91,5 @@ def _within(outcomes: Outcomes, allowed: Array) -> NDArray[np.bool_]:
 def _outcomes(problem: Problem, matrix: Array, start: Array | None = None) -> Outcomes:
     """Evaluate designs in float64; start: (T, D) angles [rad], None for the straight start."""
     arrays = stack_designs(problem.space, matrix, "float64")
-    cases = range(problem.task.n_cases)
-    return worst_case([problem.outcomes(evaluate_arrays(arrays, problem.scene(case), "cpu", start)) for case in cases])
+    evaluations = [evaluate_arrays(arrays, scene, "cpu", start) for scene in problem.scenes]
+    return worst_case([problem.outcomes(evaluation) for evaluation in evaluations])

@@ -190,7 +190,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @property
     def is_plain(self) -> bool:
         """True if the targets are plain points, solved from one start and in one case."""
-        return not self._records and self.restarts == 0 and self.n_cases == 1
+        return not self._records and self.restarts == 0 and len(self.cases) == 1
 
     @property
     def cases(self) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -199,11 +199,6 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         shifts = [sign * noise * axis for axis in np.eye(3) for sign in (-1.0, 1.0)] if noise > 0.0 else []
         heavier = [(targets, factor * payloads) for factor in self.payload_factors]
         return [(targets, payloads), *heavier, *((targets + shift, payloads) for shift in shifts)]
-
-    @property
-    def n_cases(self) -> int:
-        """Number of `cases`."""
-        return 1 + len(self.payload_factors) + (6 if self.target_noise > 0.0 else 0)
 
     @property
     def cases_description(self) -> str:
