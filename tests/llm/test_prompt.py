@@ -511,6 +511,17 @@ def test_shown_designs_depend_only_on_the_seed() -> None:
         assert not set(draw.others) & set(front)
 
 
+def test_others_of_all_designs_include_the_front() -> None:
+    history = fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES), 120)
+    front = {member.number for member in history.front}
+    drawn = {number for seed in range(9) for number in Feedback(history, seed, "all").others}
+    assert drawn & front
+    assert drawn - front
+    for others, words in (("off-front", f"{120 - len(front)} other"), ("all", "120 evaluated")):
+        text = load_prompt("plus").render(history, 0, PromptOptions(others=others))
+        assert f"## 5 of the {words} designs, drawn at random" in text
+
+
 def test_feedback_matches_the_evaluation() -> None:
     problem = Problem(load_task("target-2"))
     history = fixed_history(problem, 12)

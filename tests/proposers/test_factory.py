@@ -18,6 +18,7 @@ from armwright.proposers.factory import choose_proposer
         ("memory", "none"),
         ("answer", "two-step"),
         ("proposals", 1),
+        ("others", "off-front"),
         ("temperature", 0.0),
         ("seed", 0),
         ("output", "auto"),
@@ -33,13 +34,14 @@ from armwright.proposers.factory import choose_proposer
 def test_option_without_effect_is_refused(tmp_path: Path, name: str, option: str, value: Any) -> None:
     """This holds even if it states the default."""
     chosen, options = name.replace("x", str(tmp_path / "x")), ModelOptions(**{option: value})
-    if name == "manual:x" and option in ("prompt", "memory", "proposals", "wait"):
+    if name == "manual:x" and option in ("prompt", "memory", "proposals", "others", "wait"):
         assert choose_proposer(chosen, options).proposer is not None
     elif name == "replay:x" and option in (
         "prompt",
         "memory",
         "answer",
         "proposals",
+        "others",
         "in_flight",
         "replay_strict",
     ):  # checked against the record

@@ -68,16 +68,18 @@ class Feedback:
         front: trial numbers of front members, sorted by the first objective; if no design is feasible, those of the
             designs with the smallest violations.
         others: trial numbers of other designs, in the order of the run.
+        n_others: number of designs that `others` were drawn from.
         digits: decimals of all numbers.
     """
 
-    def __init__(self, history: History, seed: int) -> None:
+    def __init__(self, history: History, seed: int, others: str = "off-front") -> None:
         rng = np.random.default_rng(seed)
         front = [member.number for member in history.front] or history.nearest(N_PARETO)
         on_front = set(front)
-        others = [trial.number for trial in history if trial.number not in on_front]
+        drawn_from = [trial.number for trial in history if others == "all" or trial.number not in on_front]
+        self.n_others = len(drawn_from)
         self.front = draw_in_order(front, N_PARETO, rng)
-        self.others = draw_in_order(others, N_RANDOM, rng)
+        self.others = draw_in_order(drawn_from, N_RANDOM, rng)
         self._history = history
         self.digits = Digits.of(history)
         numbers = [*self.front, *self.others]

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_va
 from armwright.exceptions import did_you_mean
 
 MEMORIES = ("none", "own")
+OTHERS = ("off-front", "all")
 # Form of the answer in the prompt: free text and a second call, JSON only, or free text alone.
 ANSWERS = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
 OUTPUTS = ("auto", "tool", "native", "prompted")
@@ -23,6 +24,7 @@ DIRECT = ("model", "prompt", "max_cost")  # fields with a command-line option of
 
 _CHOICES: Mapping[str, tuple[str, ...]] = {
     "memory": MEMORIES,
+    "others": OTHERS,
     "answer": tuple(ANSWERS),
     "output": OUTPUTS,
     "origin": ORIGINS,
@@ -38,12 +40,14 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
         memory: "none" (every call is new) or "own" (show the earlier proposals of the run).
         answer: "two-step" (free reasoning, then a second call into the schema), "one-step", or "text" (manual answers).
         proposals: Designs per call.
+        others: Source of the five designs shown beside the front: "off-front" (designs off the front) or "all".
     """
 
     prompt: str = "plus"
     memory: str = "none"
     answer: str = "two-step"
     proposals: int = Field(default=1, ge=1, le=MAX_PROPOSALS)
+    others: str = "off-front"
 
     @model_validator(mode="before")
     @classmethod

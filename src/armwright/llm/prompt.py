@@ -93,7 +93,7 @@ class Prompt:
             SettingsError: The template fails, or renders to nothing.
         """
         proposed = proposal_records(history, name) if options.expects else []
-        feedback = Feedback(history, seed)
+        feedback = Feedback(history, seed, options.others)
         common = common_values(history, options) | {
             "n_proposed": len(proposed),
             "hints": [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))],  # visible ones

@@ -80,6 +80,7 @@ VARIABLES = {
     "a_ik, unreached, tau_ik, limits, load, e_all, violated (constraints, or none; empty if the task has none); if no "
     "design is feasible (n_feasible), those with the smallest violations",
     "others": "some other designs, with the same fields",
+    "n_others": "number of designs that these were drawn from: those off the front, or all (option others)",
     "proposed": "earlier proposals (memory: own): number, origin, joints, links, extras, expected, e_all, violated, "
     "reason",
     "n_proposed": "number of earlier proposals",
@@ -229,6 +230,7 @@ def shown_values(
         "n_targets_shown": len(shown),
         "front": feedback.records(front, shown),
         "others": feedback.records(others, shown),
+        "n_others": feedback.n_others,
         "proposed": proposed[-most_proposed:],
     }
 

@@ -18,9 +18,9 @@ WITH_PLACE = ("replay", "manual")  # written replay:RUN and manual:DIR
 _USED: dict[str, Collection[str]] = {
     "none": (),
     "rules": (),
-    "manual": ("prompt", "memory", "proposals", "wait"),  # answers are text and cost nothing
-    # The first four are for a transcript without its run; those that contradict the record are refused.
-    "replay": ("prompt", "memory", "answer", "proposals", "in_flight", "replay_strict"),
+    "manual": ("prompt", "memory", "proposals", "others", "wait"),  # answers are text and cost nothing
+    # The first five are for a transcript without its run; those that contradict the record are refused.
+    "replay": ("prompt", "memory", "answer", "proposals", "others", "in_flight", "replay_strict"),
     "llm": [name for name in ModelOptions.model_fields if name not in ("wait", "replay_strict")],
 }
 

@@ -55,7 +55,7 @@ class PromptedProposer(LlmSession, Proposer):
         return {
             "prompt": self.prompt.name,
             **own,
-            **self.options.model_dump(include={"memory", "answer", "proposals"}),
+            **self.options.model_dump(include={"memory", "answer", "proposals", "others"}),
         }
 
     def open(self, folder: Path | None) -> None:

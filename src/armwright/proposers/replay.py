@@ -130,7 +130,7 @@ def _as_recorded(
         prompt = own or load_prompt(recorded.prompt)
     else:  # a transcript alone does not name its prompt and memory
         prompt = load_prompt(given.prompt)
-        recorded = options_of(calls).model_copy(update={"memory": given.memory})
+        recorded = options_of(calls).model_copy(update={"memory": given.memory, "others": given.others})
     for name, value in given.given.items():
         if name == "prompt":
             found, same = prompt.name, load_prompt(given.prompt).template == prompt.template
