@@ -1,4 +1,4 @@
-"""Prompts: six reviewed golden files, facts of other cases, and properties of all prompts.
+"""Prompts: seven reviewed golden files, facts of other cases, and properties of all prompts.
 
 Rewrite the golden files with: ARMWRIGHT_REMAKE_GOLDEN=1 python -m pytest tests/llm/test_prompt.py
 """
@@ -7,6 +7,8 @@ import json
 import os
 import re
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,18 @@ from hypothesis import strategies as st
 from armwright.llm.answer import answer_schema
 from armwright.llm.feedback import Feedback
 from armwright.llm.model_options import ANSWERS, PromptOptions
-from armwright.llm.prompt import MAX_TOKENS, Prompt, builtin_template, estimated_tokens, load_prompt, parameters_prompt
+from armwright.llm.prompt import (
+    MAX_TOKENS,
+    PROMPTS,
+    Prompt,
+    builtin_template,
+    estimated_tokens,
+    load_prompt,
+    parameters_prompt,
+)
 from armwright.llm.prompt_values import VARIABLES, spread
 from armwright.problem.problem import Problem
+from armwright.runs.config import Method
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.link_mass import MassPerLink
@@ -80,13 +91,19 @@ DESIGNS = paper_space().sample(30, seed=9)
 REASONS = ("a universal shoulder at the centre", "", "longer links, because the far corners were missed", "x")
 
 
-def own(n: int) -> History:
+def own(n: int, problem: FixedProblem = PAPER) -> History:
     """A run with `n` earlier proposals."""
     told = [
         proposal(design, REASONS[i % 4], None if i % 3 == 1 else (1.25 + i, 3.5))
         for i, design in enumerate(DESIGNS[:n])
     ]
-    return fixed_history(PAPER, proposals=told)
+    return fixed_history(problem, proposals=told)
+
+
+def in_study(history: History, n_step: int = 10, n_total: int = 200) -> History:
+    """The same trials as part of a study that goes on."""
+    method = Method(proposer=None, sampler="tpe", n_init=10, n_step=n_step, n_total=n_total)
+    return replace(history, method=method)
 
 
 def bounded(*constraints: str) -> FixedProblem:
@@ -100,6 +117,7 @@ def rendered(history: History, prompt: str = "plus", **how: Any) -> str:
 GOLDENS: dict[str, Callable[[], str]] = {
     "analysis-in-three-steps": lambda: rendered(fixed_history(PAPER)),
     "memory-and-several-designs-as-text": lambda: rendered(own(1), "minus", memory="own", proposals=2, answer="text"),
+    "everything-that-models-asked-for": lambda: rendered(in_study(own(5, FixedProblem(OPEN))), "full"),
     "obstacles-and-moves": lambda: rendered(fixed_history(FixedProblem(ON_LINES)), "minus"),
     "no-feasible-design": lambda: rendered(
         fixed_history(bounded("mass <= 0.001"), proposals=[proposal(DESIGNS[0], "light", (1.0, 2.0))]),
@@ -204,7 +222,7 @@ FACTS: dict[str, Facts] = {
         lambda: rendered(fixed_history(FixedProblem(grid_task(200))), "minus"),
         (
             "each of 200 target points (x, y, z) [m], which lie in the box from (0.300, 0.000, 0.400) to "
-            "(0.480, 0.950, 0.460). These are 20 of them, spread evenly over the list:",
+            "(0.480, 0.950, 0.460). These are 48 of them, spread evenly over the list:",
             "for each target in TARGET",
             "with the reference point (36.45, 1006): a design counts only if E_pos < 36.45 and E_torque < 1006",
         ),
@@ -278,7 +296,7 @@ FACTS: dict[str, Facts] = {
         lambda: rendered(fixed_history(PAPER, n=0), "minus"),
         (
             "No design has been evaluated yet.",
-            "Propose one new design, that enlarges the hypervolume most. Think step by step.",
+            "Propose one new design that enlarges the hypervolume most. Think step by step.",
         ),
         ("E_EACH", "different from", "\nDesign "),
     ),
@@ -442,7 +460,7 @@ def test_prompt_of_any_problem_is_complete_and_bounded(
         proposals=proposals,
     )
     seed = data.draw(st.integers(0, 2**31))
-    prompt = load_prompt(data.draw(st.sampled_from(["plus", "minus"])))
+    prompt = load_prompt(data.draw(st.sampled_from(PROMPTS)))
     text = prompt.render(history, seed, options)
     assert text == prompt.render(history, seed, options)
     assert estimated_tokens(text) <= MAX_TOKENS
@@ -459,9 +477,10 @@ def test_prompt_of_any_problem_is_complete_and_bounded(
     for kind in space.joint_types:
         assert f"  - {kind}: " in text
     headings = [line for line in text.splitlines() if line.startswith("# ")]
-    assert headings == [
+    assert [heading for heading in headings if heading != "# What follows from this evaluation"] == [
         "# Design parameters", "# Task", "# Evaluation", "# Results so far", "# Your turn",
     ]  # fmt: skip
+    assert len(headings) == (6 if prompt.name == "full" else 5)
     assert "\x1b" not in text
     assert "\u202e" not in text
     assert not re.search(r"\(1 (designs|joints|targets)|\b1 (designs|joints) ", text)
@@ -477,11 +496,96 @@ def test_longest_prompt_is_bounded() -> None:
     problem = FixedProblem(task, space)
     told = [proposal(design, "理由" * 500, (1e308, -1e308)) for design in space.sample(40, 5)]
     history = fixed_history(problem, 30, proposals=told)
-    for answer in ANSWERS:
-        text = load_prompt("plus").render(history, 0, PromptOptions(memory="own", proposals=100, answer=answer))
+    for answer, prompt in product(ANSWERS, PROMPTS):
+        text = load_prompt(prompt).render(history, 0, PromptOptions(memory="own", proposals=100, answer=answer))
         assert estimated_tokens(text) <= MAX_TOKENS
         assert "of them, spread evenly" in text
         assert "理由" in text
+
+
+def test_full_prompt_shows_the_whole_front_and_all_targets_of_a_long_run() -> None:
+    """50 members of the front and 20 targets fit into the limit."""
+    history = front_of(50, FixedProblem(grid_task(20)))
+    text = rendered(in_study(history), "full")
+    assert estimated_tokens(text) <= MAX_TOKENS
+    assert len(history.front) == 50
+    listed = re.findall(r"^- (\d+) \((?:random|black box)\): ", text, re.MULTILINE)
+    assert [int(number) for number in listed] == [member.number for member in history.front]
+    assert "each of these 20 target points" in text
+
+
+def front_of(n: int, problem: FixedProblem) -> History:
+    """A history with this many members of the front, and as many other designs."""
+    history = fixed_history(problem, 2 * n)
+    values = [(1.0 + i, 1.0 + n - i) if i < n else (n + 2.0, n + 2.0) for i in range(2 * n)]
+    trials = [replace(trial, values=value) for trial, value in zip(history.trials, values, strict=True)]
+    return replace(history, trials=trials)
+
+
+def test_full_prompt_asks_to_explore_joint_sequences_first() -> None:
+    for history in (fixed_history(PAPER), in_study(own(3))):
+        text = rendered(history, "full")
+        places = [
+            text.index("Explore joint sequences first."),
+            text.index("compare the fronts that they could give"),
+            text.index("Return to exploration when gains are small"),
+        ]
+        assert places == sorted(places)
+
+
+@pytest.mark.parametrize(
+    ("n_trials", "n_step", "proposals", "turns"),
+    [
+        (10, 10, 1, "a black box tries 9 designs. It learns from all results, yours included, and is good at small "
+         "changes of numbers. You have 20 turns left, this one included."),
+        (5, 10, 1, "You have 20 turns left, this one included."),
+        (200, 10, 1, "This is your last turn."),
+        (110, 10, 4, "a black box tries 36 designs."),
+        (110, 10, 4, "You have 3 turns left, this one included."),
+        (100, 2, 1, "a black box tries 1 design. "),
+    ],
+)  # fmt: skip
+def test_full_prompt_states_the_turns_that_are_left(n_trials: int, n_step: int, proposals: int, turns: str) -> None:
+    history = in_study(fixed_history(PAPER, n_trials), n_step)
+    assert turns in rendered(history, "full", proposals=proposals)
+
+
+def test_full_prompt_without_black_box_trials_between_turns() -> None:
+    text = rendered(in_study(fixed_history(PAPER), n_step=1), "full")
+    assert "black box tries" not in text
+    assert "You have 196 turns left" in text
+    assert "turns left" not in rendered(fixed_history(PAPER), "full")  # outside a study
+
+
+def test_full_prompt_states_what_each_own_design_gained() -> None:
+    """The gains of all trials sum up to the hypervolume that is stated."""
+    told = own(5)
+    values = [(4.0, 3.0), (3.0, 4.0), (4.5, 4.5), (1.0, 4.5), (2.0, 2.0)]
+    mine = [replace(trial, values=value) for trial, value in zip(told.trials[14:], values, strict=True)]
+    history = replace(told, trials=[*told.trials[:14], *mine])
+    text = rendered(history, "full")
+    gained = {
+        int(n): float(gain) for n, gain in re.findall(r"^- (\d+): .*hypervolume \+([\d.]+) at", text, re.MULTILINE)
+    }
+    assert list(gained) == [14, 15, 16, 17, 18]
+    assert [gain > 0.0 for gain in gained.values()] == [True, True, False, True, True]
+    for number, gain in gained.items():
+        volumes = history.hypervolumes
+        assert gain == pytest.approx(volumes[number] - volumes[number - 1], abs=0.0006)
+    assert f"The hypervolume is {history.hypervolumes[-1]:.4g} now." in text
+
+
+def test_full_prompt_shows_the_latest_own_designs_with_their_joint_angles() -> None:
+    problem = Problem(load_task("target-2"))
+    history = fixed_history(problem, 12, proposals=[proposal(design, "") for design in DESIGNS[:4]])
+    text = rendered(history, "full")
+    for number in (13, 14, 15):
+        block = text.split(f"\nDesign {number}\n", 1)[1].split("\n\n", 1)[0]
+        lines = dict(line.split(": ", 1) for line in block.splitlines())
+        q = problem.physics([history.trials[number].design]).q[0]
+        assert numbers(lines["Q_IK"]) == pytest.approx(q.ravel(), abs=0.0006)
+        assert numbers(lines["ORIGIN"]) == pytest.approx(history.trials[number].design.origin, abs=0.00006)
+    assert text.count("\nDesign 14\n") == 1
 
 
 def test_shortening_an_overlong_template_terminates() -> None:
@@ -514,7 +618,7 @@ def test_shown_designs_depend_only_on_the_seed() -> None:
 def test_others_of_all_designs_include_the_front() -> None:
     history = fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES), 120)
     front = {member.number for member in history.front}
-    drawn = {number for seed in range(9) for number in Feedback(history, seed, "all").others}
+    drawn = {number for seed in range(9) for number in Feedback(history, seed, others="all").others}
     assert drawn & front
     assert drawn - front
     for others, words in (("off-front", f"{120 - len(front)} other"), ("all", "120 evaluated")):
@@ -593,7 +697,7 @@ def test_spread_selects_evenly(n: int, most: int) -> None:
 def test_documented_template_variables_are_those_available() -> None:
     used = "".join(f"{{% set x = {name} %}}" for name in VARIABLES)  # one that did not exist would be refused
     assert Prompt("own", used + "fine").render(fixed_history(PAPER), 0) == "fine\n"
-    for word in ("plus.md.j2", "proposal.md.j2"):
+    for word in ("plus.md.j2", "full.md.j2", "proposal.md.j2"):
         Prompt("given", builtin_template(word))  # one that is not told would be refused
 
 

@@ -48,7 +48,7 @@ ModelName = Annotated[
 PromptName = Annotated[
     str | None,
     typer.Option(
-        help="Prompt: plus (with analysis instructions), minus, or a template file.",
+        help="Prompt: plus (with analysis instructions), minus, full (whole front, mechanics), or a template file.",
         show_default="plus",
         rich_help_panel=MODEL,
     ),

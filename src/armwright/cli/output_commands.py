@@ -124,7 +124,8 @@ def prompt(
     ] = None,
     space: SpaceFile = None,
     prompt: Annotated[
-        str | None, typer.Option(help="Prompt: plus, minus, or a template file.", show_default="the run's, else plus")
+        str | None,
+        typer.Option(help="Prompt: plus, minus, full, or a template file.", show_default="the run's, else plus"),
     ] = None,
     model_options: Annotated[
         str | None,

@@ -122,7 +122,7 @@ def describe_method(config: RunConfig) -> str:
     if method.proposer is not None:
         name = str(method.proposer["name"])
         text += "/LLM" if name == "llm" else f"/{name}"
-        text += {"plus": "+", "minus": "-"}.get(str(method.proposer.get("prompt", "")), "")
+        text += {"plus": "+", "minus": "-", "full": " full"}.get(str(method.proposer.get("prompt", "")), "")
         if model := method.proposer.get("model"):
             text += f" {model}"
         if method.n_step != 10:

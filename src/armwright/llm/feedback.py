@@ -13,13 +13,17 @@ from armwright.llm.answer_format import NOTHING, module_lists
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
 from armwright.robot.arm import GRAVITY
-from armwright.runs.history import History
+from armwright.runs.attribution import hypervolume_gains
+from armwright.runs.history import BBO, History
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 from armwright.text import one_line
 
 N_PARETO = 5  # front members shown
 N_RANDOM = 5  # other finished designs shown
+MAX_PROPOSED, MIN_PROPOSED = 20, 4  # earlier proposals shown
+N_LATEST = 3  # of the proposer's own designs, the latest ones shown
+FINE = 4  # decimals of lengths [m]: a base 1 mm off a symmetry plane may lead to another posture
 LARGE = 1e6  # from which numbers are written with an exponent
 NOISE = 1e-9  # below it a number counts as 0
 
@@ -62,17 +66,19 @@ class Digits:
 
 
 class Feedback:
-    """A random sample of the front and of the other finished designs, as text.
+    """A random sample of the front and of the other finished designs, and the proposer's latest ones, as text.
 
     Attributes:
         front: trial numbers of front members, sorted by the first objective; if no design is feasible, those of the
             designs with the smallest violations.
         others: trial numbers of other designs, in the order of the run.
         n_others: number of designs that `others` were drawn from.
+        latest: trial numbers of the latest designs of the proposer, in the order of the run.
+        name: of the proposer.
         digits: decimals of all numbers.
     """
 
-    def __init__(self, history: History, seed: int, others: str = "off-front") -> None:
+    def __init__(self, history: History, seed: int, name: str = "", others: str = "off-front") -> None:
         rng = np.random.default_rng(seed)
         front = [member.number for member in history.front] or history.nearest(N_PARETO)
         on_front = set(front)
@@ -80,11 +86,14 @@ class Feedback:
         self.n_others = len(drawn_from)
         self.front = draw_in_order(front, N_PARETO, rng)
         self.others = draw_in_order(drawn_from, N_RANDOM, rng)
+        self.latest = [trial.number for trial in history if trial.source == name][-N_LATEST:]
+        self.name = name
         self._history = history
+        shown = dict.fromkeys([*self.front, *self.others, *self.latest])
+        self._rows = {number: row for row, number in enumerate(shown)}
         self.digits = Digits.of(history)
-        numbers = [*self.front, *self.others]
-        if numbers:
-            self._evaluation = history.evaluation(numbers)
+        if self._rows:
+            self._evaluation = history.evaluation(list(self._rows))
             shares = [o.each(self._evaluation) for o in history.problem.objectives if o.is_of_targets]
             shape = (*self._evaluation.position_error.shape, 0)
             self._each = np.stack(shares, axis=-1) if shares else np.empty(shape)  # (n, T, objectives with shares)
@@ -94,15 +103,17 @@ class Feedback:
         return [self._record(number, list(targets)) for number in numbers]
 
     def _record(self, number: int, shown: list[int]) -> Record:
-        row = [*self.front, *self.others].index(number)
+        row = self._rows[number]
         evaluation, at = self._evaluation, self.digits
         joints = _joint_labels(self._history, number)
         return {
             **_parameters(self._history, number, at.length),
+            **_fine_lengths(self._history, number, at.length),
             "e_each": points(self._each[row, shown], at.shares) if at.shares else "",
             "p_ik": points(evaluation.reached[row, shown], at.length),
             "a_ik": _angles(evaluation, row, shown),
             "unreached": self._unreached(number, row, shown),
+            "q_ik": points(evaluation.q[row, shown, : len(joints)], at.length),
             "tau_ik": points(evaluation.motor_torques[row, shown, : len(joints)], at.torque),
             "limits": _limits(evaluation, row, joints),
             "load": _load(evaluation.motor_torques[row], joints),
@@ -137,6 +148,31 @@ def proposal_records(history: History, name: str) -> list[Record]:
     ]
 
 
+def design_lines(history: History, numbers: Sequence[int], name: str) -> list[Record]:
+    """Return the parameters, objectives and hypervolume gained of designs, without their postures.
+
+    Args:
+        history: the finished trials.
+        numbers: of the trials.
+        name: of the proposer, whose designs are marked as its own.
+    """
+    at, gains = Digits.of(history), hypervolume_gains(history)
+    front = {member.number for member in history.front}
+    own = {name: "you", BBO: "black box"}
+    return [
+        {
+            **_parameters(history, number, at.length),
+            **_fine_lengths(history, number, at.length),
+            "source": own.get(history.trials[number].source, history.trials[number].source.replace("_", " ")),
+            "e_all": vector(history.trials[number].values, at.objectives),
+            "gained": None if gains is None else _number(float(gains[number]), max(at.objectives)),
+            "violated": _violated(history, number),
+            "on_front": number in front,
+        }
+        for number in numbers
+    ]
+
+
 def points(rows: NDArray[np.float64], decimals: int | Sequence[int] = 3) -> str:
     """Format an array (N, M) as a list of vectors."""
     return "[" + ", ".join(vector(row, decimals) for row in rows) + "]"
@@ -168,6 +204,12 @@ def _parameters(history: History, number: int, decimals: int) -> dict[str, Any]:
         "links": vector(design.links, decimals),
         "extras": _extras(history.problem.space, design, decimals),
     }
+
+
+def _fine_lengths(history: History, number: int, decimals: int) -> dict[str, str]:
+    """Return the base and the links of a design with enough decimals to see on which side of a plane the base is."""
+    design, decimals = history.trials[number].design, max(FINE, decimals)
+    return {"fine_origin": vector(design.origin, decimals), "fine_links": vector(design.links, decimals)}
 
 
 def _violated(history: History, number: int) -> str:

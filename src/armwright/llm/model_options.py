@@ -36,7 +36,8 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """How designs are asked for.
 
     Attributes:
-        prompt: "plus" (with instructions on how to analyse the parameters), "minus", or a template file.
+        prompt: "plus" (with instructions on how to analyse the parameters), "minus", "full" (also with the whole front,
+            the gains of its own designs, joint angles and mechanics), or a template file.
         memory: "none" (every call is new) or "own" (show the earlier proposals of the run).
         answer: "two-step" (free reasoning, then a second call into the schema), "one-step", or "text" (manual answers).
         proposals: Designs per call.

@@ -15,18 +15,16 @@ from armwright.exceptions import SettingsError, did_you_mean
 from armwright.files import read_text
 from armwright.llm.feedback import Feedback, proposal_records
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt_values import MAX_TARGETS, VARIABLES, common_values, shown_values
+from armwright.llm.prompt_values import VARIABLES, Limits, common_values, shown_values
 from armwright.llm.template_sandbox import Sandbox, render
 from armwright.problem.problem import Problem
 from armwright.runs.control import MAX_HINT_LENGTH
 from armwright.runs.history import History
 from armwright.text import end_of, fence, one_line, without_thoughts
 
-PROMPTS = ("plus", "minus")
+PROMPTS = ("plus", "minus", "full")
 
-MAX_TOKENS = 12_000  # longer prompts show fewer targets, designs and earlier proposals
-MIN_TARGETS = 4  # shown
-MAX_PROPOSED, MIN_PROPOSED = 20, 4  # earlier proposals shown
+MAX_TOKENS = 12_000  # longer prompts show fewer designs, earlier proposals and targets
 MAX_ANALYSIS_LENGTH = 40_000  # characters from the end of a free answer that the second call reads
 MAX_TEMPLATE = 256 * 1024  # [bytes]
 DEFAULTS = PromptOptions()
@@ -79,7 +77,7 @@ class Prompt:
     ) -> str:
         """Return the prompt for the next design.
 
-        Fewer targets, designs and proposals are shown until the prompt has at most about MAX_TOKENS, unless hints and
+        Fewer designs, then fewer targets are shown until the prompt has at most about MAX_TOKENS, unless hints and
         the template itself are longer.
 
         Args:
@@ -93,18 +91,17 @@ class Prompt:
             SettingsError: The template fails, or renders to nothing.
         """
         proposed = proposal_records(history, name) if options.expects else []
-        feedback = Feedback(history, seed, options.others)
+        feedback = Feedback(history, seed, name, options.others)
         common = common_values(history, options) | {
             "n_proposed": len(proposed),
             "hints": [line for hint in hints if (line := one_line(hint, MAX_HINT_LENGTH))],  # visible ones
         }
-        most = MAX_TARGETS, max(len(feedback.front), len(feedback.others)), MAX_PROPOSED
+        most = Limits()
         while True:
-            text = self._with_hints({**common, **shown_values(history, feedback, proposed, *most)})
-            fewer = _fewer(*most)
-            if estimated_tokens(text) <= MAX_TOKENS or fewer == most:
+            text = self._with_hints({**common, **shown_values(history, feedback, proposed, most)})
+            if estimated_tokens(text) <= MAX_TOKENS or most == most.fewer():
                 return text
-            most = fewer
+            most = most.fewer()
 
     def _with_hints(self, values: Mapping[str, Any]) -> str:
         text = self._render(values)
@@ -133,7 +130,7 @@ _TEMPLATE_ERRORS = (
 
 
 def load_prompt(name: str | Path) -> Prompt:
-    """Return the prompt `plus` or `minus`, or that of a template file."""
+    """Return a built-in prompt by its name, or that of a template file."""
     if str(name) in PROMPTS:
         return _builtin_prompt(str(name))
     path = Path(name)
@@ -161,15 +158,15 @@ def builtin_template(name: str) -> str:
 
 
 def whole_template(name: str) -> str:
-    """Return the template of a prompt as one text, with the template that `plus` and `minus` extend."""
+    """Return the template of a prompt as one text, with the template that built-in prompts extend."""
     template = load_prompt(name).template
     if name not in PROMPTS:
         return template
-    whole = builtin_template("proposal.md.j2")
-    for block, content in re.findall(r"{% block (\w+) %}\n(.*?){% endblock %}", template, re.DOTALL):
-        opening = f"{{% block {block} %}}\n"
-        whole = whole.replace(opening, opening + content, 1)
-    return whole
+    blocks = re.compile(r"{% block (\w+) %}\n.*?{% endblock %}\n", re.DOTALL)
+    own = {match[1]: match[0] for match in blocks.finditer(template)}
+    macros = blocks.sub("", template).partition('{% extends "proposal.md.j2" %}\n')[2].rstrip() + "\n"
+    whole = blocks.sub(lambda match: own.get(match[1], match[0]), builtin_template("proposal.md.j2"))
+    return whole.replace("{% block role %}", macros.lstrip("\n") + "{% block role %}", 1)
 
 
 def parameters_prompt(problem: Problem, answer: str, options: PromptOptions = DEFAULTS) -> str:
@@ -198,13 +195,6 @@ def rendered(name: str, values: Mapping[str, Any]) -> str:
 def estimated_tokens(text: str) -> int:
     """Estimate the tokens of a text: one per 5 letters of a word, or 3 digits of a number."""
     return len(re.findall(r"[0-9]{1,3}|[A-Za-z]{1,5}|\S", text))
-
-
-def _fewer(targets: int, designs: int, proposed: int) -> tuple[int, int, int]:
-    """Return the next smaller numbers to show; targets are reduced first."""
-    if targets > MIN_TARGETS:
-        return max(MIN_TARGETS, 3 * targets // 4), designs, max(MIN_PROPOSED, 3 * proposed // 4)
-    return targets, max(1, designs - 1), MIN_PROPOSED
 
 
 def _tidy(text: str) -> str:

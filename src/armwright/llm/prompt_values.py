@@ -1,7 +1,7 @@
 """The values of a prompt template: the problem as text, and what is shown of past designs."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from armwright.kinematics.ik import UPDATES
 from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.llm.answer_format import module_lists
-from armwright.llm.feedback import Feedback, Record, points, vector
+from armwright.llm.feedback import MAX_PROPOSED, MIN_PROPOSED, Feedback, Record, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
@@ -34,6 +34,36 @@ from armwright.text import one_line
 
 MAX_TARGETS = 64  # shown
 MAX_DESCRIPTION_LENGTH = 2_000  # characters of a task's description
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much a prompt shows at most.
+
+    Attributes:
+        targets: of the task.
+        designs: in detail, of the front, of the others and of the proposer's latest ones.
+        lines: designs in one line each, of the front and of the proposer.
+        proposed: earlier proposals with expectations and reasons.
+    """
+
+    targets: int = MAX_TARGETS
+    designs: int = 5
+    lines: int = 60
+    proposed: int = MAX_PROPOSED
+
+    def fewer(self) -> "Limits":
+        """Return the next smaller limits, or these if they are the smallest.
+
+        Targets are the last but one to go: a model that knows all of them needs fewer examples.
+        """
+        proposed = max(MIN_PROPOSED, 3 * self.proposed // 4)
+        if self.designs > 2:
+            return replace(self, designs=self.designs - 1, proposed=proposed)
+        if self.targets > 4:
+            return replace(self, targets=max(4, 3 * self.targets // 4), proposed=proposed)
+        return replace(self, designs=1, lines=max(5, 3 * self.lines // 4), proposed=proposed)
+
 
 # Variables of a template, as `armwright prompt --variables` lists them.
 VARIABLES = {
@@ -76,11 +106,20 @@ VARIABLES = {
     "reference_point": "of the hypervolume; none if there is none yet",
     "n_finished": "number of evaluated designs",
     "n_front": "number of Pareto-optimal designs",
-    "front": "members of the front, by rising first objective: number, origin, joints, links, extras, e_each, p_ik, "
-    "a_ik, unreached, tau_ik, limits, load, e_all, violated (constraints, or none; empty if the task has none); if no "
-    "design is feasible (n_feasible), those with the smallest violations",
+    "front": "members of the front, by rising first objective: number, origin, joints, links, fine_origin and "
+    "fine_links (with more digits), extras, e_each, p_ik, a_ik, unreached, q_ik, tau_ik, limits, load, e_all, violated "
+    "(constraints, or none; empty if the task has none); if no design is feasible (n_feasible), those with the "
+    "smallest violations",
     "others": "some other designs, with the same fields",
     "n_others": "number of designs that these were drawn from: those off the front, or all (option others)",
+    "latest": "the proposer's latest designs, with the same fields",
+    "whole_front": "every design of the front in short, by rising first objective: number, source, origin, joints, "
+    "links, fine_origin, fine_links, extras, e_all, gained (hypervolume, when it was evaluated), on_front",
+    "own": "every earlier design of the proposer, with the same fields; n_own of them",
+    "n_own": "number of the proposer's earlier designs",
+    "hypervolume": "of the front, as text; empty without a reference point",
+    "n_between": "designs that the black box tries between two prompts; none outside a study",
+    "n_turns": "prompts that are left, this one included; none outside a study",
     "proposed": "earlier proposals (memory: own): number, origin, joints, links, extras, expected, e_all, violated, "
     "reason",
     "n_proposed": "number of earlier proposals",
@@ -94,7 +133,10 @@ VARIABLES = {
 def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
     """Return the values that do not depend on how much of a history is shown."""
     problem = history.problem
+    hypervolume = history.hypervolumes[-1:]
     return {
+        **_schedule_values(history, options),
+        "hypervolume": f"{hypervolume[0]:.4g}" if len(hypervolume) else "",
         **_space_values(problem.space),
         **_task_values(problem),
         "constraints": problem.constraints,
@@ -107,6 +149,16 @@ def common_values(history: History, options: PromptOptions) -> dict[str, Any]:
         "expected": options.expects,
         "form": options.form,
     }
+
+
+def _schedule_values(history: History, options: PromptOptions) -> dict[str, int | None]:
+    """Return how the study goes on around this prompt."""
+    method = history.method
+    if method is None:
+        return {"n_between": None, "n_turns": None}
+    block = method.n_step * options.proposals
+    left = method.n_trials - max(method.n_init, len(history))
+    return {"n_between": (method.n_step - 1) * options.proposals, "n_turns": max(1, -(-left // block))}
 
 
 def _space_values(space: DesignSpace) -> dict[str, Any]:
@@ -204,9 +256,7 @@ def shown_values(
     history: History,
     feedback: Feedback,
     proposed: Sequence[Record],
-    most_targets: int,
-    most_designs: int,
-    most_proposed: int,
+    most: "Limits",
 ) -> dict[str, Any]:
     """Return the values that show past designs.
 
@@ -214,14 +264,14 @@ def shown_values(
         history: the finished trials.
         feedback: the designs drawn from them.
         proposed: records of the proposer's earlier designs.
-        most_targets: number of targets shown, at most.
-        most_designs: number of front members shown, and of other designs, at most.
-        most_proposed: number of earlier proposals shown, at most.
+        most: how much is shown.
     """
     task, decimals = history.problem.task, feedback.digits.length
-    shown = spread(len(task.target_positions), most_targets)
-    front = [feedback.front[i] for i in spread(len(feedback.front), most_designs)]
-    others = [feedback.others[i] for i in spread(len(feedback.others), most_designs)]
+    shown = spread(len(task.target_positions), most.targets)
+    front = [feedback.front[i] for i in spread(len(feedback.front), most.designs)]
+    others = [feedback.others[i] for i in spread(len(feedback.others), most.designs)]
+    whole_front = [member.number for member in history.front]
+    own = [trial.number for trial in history if trial.source == feedback.name]
     return {
         "targets": points(task.target_positions[shown], decimals),
         "target_requirements": describe_targets([task.target_specs[i] for i in shown]),
@@ -231,7 +281,13 @@ def shown_values(
         "front": feedback.records(front, shown),
         "others": feedback.records(others, shown),
         "n_others": feedback.n_others,
-        "proposed": proposed[-most_proposed:],
+        "latest": feedback.records(feedback.latest[-most.designs :], shown),
+        "whole_front": design_lines(
+            history, [whole_front[i] for i in spread(len(whole_front), most.lines)], feedback.name
+        ),
+        "own": design_lines(history, own[-most.lines :], feedback.name),
+        "n_own": len(own),
+        "proposed": proposed[-most.proposed :],
     }
 
 

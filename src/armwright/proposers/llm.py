@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from armwright.llm.budget import CallBudget
-from armwright.llm.feedback import N_PARETO, N_RANDOM
+from armwright.llm.feedback import N_LATEST, N_PARETO, N_RANDOM
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MAX_TOKENS, estimated_tokens, parameters_prompt
 from armwright.llm.prompt_values import MAX_TARGETS
@@ -13,6 +13,7 @@ from armwright.proposers.prompted import PromptedProposer
 from armwright.runs.history import History
 
 TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, measured on prompts
+LINES = 40  # of designs in one line each that a prompt has on average
 THOUGHT_TOKENS, PARAMETER_TOKENS = 1000, 200  # of an answer, for estimates
 
 
@@ -57,19 +58,22 @@ class LlmProposer(PromptedProposer):
             tokens = sum(call.input_tokens for call in calls), sum(call.output_tokens for call in calls)
             return tokens[0] // len(proposals), tokens[1] // len(proposals)
         given = min(
-            MAX_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + _feedback_tokens(problem)
+            MAX_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + self._feedback_tokens(problem)
         )
         written = self.options.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
         if self.options.form == "then-schema":
             given += estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS
         return given, written
 
-
-def _feedback_tokens(problem: Problem) -> int:
-    """Estimate the tokens of a full prompt's feedback without evaluating designs, which may be slow."""
-    joints, targets = problem.space.max_joints, min(len(problem.task.targets), MAX_TARGETS)
-    numbers = targets * (len(problem.objectives) + 3 + joints) + 2 * joints + len(problem.objectives) + 3
-    return (N_PARETO + N_RANDOM) * (TOKENS_A_NUMBER * numbers + TOKENS_A_DESIGN)
+    def _feedback_tokens(self, problem: Problem) -> int:
+        """Estimate the tokens of the feedback late in a run without evaluating designs, which may be slow."""
+        lists_all = self.prompt.name == "full"
+        joints, targets = problem.space.max_joints, min(len(problem.task.targets), MAX_TARGETS)
+        each = len(problem.objectives) + 3 + joints * (2 if lists_all else 1)  # numbers of a target
+        alone = 2 * joints + len(problem.objectives) + 3
+        n_designs = N_LATEST + (N_PARETO + N_RANDOM) // 2 if lists_all else N_PARETO + N_RANDOM
+        designs = n_designs * (TOKENS_A_NUMBER * (targets * each + alone) + TOKENS_A_DESIGN)
+        return designs + (LINES * TOKENS_A_NUMBER * alone if lists_all else 0)
 
 
 def _thousands(n: int) -> str:

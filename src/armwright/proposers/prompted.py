@@ -11,7 +11,7 @@ from armwright.llm.answer import Answer, answer_schema, read_answers, read_text,
 from armwright.llm.backend import LlmBackend, OutputFormat, Question
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import Prompt, load_prompt, parameters_prompt
+from armwright.llm.prompt import PROMPTS, Prompt, load_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import TRANSCRIPTS, Transcript, hints_of
 from armwright.problem.problem import Problem
@@ -51,7 +51,7 @@ class PromptedProposer(LlmSession, Proposer):
 
     def settings(self) -> Mapping[str, Any]:
         """Return prompt, memory and form of the answer; for a custom prompt also its template."""
-        own = {} if self.prompt.name in ("plus", "minus") else {"template": self.prompt.template}
+        own = {} if self.prompt.name in PROMPTS else {"template": self.prompt.template}
         return {
             "prompt": self.prompt.name,
             **own,

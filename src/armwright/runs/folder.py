@@ -25,7 +25,7 @@ from filelock import FileLock, Timeout
 from armwright.exceptions import RunConflictError, RunFolderError
 from armwright.files import naming_write_errors, replace_file
 from armwright.problem.evaluators import Evaluator
-from armwright.runs.config import RunConfig, check_same_run, versions
+from armwright.runs.config import Method, RunConfig, check_same_run, versions
 from armwright.runs.control import CHANNEL_FILES
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial, trial_line
@@ -218,4 +218,5 @@ def read_run(path: str | Path) -> tuple[RunConfig, History]:
     path = Path(path)
     config = read_config(path)
     trials, _ = read_trials(path / TRIALS, config)
-    return config, History(config.problem, trials, config.method.n_init, config.reference_point)
+    method = config.method if isinstance(config.method, Method) else None
+    return config, History(config.problem, trials, config.method.n_init, config.reference_point, method)

@@ -22,6 +22,7 @@ from armwright.pareto import (
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm
+from armwright.runs.config import Method
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.parameters import Design
 
@@ -55,6 +56,7 @@ class History:
         trials: The trials.
         n_init: Number of random trials.
         frozen_reference_point: The one chosen from the random trials, if the task states none.
+        method: The search settings of the study; None outside one.
         earlier: Values of the history that this one extends (`grown`), with its number of trials.
     """
 
@@ -62,6 +64,7 @@ class History:
     trials: Sequence[FinishedTrial]
     n_init: int
     frozen_reference_point: tuple[float, ...] | None = None
+    method: Method | None = None
     earlier: Mapping[str, tuple[int, Any]] = field(
         default_factory=dict[str, tuple[int, Any]], repr=False, compare=False
     )
@@ -80,7 +83,7 @@ class History:
         known = {**self.earlier, **{name: (len(self), vars(self)[name]) for name in CACHED if name in vars(self)}}
         if not same_point:
             known.pop("_hypervolumes", None)
-        return History(self.problem, trials, self.n_init, frozen_reference_point, known)
+        return History(self.problem, trials, self.n_init, frozen_reference_point, self.method, known)
 
     def _known(self, name: str, nothing: Any) -> tuple[Any, Sequence[FinishedTrial]]:
         """Return the earlier history's value, and the trials after it."""
@@ -157,7 +160,7 @@ class History:
         """Return the history at the start of trial `number`."""
         if number >= len(self):
             return self
-        return History(self.problem, self.trials[:number], self.n_init, self.frozen_reference_point)
+        return History(self.problem, self.trials[:number], self.n_init, self.frozen_reference_point, self.method)
 
     def member(self, number: int) -> FrontMember:
         """Return the design of one trial and its arm."""

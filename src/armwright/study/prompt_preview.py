@@ -41,9 +41,13 @@ class Preview:
     note: str = ""
 
 
-def preview(problem: Problem, options: PromptOptions, *, n_init: int = 10, seed: int = 0) -> Preview:
+def preview(
+    problem: Problem, options: PromptOptions, *, n_init: int = 10, n_total: int = 200, seed: int = 0
+) -> Preview:
     """Return the first prompt of a new run."""
     history = optimize(problem, proposer="none", n_init=n_init, n_total=1, seed=seed).history.before(n_init)
+    assert history.method is not None
+    history = replace(history, method=history.method.model_copy(update={"n_total": n_total}))
     proposer = PromptedProposer(ReplayBackend((), Path()), options, "llm")
     text = proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init))
     return _preview(proposer, problem, n_init, text)

@@ -135,7 +135,7 @@ class Study:
             self._first_of.setdefault(trial.design, trial.number)
         self._faults = Counter(trial.fault for trial in self._trials if trial.fault)
         self._n_refined = sum(trial.refines is not None for trial in self._trials)
-        self._latest = History(problem, (), self._method.n_init, config.reference_point)
+        self._latest = History(problem, (), self._method.n_init, config.reference_point, self._method)
         self._tracker = FrontTracker(n_objectives, config.reference_point)
         for values in self._history().masked_objectives:
             self._tracker.add(values)

@@ -9,9 +9,9 @@ import optuna
 from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
-from armwright.llm.feedback import N_PARETO, N_RANDOM, draw_in_order
+from armwright.llm.feedback import MAX_PROPOSED, N_PARETO, N_RANDOM, draw_in_order
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import MAX_PROPOSED, MAX_TOKENS, estimated_tokens, fenced, rendered
+from armwright.llm.prompt import MAX_TOKENS, estimated_tokens, fenced, rendered
 from armwright.proposers.for_optuna.parameter_values import value_text
 from armwright.proposers.for_optuna.parameters import Parameter, unique_keys
 from armwright.proposers.for_optuna.study_view import best_trials, given_params
