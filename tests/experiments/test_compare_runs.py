@@ -19,11 +19,12 @@ from armwright.exceptions import RunFolderError, SettingsError
 from armwright.experiments.compare_runs import Comparison, compare_runs, compare_summaries
 from armwright.experiments.outcome import Published
 from armwright.experiments.run_list import find_runs, list_runs
-from armwright.experiments.run_summary import RunSummary, read_run_summary
+from armwright.experiments.run_summary import RunSummary, read_run_summary, shares_by_source
 from armwright.experiments.statistics import interval, paired_test
 from armwright.problem.problem import Problem
 from armwright.report.comparison_figures import write_comparison_figures
-from armwright.report.tables import latex, markdown, write_tables
+from armwright.report.latex_tables import latex
+from armwright.report.tables import markdown, write_tables
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
 from armwright.study.front_run import find_front
@@ -78,6 +79,30 @@ def test_table_values_match_the_hypervolume_histories(runs: Path, comparison: Co
     assert len(comparison.rows) == 4
 
 
+def test_methods_are_compared_with_each_that_they_name(runs: Path) -> None:
+    records = [
+        read_run_summary(folder, folder.name.split("-")[2]) for folder in find_runs([runs / f"{TASKS[0]}-none-0"])
+    ]
+    records += [replace(records[0], method=f"m{i}", seed=seed) for i in range(3) for seed in range(min(2, i + 1))]
+    labels = ["none", "m0", "m1", "m2"]
+    found = Comparison(records, labels, TASKS[:1], "none", {"m1": ["none", "m0"], "m2": ["m1", "gone"]})
+    pairs = [(contrast.method, contrast.baseline, contrast.test.n) for contrast in found.contrasts]
+    assert pairs == [("m0", "none", 1), ("m1", "none", 1), ("m1", "m0", 1), ("m2", "m1", 2)]
+    text = markdown(found, "x")
+    assert re.search(r"(?m)^\| m1 +\| 0, 1 +\| \*\*", text), "seeds are stated"
+    assert not re.search(r"(?m)^\| m0 +\| 0 +\| \*\*", text), "only methods with the most runs can be the best"
+
+
+def test_shares_by_source_add_up(comparison: Comparison) -> None:
+    for task in comparison.tasks:
+        for method in comparison.methods:
+            shares = shares_by_source(comparison.runs_of(method, task))
+            assert [share.source for share in shares][:2] == ["random", "bbo"]
+            assert [share.trials for share in shares] == ([4, 9, 3] if "rules" in method else [4, 12])
+            assert sum(share.front for share in shares) == pytest.approx(1.0)
+            assert sum(share.gained for share in shares) == pytest.approx(1.0)
+
+
 def test_share_of_best_known_needs_a_known_front(comparison: Comparison) -> None:
     shares = {row.task: row.share for row in comparison.rows}
     assert shares["random-4"] is None
@@ -90,7 +115,7 @@ def test_contrasts_pair_runs_by_seed(comparison: Comparison) -> None:
     for contrast in comparison.contrasts:
         ours, theirs = (
             [run.curve.mean() for run in comparison.runs_of(method, contrast.task)]
-            for method in (contrast.method, comparison.baseline)
+            for method in (contrast.method, contrast.baseline)
         )
         assert contrast.test == paired_test(ours, theirs)
         assert contrast.p_holm is None, "three pairs are too few for a test"
@@ -239,14 +264,16 @@ def test_markdown_csv_and_latex_tables_agree(comparison: Comparison, tmp_path: P
     assert "6.70 (2.03)" in text
     assert "The Paper" in text
     assert "one cell is missing" in text
-    assert "no p is shown (seeds in common: 3, smallest possible p: 0.25)" in text
+    assert "no p is shown for them (the smallest p of 3 pairs is 0.25)" in text
     table = re.findall(r"(?m)^\|.*$", text)
     assert len(table) > len(rows)
     assert all(line.endswith("|") for line in table)
     tex = (tmp_path / "table.tex").read_text()
-    body = [line for line in tex.splitlines() if line.endswith(r"\\")]
-    columns = re.search(r"\{tabular\}\{(\w+)\}", tex)[1]
-    assert {line.count("&") for line in body[1:]} == {len(columns) - 1}
+    parts = re.findall(r"(?s)\\begin\{tabular\}\{(\w+)\}(.*?)\\end\{tabular\}", tex)
+    assert len(parts) == 2
+    for columns, part in parts:
+        body = [line for line in part.splitlines() if line.endswith(r"\\") and "multicolumn" not in line]
+        assert {line.count("&") for line in body} == {len(columns) - 1}
     assert tex.count("{") == tex.count("}")
     assert "_" not in re.sub(r"\\_|[E\\]?\w*_\{hv\}", "", tex)
 

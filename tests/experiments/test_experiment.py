@@ -28,6 +28,7 @@ from armwright.experiments.plan import (
 from armwright.experiments.runner import run_cell
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.recording_file import shipped_recordings
+from armwright.report.tables import write_tables
 from armwright.tasks.catalogue import builtin_tasks
 from tests.support.chat_server import ChatServer
 
@@ -115,6 +116,8 @@ def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> No
         ({"methods": {"a": {"label": "A"}, "b": {"label": "A"}}}, "same label"),
         ({"methods": {"../a": {"label": "A"}}}, "match pattern"),
         ({"n_total": 0}, "n_total"),
+        ({"methods": {"a": {"label": "A", "seeds": [2, 2]}}}, "each once"),
+        ({"methods": {"a": {"label": "A", "against": ["b"]}}}, r'methods\.a\.against names the unknown method "b"'),
     ],
 )
 def test_mistakes_in_experiment_files_are_reported(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
@@ -133,6 +136,29 @@ def test_unknown_experiments_methods_and_tasks_are_refused(tmp_path: Path) -> No
         plan_cells(plan_of(tasks=["mine.yaml"]), tmp_path, tmp_path)
     with pytest.raises(SettingsError, match="--seeds: expected a whole number from 1 to 10000, got 0"):
         with_seeds(plan_of(), 0)
+
+
+def test_method_runs_its_share_of_the_seeds(tmp_path: Path) -> None:
+    methods = {**SMALL["methods"], "few": {"label": "few", "seeds": [3, 1], "against": ["rules"]}}
+    plan = plan_of(methods=methods, tasks=["target-1"], seeds=4)
+    cells, skipped = plan_cells(plan, tmp_path, tmp_path)
+    assert not skipped
+    assert [cell.seed for cell in cells if cell.method == "few"] == [1, 3]
+    assert [cell.seed for cell in cells if cell.method == "bbo"] == [0, 1, 2, 3]
+    assert with_seeds(plan, 2).seeds_of("few") == (1,)
+    assert with_only(plan, ["bbo", "few"], []).methods["few"].against == ()
+
+
+def test_two_runs_of_an_experiment_give_equal_tables(tmp_path: Path) -> None:
+    plan = plan_of(tasks=["target-1"])
+    for name in ("first", "second"):
+        cells, _ = plan_cells(plan, tmp_path, tmp_path / name)
+        assert not any(run_cell(cell).fault for cell in cells)
+        write_tables(tmp_path / name, collect(plan, cells), "Experiment small")
+    tables = {path.name for path in (tmp_path / "first").iterdir() if path.is_file()}
+    assert tables >= {"table.md", "table.csv", "table.tex", "contrasts.csv", "sources.csv", "proposers.csv", "runs.csv"}
+    for name in tables - {"runs.csv"}:
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes(), name
 
 
 def test_task_and_space_files_next_to_the_experiment_are_found(tmp_path: Path) -> None:
@@ -166,9 +192,8 @@ def test_replayed_methods_run_the_cells_with_a_recording(tmp_path: Path) -> None
     assert {name for _, name in replayed} == set(shipped_recordings())
     assert all(f"--proposer=replay:{cell.replay}" in cell.command for cell in cells if cell.replay)
     assert len(cells) == 2 * 3 * 5 + len(replayed)
-    assert {one.reason for one in skipped} == {
-        "there is no {task}-minus-seed{seed}",
-        "there is no {task}-plus-n5-seed{seed}",
+    assert {(one.cell.task_name, one.reason) for one in skipped} == {
+        (task, "there is no {task}-plus-n5-seed{seed}") for task in ("target-1", "target-3")
     }
 
 

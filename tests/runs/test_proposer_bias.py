@@ -9,6 +9,7 @@ from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.runs.proposer_bias import are_round, front_share, proposer_bias, repeated
 from armwright.runs.trial import FinishedTrial
+from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 from armwright.tasks.catalogue import load_task, random_task
 
@@ -60,6 +61,7 @@ def test_proposer_bias_is_compared_with_the_black_box() -> None:
     assert (found.proposer.base_on_symmetry_plane, found.black_box.base_on_symmetry_plane) == (0.75, 0.5)
     assert (found.proposer.repeats, found.black_box.repeats) == (0.0, 0.5)
     assert (found.proposer.near_repeats, found.black_box.near_repeats) == (0.25, 0.5)
+    assert found.black_box.equal_neighbours == pytest.approx(1 / 3), "of YPPR"
 
 
 def test_asymmetric_targets_have_no_bases_on_symmetry_planes() -> None:
@@ -70,6 +72,23 @@ def test_asymmetric_targets_have_no_bases_on_symmetry_planes() -> None:
     assert found.black_box is None
 
 
+@pytest.mark.parametrize(
+    ("joints", "share"), [(("YYYY", "PPPP"), 1.0), (("YPRP", "RPYP"), 0.0), (("YYPR", "YYYR"), 0.5)]
+)
+def test_equal_neighbours_are_counted_over_all_designs(joints: tuple[str, ...], share: float) -> None:
+    found = proposer_bias(history([("rules", design(joints=each)) for each in joints]), "rules")
+    assert found.proposer is not None
+    assert found.proposer.equal_neighbours == share
+
+
+def test_single_joint_has_no_neighbours() -> None:
+    single = Problem(load_task("target-2"), DesignSpace(joints=1))
+    past = History(single, [FinishedTrial(0, "rules", single.space.sample(1, 0)[0], (1.0, 2.0))], 0)
+    found = proposer_bias(past, "rules").proposer
+    assert found is not None
+    assert found.equal_neighbours is None
+
+
 def test_uniform_designs_have_no_bias() -> None:
     drawn = TARGET_2.space.sample(300, 0)
     found = proposer_bias(history([("bbo", d) for d in drawn]), "rules")
@@ -78,6 +97,7 @@ def test_uniform_designs_have_no_bias() -> None:
     assert found.black_box is not None
     shares = (found.black_box.lengths_1_cm, found.black_box.base_on_symmetry_plane, found.black_box.near_repeats)
     assert shares == (0.0, 0.0, 0.0)
+    assert found.black_box.equal_neighbours == pytest.approx(1 / 3, abs=0.05)
 
 
 @given(st.integers(0, 6), st.floats(-3e-3, 3e-3))

@@ -107,6 +107,9 @@ def plan_cells(
     methods = {key: _with_prompt(method, folder) for key, method in plan.methods.items()}
     # By seed first: an experiment that is stopped early then has results of every method.
     for seed, (task, task_name), (key, method) in itertools.product(plan.seed_list, tasks, methods.items()):
+        seeds = plan.seeds_of(key)
+        if seed not in seeds:
+            continue
         cell = Cell(
             method=key,
             plan=method,
@@ -119,7 +122,7 @@ def plan_cells(
             robust=plan.robust,
             folder=out.resolve() / RUNS / key / task_name / f"seed{seed}",
         )
-        if seed == plan.seed_list[0] and not cell.command.isprintable():
+        if seed == seeds[0] and not cell.command.isprintable():
             raise SettingsError(f"{cell.command}: a name in it has a character that is not printable")
         cell, reason = _with_model_source(cell, folder, replay)
         if reason:

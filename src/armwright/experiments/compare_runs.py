@@ -1,7 +1,7 @@
 """Compare finished runs by method, task and seed: means, intervals, paired tests and times to target."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,28 +23,28 @@ LEVELS = (0.5, 0.75, 0.9, 0.95)  # shares of the best known hypervolume, for tim
 class MethodResult:
     """Results of a method on a task.
 
-    runs: number of runs that count. e_hv, sigma_hv: as in the paper's table; None for a front search.
-    share: of the best known hypervolume; None if none is known. seconds: mean duration of a run.
+    seeds: of the runs that count. e_hv, sigma_hv: as in the paper's table; None for a front search, and σ_hv for a
+        single run. share: of the best known hypervolume; None if none is known.
     """
 
     method: str
     task: str
-    runs: int
+    seeds: tuple[int, ...]
     e_hv: Interval | None
     sigma_hv: float | None
     final: Interval
     share: Interval | None
-    seconds: float
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """E_hv of a method against the baseline on a task, paired by seed.
+    """E_hv of a method against another one, its baseline, on a task, paired by seed.
 
     p_holm: corrected for all contrasts that have enough pairs for a test; None with fewer pairs.
     """
 
     method: str
+    baseline: str
     task: str
     test: PairedTest
     p_holm: float | None
@@ -52,13 +52,14 @@ class Contrast:
 
 @dataclass(frozen=True)
 class OverallContrast:
-    """A method against the baseline over all tasks that both ran; every task counts once.
+    """A method against another one, its baseline, over all tasks that both ran; every task counts once.
 
     ratio: its mean E_hv divided by the baseline's, averaged over the tasks. test: of the logarithms of these ratios,
-        paired by task (Demsar, JMLR 7:1, 2006). p_holm: corrected for the number of methods.
+        paired by task (Demsar, JMLR 7:1, 2006). p_holm: corrected for the number of contrasts.
     """
 
     method: str
+    baseline: str
     ratio: Interval
     test: PairedTest
     p_holm: float
@@ -83,12 +84,20 @@ class TimeToTarget:
 class Comparison:
     """Runs of several methods on the same tasks.
 
-    methods, tasks: in display order. baseline: the method that the others are compared with.
+    methods, tasks: in display order. baseline: the method that others are compared with, unless `against` names the
+        methods that they are compared with.
     excluded: flagged runs, which do not count.
     widened: tasks whose runs had different reference points; their componentwise maximum is used for all.
     """
 
-    def __init__(self, runs: Iterable[RunSummary], methods: Sequence[str], tasks: Sequence[str], baseline: str) -> None:
+    def __init__(
+        self,
+        runs: Iterable[RunSummary],
+        methods: Sequence[str],
+        tasks: Sequence[str],
+        baseline: str,
+        against: Mapping[str, Sequence[str]] | None = None,
+    ) -> None:
         runs = list(runs)
         points: dict[str, tuple[float, ...]] = {}
         self.widened: list[str] = []
@@ -105,6 +114,17 @@ class Comparison:
         self.methods = [method for method in methods if any(run.method == method for run in self.runs)]
         self.tasks = [task for task in tasks if any(run.task == task for run in self.runs)]
         self.baseline = baseline
+        self.against = against or {}
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """Each method with each other one that it is compared with."""
+        return [
+            (method, other)
+            for method in self.methods
+            for other in self.against.get(method, (self.baseline,))
+            if other != method
+        ]
 
     def runs_of(self, method: str, task: str) -> list[RunSummary]:
         """Return the runs of a method on a task, by seed."""
@@ -141,33 +161,32 @@ class Comparison:
 
     @cached_property
     def contrasts(self) -> list[Contrast]:
-        """Every other method against the baseline, on each task with common seeds."""
-        tests: list[tuple[str, str, PairedTest]] = []
+        """The pairs of methods on each task with common seeds."""
+        tests: list[tuple[str, str, str, PairedTest]] = []
         for task in self.tasks:
-            baseline = self._e_hv_by_seed(self.baseline, task)
-            for method in self.methods:
-                e_hv = self._e_hv_by_seed(method, task)
+            for method, other in self.pairs:
+                e_hv, baseline = self._e_hv_by_seed(method, task), self._e_hv_by_seed(other, task)
                 seeds = sorted(e_hv.keys() & baseline.keys())
-                if method != self.baseline and seeds:
+                if seeds:
                     test = paired_test([e_hv[seed] for seed in seeds], [baseline[seed] for seed in seeds])
-                    tests.append((method, task, test))
+                    tests.append((method, other, task, test))
         corrected = iter(holm([test.p for *_, test in tests if can_reject(test.n)]).tolist())
         return [Contrast(*found, next(corrected) if can_reject(found[-1].n) else None) for found in tests]
 
     @cached_property
     def overall(self) -> list[OverallContrast]:
-        """Every other method against the baseline over the tasks; empty with too few tasks for a test."""
+        """The pairs of methods over the tasks; empty with too few tasks for a test."""
         e_hv = {(row.method, row.task): row.e_hv.mean for row in self.rows if row.e_hv is not None}
-        tests: list[tuple[str, Interval, PairedTest]] = []
-        for method in self.methods:
+        tests: list[tuple[str, str, Interval, PairedTest]] = []
+        for method, other in self.pairs:
             pairs = [
-                (e_hv[method, task], e_hv[self.baseline, task])
+                (e_hv[method, task], e_hv[other, task])
                 for task in self.tasks
-                if method != self.baseline and {(method, task), (self.baseline, task)} <= e_hv.keys()
+                if {(method, task), (other, task)} <= e_hv.keys()
             ]
             own, baseline = np.array([pair for pair in pairs if min(pair) > 0.0]).reshape(-1, 2).T
             if can_reject(len(own)):
-                tests.append((method, interval(own / baseline), paired_test(np.log(own), np.log(baseline))))
+                tests.append((method, other, interval(own / baseline), paired_test(np.log(own), np.log(baseline))))
         corrected = holm([test.p for *_, test in tests])
         return [OverallContrast(*test, float(p)) for test, p in zip(tests, corrected, strict=True)]
 
@@ -213,12 +232,11 @@ class Comparison:
         return MethodResult(
             method=method,
             task=task,
-            runs=len(runs),
+            seeds=tuple(run.seed for run in runs),
             e_hv=interval(curves.mean(axis=1)) if len(curves) else None,
-            sigma_hv=float(curves.std(axis=0).mean()) if len(curves) else None,
+            sigma_hv=float(curves.std(axis=0).mean()) if len(curves) > 1 else None,
             final=interval(finals),
             share=interval(finals / best) if best else None,
-            seconds=float(np.mean([run.seconds for run in runs])),
         )
 
 

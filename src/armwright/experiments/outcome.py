@@ -40,7 +40,8 @@ def collect(plan: ExperimentPlan, cells: Sequence[Cell]) -> Comparison:
         raise FailureError("no cell of the experiment is finished, so there is nothing to compare")
     labels = [method.label for method in plan.methods.values()]
     tasks = list(dict.fromkeys(cell.task_name for cell in cells))
-    return Comparison(records, labels, tasks, plan.methods[plan.baseline_key].label)
+    against = {m.label: [plan.methods[key].label for key in m.against] for m in plan.methods.values() if m.against}
+    return Comparison(records, labels, tasks, plan.methods[plan.baseline_key].label, against)
 
 
 def published(plan: ExperimentPlan) -> Published:

@@ -5,7 +5,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.files import check_name
@@ -21,11 +21,26 @@ Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$"), AfterValidat
 Count = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
+def _check_seeds(seeds: int | tuple[int, ...]) -> int | tuple[int, ...]:
+    if isinstance(seeds, tuple) and (not seeds or len(set(seeds)) < len(seeds)):
+        raise ValueError("expected at least one seed, each once")
+    return seeds
+
+
+# A number of seeds from 0 on, or a list.
+Seeds = Annotated[
+    Annotated[int, Field(ge=1, le=MAX_SEEDS)] | tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...],
+    AfterValidator(_check_seeds),
+]
+
+
 class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A method: the options of `armwright optimize`, or, with `design`, the budget of `armwright design`.
 
     label: name in tables and figures. proposer: as in `armwright optimize`; `replay:NAME` may contain {task} and
         {seed}, and runs the cells for which there is such a recording.
+    seeds: those of the experiment's seeds that it runs; None for all. against: the methods that it is compared with; by
+        default the baseline.
     """
 
     label: str = Field(min_length=1, max_length=40)
@@ -34,6 +49,8 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     sampler: str = "tpe"
     n_step: Count = 10
     refine_every: Count | None = None
+    seeds: Seeds | None = None
+    against: tuple[Key, ...] = ()
     model_options: ModelOptions = ModelOptions()
 
     @property
@@ -75,7 +92,7 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
     tasks: names of built-in tasks (including random-N), or task files next to the experiment file.
     n_init, n_total, space, robust: as in `armwright optimize`; equal for all methods, so that they can be compared.
-    seeds: a number of seeds from 0 on, or a list. baseline: the method that the others are compared with.
+    seeds: a number of seeds from 0 on, or a list. baseline: the method that others without `against` are compared with.
     published: published numbers to show, by method and task: (E_hv, σ_hv).
     figures: by name; by default one with all methods. samples: methods to draw in detail, with their first seed; the
         first one with runs is used.
@@ -84,7 +101,7 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     name: Key  # also of its folder
     description: str = ""
     tasks: tuple[str, ...] | Literal["all"]
-    seeds: Annotated[int, Field(ge=1, le=MAX_SEEDS)] | tuple[Annotated[int, Field(ge=0, le=2**31 - 1)], ...] = 5
+    seeds: Seeds = 5
     n_init: Count = 10
     n_total: Count = 200
     space: str | None = None
@@ -96,19 +113,13 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     figures: dict[Key, FigurePlan] = {}
     samples: tuple[Key, ...] = ()
 
-    @field_validator("seeds")
-    @classmethod
-    def _each_seed_once(cls, seeds: int | tuple[int, ...]) -> int | tuple[int, ...]:
-        if isinstance(seeds, tuple) and (not seeds or len(set(seeds)) < len(seeds)):
-            raise ValueError("expected at least one seed, each once")
-        return seeds
-
     @model_validator(mode="after")
     def _check_names(self) -> Self:
         if not self.tasks:
             raise ValueError("tasks is empty; name at least one, or all")
         used = {"baseline": () if self.baseline is None else (self.baseline,), "published": tuple(self.published)}
         used |= {f"figures.{name}": figure.methods for name, figure in self.figures.items()}
+        used |= {f"methods.{key}.against": method.against for key, method in self.methods.items()}
         for where, keys in (used | {"samples": self.samples}).items():
             for key in keys:
                 if key not in self.methods:
@@ -124,7 +135,12 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     @property
     def seed_list(self) -> tuple[int, ...]:
         """The seeds as a list."""
-        return tuple(range(self.seeds)) if isinstance(self.seeds, int) else self.seeds
+        return _listed(self.seeds)
+
+    def seeds_of(self, key: str) -> tuple[int, ...]:
+        """Return the seeds that a method runs."""
+        seeds = self.methods[key].seeds
+        return tuple(seed for seed in self.seed_list if seeds is None or seed in _listed(seeds))
 
     @property
     def task_list(self) -> tuple[str, ...]:
@@ -135,6 +151,10 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     def baseline_key(self) -> str:
         """Key of the method that the others are compared with; by default the first one."""
         return self.baseline or next(iter(self.methods))
+
+
+def _listed(seeds: int | tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(range(seeds)) if isinstance(seeds, int) else seeds
 
 
 def builtin_experiments() -> dict[str, ExperimentPlan]:
@@ -205,7 +225,11 @@ def with_only(plan: ExperimentPlan, methods: Sequence[str], tasks: Sequence[str]
                     f'{plan.name} has no {what} "{name}".{did_you_mean(name, available)} '
                     f"Available: {', '.join(available)}"
                 )
-    kept = {key: method for key, method in plan.methods.items() if not methods or key in methods}
+    kept = {
+        key: method.model_copy(update={"against": tuple(k for k in method.against if not methods or k in methods)})
+        for key, method in plan.methods.items()
+        if not methods or key in methods
+    }
     return plan.model_copy(
         update={
             "methods": kept,

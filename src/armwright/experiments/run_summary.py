@@ -1,6 +1,6 @@
 """A finished run, read from its summary, and the short description of its method."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ from armwright.pareto import hypervolume
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import read_config, read_run
-from armwright.runs.history import History
+from armwright.runs.history import BBO, RANDOM, History
 from armwright.runs.results import read_summary
 
 
@@ -97,6 +97,35 @@ class RunSummary:
         _, history = read_run(self.folder)
         task = history.problem.task.model_copy(update={"reference_point": self.reference_point})
         return replace(history, problem=replace(history.problem, task=task))
+
+
+@dataclass(frozen=True)
+class SourceShare:
+    """What the designs of one source contributed, averaged over runs.
+
+    trials: their number. front: share of the final front. gained: as in `RunSummary.gained`.
+    """
+
+    source: str
+    trials: float
+    front: float
+    gained: float
+
+
+def shares_by_source(runs: Sequence[RunSummary]) -> list[SourceShare]:
+    """Return the mean shares of all sources of these runs, random trials and the black box first.
+
+    Front searches have no such shares and do not count.
+    """
+    runs = [run for run in runs if "attribution" in run.summary]
+    sources = dict.fromkeys(source for run in runs for source in run.summary["attribution"])
+    shares: list[SourceShare] = []
+    for source in sorted(sources, key=lambda source: (source != RANDOM, source != BBO)):
+        of_runs = [run.summary["attribution"].get(source, {"trials": 0, "front": 0}) for run in runs]
+        front = [own["front"] / max(1, run.summary["front_size"]) for own, run in zip(of_runs, runs, strict=True)]
+        trials, gained = [own["trials"] for own in of_runs], [run.gained.get(source, 0.0) for run in runs]
+        shares.append(SourceShare(source, *(float(np.mean(values)) for values in (trials, front, gained))))
+    return shares
 
 
 def read_run_summary(folder: Path, method: str | None = None) -> RunSummary:

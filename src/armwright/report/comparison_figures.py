@@ -1,7 +1,7 @@
 """Figures of a comparison: those of the paper, times to target and attainment surfaces."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.plan import ExperimentPlan
-from armwright.experiments.run_summary import RunSummary
+from armwright.experiments.run_summary import shares_by_source
 from armwright.pareto import front_indices, hypervolume, paper_solution_indices
 from armwright.report.arm_figures import draw_arm, frame
 from armwright.report.attainment import draw_attainment
@@ -30,7 +30,6 @@ from armwright.report.drawing import (
 from armwright.report.figures import draw_samples
 from armwright.report.reason_figures import draw_reasons
 from armwright.report.style import BEST_KNOWN, FRONT, MISSED, TARGET, line, look
-from armwright.runs.history import BBO, RANDOM
 from armwright.runs.results import FIGURES
 
 MAX_SHOWN = 12  # most tasks in the figure of targets
@@ -223,10 +222,10 @@ def draw_attribution_shares(comparison: Comparison) -> Figure:
     sources: dict[str, None] = {}
     for row, (task, method) in enumerate(pairs):
         left = 0.0
-        for source, share in _gained_shares(comparison.runs_of(method, task)).items():
-            axes.barh(row, share, left=left, height=0.7, linewidth=0, **look(source).fill)
-            left += share
-            sources[source] = None
+        for share in shares_by_source(comparison.runs_of(method, task)):
+            axes.barh(row, share.gained, left=left, height=0.7, linewidth=0, **look(share.source).fill)
+            left += share.gained
+            sources[share.source] = None
     axes.set_yticks(range(len(pairs)), [f"{task}, {comparison.label(method)}" for task, method in pairs])
     axes.set_ylim(len(pairs) - 0.4, -0.6)
     axes.set_xlim(0, 1)
@@ -235,13 +234,6 @@ def draw_attribution_shares(comparison: Comparison) -> Figure:
     axes.grid(axis="y", visible=False)
     legend_below(figure, [Patch(label=look(source).label, **look(source).fill) for source in sources])
     return figure
-
-
-def _gained_shares(runs: Sequence[RunSummary]) -> Mapping[str, float]:
-    """Return the mean share of each source, random trials and the black box first."""
-    sources = dict.fromkeys(source for run in runs for source in run.gained)
-    ordered = sorted(sources, key=lambda source: (source != RANDOM, source != BBO))
-    return {source: sum(run.gained.get(source, 0.0) for run in runs) / len(runs) for source in ordered}
 
 
 def _columns(tasks: Sequence[str]) -> int:

@@ -1,16 +1,19 @@
 """Records of a comparison, one per row of its CSV tables."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from armwright.experiments.compare_runs import Comparison, Contrast, OverallContrast
 from armwright.experiments.outcome import Published
-from armwright.experiments.run_summary import RunSummary
+from armwright.experiments.run_summary import RunSummary, shares_by_source
 from armwright.experiments.statistics import Interval, least_p
+from armwright.report.table_cells import format_seeds
 
-BIASES = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats")  # of proposers, shown in tables
+# Biases of proposers that tables show.
+BIASES = ("lengths_5_cm", "base_on_symmetry_plane", "near_repeats", "equal_neighbours")
 
 
 def row_records(comparison: Comparison, published: Published) -> Iterable[dict[str, Any]]:
@@ -20,7 +23,8 @@ def row_records(comparison: Comparison, published: Published) -> Iterable[dict[s
         yield {
             "task": row.task,
             "method": row.method,
-            "runs": row.runs,
+            "runs": len(row.seeds),
+            "seeds": format_seeds(row.seeds),
             **_flat("e_hv", row.e_hv),
             "sigma_hv": row.sigma_hv,
             **_flat("final", row.final),
@@ -28,18 +32,17 @@ def row_records(comparison: Comparison, published: Published) -> Iterable[dict[s
             "best_known": comparison.best_known(row.task),
             "published_e_hv": e_hv,
             "published_sigma_hv": sigma_hv,
-            "seconds": row.seconds,
             "scripted": any(run.is_scripted for run in comparison.runs_of(row.method, row.task)),
         }
 
 
 def contrast_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
-    """Yield one record per comparison with the baseline on a task."""
+    """Yield one record per pair of methods on a task."""
     for contrast in comparison.contrasts:
         yield {
             "task": contrast.task,
             "method": contrast.method,
-            "baseline": comparison.baseline,
+            "baseline": contrast.baseline,
             "pairs": contrast.test.n,
             **_flat("difference", contrast.test.difference),
             **_test_fields(contrast),
@@ -48,15 +51,23 @@ def contrast_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
 
 
 def overall_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
-    """Yield one record per method over all tasks."""
+    """Yield one record per pair of methods over all tasks."""
     for over in comparison.overall:
         yield {
             "method": over.method,
-            "baseline": comparison.baseline,
+            "baseline": over.baseline,
             "tasks": over.test.n,
             **_flat("ratio", over.ratio),
             **_test_fields(over),
         }
+
+
+def source_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
+    """Yield one record per task, method and source of trials: means over the runs."""
+    for task in comparison.tasks:
+        for method in comparison.methods:
+            for share in shares_by_source(comparison.runs_of(method, task)):
+                yield {"task": task, "method": method, **asdict(share)}
 
 
 def proposer_records(comparison: Comparison) -> list[dict[str, Any]]:
@@ -84,6 +95,7 @@ def run_records(comparison: Comparison) -> Iterable[dict[str, Any]]:
             "share_of_best_known": run.final / known if known else None,
             "flagged": run.is_flagged,
             "origin": run.proposer.get("origin"),
+            "seconds": run.seconds,
             "folder": str(run.folder),
         }
 
@@ -103,11 +115,8 @@ def _proposer_means(runs: Sequence[RunSummary]) -> dict[str, Any]:
     each: list[dict[str, Any]] = []
     for run in runs:
         summary, name = run.summary, run.proposer["name"]
-        attribution = summary["attribution"].get(name, {"trials": 0, "front": 0})
         found: dict[str, Any] = {
-            "proposals": attribution["trials"],
-            "front_share": attribution["front"] / max(1, summary["front_size"]),
-            "gained_share": run.gained.get(name, 0.0),
+            "proposals": summary["attribution"].get(name, {"trials": 0})["trials"],
             "calls": run.proposer["calls"],
             "failures": sum(run.proposer["failures"].values()),
             "tokens": run.proposer["tokens"],

@@ -1,14 +1,27 @@
 """Tables of a comparison: Markdown to read, CSV for programs and LaTeX for papers."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
 
 from armwright.experiments.compare_runs import LEVELS, Comparison
 from armwright.experiments.outcome import NOTHING_PUBLISHED, Published
-from armwright.experiments.statistics import Interval, PairedTest, least_p
+from armwright.experiments.run_summary import shares_by_source
+from armwright.experiments.statistics import can_reject, least_p
 from armwright.files import naming_write_errors, replace_file, to_csv
+from armwright.report.latex_tables import latex
+from armwright.report.style import look
+from armwright.report.table_cells import (
+    TEST_COLUMNS,
+    SummaryCell,
+    contrast_cells,
+    format_interval,
+    format_number,
+    format_share,
+    remarks_on,
+    summary_rows,
+)
 from armwright.report.table_records import (
     BIASES,
     contrast_records,
@@ -16,10 +29,10 @@ from armwright.report.table_records import (
     proposer_records,
     row_records,
     run_records,
+    source_records,
 )
 
 WIDE = 4  # up to this many tasks, each has a column, as in the paper
-TEST_COLUMNS = ("better", "effect", "p", "p (Holm)")
 
 
 def write_tables(
@@ -31,6 +44,8 @@ def write_tables(
 ) -> list[Path]:
     """Write table.md, table.csv, table.tex and the detailed CSV tables; return the paths, table.md first.
 
+    Only runs.csv holds measured times and folders: equal runs give equal bytes in all other files.
+
     notes: further remarks, such as missing cells.
     """
     files = {
@@ -40,6 +55,7 @@ def write_tables(
         "contrasts.csv": to_csv(contrast_records(comparison)),
         "overall.csv": to_csv(overall_records(comparison)),
         "time-to.csv": to_csv(map(asdict, comparison.times)),
+        "sources.csv": to_csv(source_records(comparison)),
         "proposers.csv": to_csv(proposer_records(comparison)),
         "runs.csv": to_csv(run_records(comparison)),
     }
@@ -54,7 +70,7 @@ def markdown(
     comparison: Comparison, title: str, published: Published = NOTHING_PUBLISHED, notes: Sequence[str] = ()
 ) -> str:
     """Return the whole comparison as Markdown."""
-    remarks = [*_remarks(comparison), *notes]
+    remarks = [*remarks_on(comparison), *notes]
     parts = [
         f"# {title}",
         _summary_section(comparison, published),
@@ -62,6 +78,7 @@ def markdown(
         _overall_section(comparison),
         _contrast_section(comparison),
         _time_section(comparison),
+        _source_section(comparison),
         _proposer_section(comparison),
         "## Notes\n\n" + "\n".join(f"- {note}" for note in remarks) if remarks else "",
     ]
@@ -78,52 +95,24 @@ def _summary_section(comparison: Comparison, published: Published) -> str:
     """Return the paper's table, with published values if there are any."""
     caption = (
         "Mean hypervolume E_hv over the counted trials and the runs. In brackets σ_hv: the mean over the trials of the "
-        "standard deviation over the runs (ddof = 0)."
+        "standard deviation over the runs (ddof = 0). Bold: the largest E_hv of the methods with most runs on a task."
     )
     if published.source and published.values:
         caption += f" Published: {published.source}."
 
-    def cell(mean: float, deviation: float, is_best: bool) -> str:
-        text = f"{mean:.2f} ({deviation:.2f})"
-        return f"**{text}**" if is_best else text
-
     is_wide = len(comparison.tasks) > WIDE
-    rows = _summary(comparison, published, cell, "–")
-    table = [["task" if is_wide else "method", *comparison.tasks], *rows]
+    rows = [[row.label, row.seeds, *map(_summary_cell, row.cells)] for row in summary_rows(comparison, published)]
+    table = [["task" if is_wide else "method", "seeds", *comparison.tasks], *rows]
     if is_wide:
         table = list(map(list, zip(*table, strict=True)))
     return _section("Hypervolume over the trials", caption, table[0], table[1:]) if rows else ""
 
 
-def _summary(
-    comparison: Comparison, published: Published, form: Callable[[float, float, bool], str], missing: str
-) -> list[list[str]]:
-    """Return the rows of the paper's table: a label, and a cell per task.
-
-    Args:
-        comparison: The runs.
-        published: Published values, in rows below ours.
-        form: Renders E_hv, σ_hv and whether this E_hv is the largest of several methods on the task.
-        missing: The cell of a task without a value.
-    """
-    ours = {
-        (row.method, row.task): (row.e_hv.mean, row.sigma_hv)
-        for row in comparison.rows
-        if row.e_hv is not None and row.sigma_hv is not None
-    }
-    best: dict[str, float] = {}
-    for task in comparison.tasks:
-        means = [mean for (_, of), (mean, _) in ours.items() if of == task]
-        if len(means) > 1:
-            best[task] = max(means)
-    rows: list[list[str]] = []
-    for method in comparison.methods:
-        for label, values in ((comparison.label(method), ours), (f"{method}, published", published.values)):
-            cells = [(values.get((method, task)), best.get(task)) for task in comparison.tasks]
-            if any(pair for pair, _ in cells):
-                shown = (missing if pair is None else form(*pair, values is ours and pair[0] == b) for pair, b in cells)
-                rows.append([label, *shown])
-    return rows
+def _summary_cell(cell: SummaryCell | None) -> str:
+    if cell is None:
+        return "–"
+    text = f"{cell.e_hv:.2f}" if cell.sigma_hv is None else f"{cell.e_hv:.2f} ({cell.sigma_hv:.2f})"
+    return f"**{text}**" if cell.is_best else text
 
 
 def _final_section(comparison: Comparison) -> str:
@@ -134,53 +123,59 @@ def _final_section(comparison: Comparison) -> str:
     rows: list[list[str]] = []
     for task in comparison.tasks:
         for row in (row for row in comparison.rows if row.task == task):
-            share = "–" if row.share is None else _interval(row.share, scale=100.0, unit=" %", decimals=1)
+            share = "–" if row.share is None else format_interval(row.share, scale=100.0, unit=" %", decimals=1)
             label = comparison.label(row.method)
-            rows.append([task, label, str(row.runs), _interval(row.final), share, f"{row.seconds:.1f}"])
+            rows.append([task, label, str(len(row.seeds)), format_interval(row.final), share])
         known = comparison.best_known(task)
         if known is not None:
-            rows.append([task, "best known front", "", f"{known:.2f}", "100 %", ""])
-    head = ["task", "method", "runs", "hypervolume at the end", "share", "s a run"]
-    return _section("At the end", caption, head, rows, right=(2, 5))
+            rows.append([task, "best known front", "", f"{known:.2f}", "100 %"])
+    head = ["task", "method", "runs", "hypervolume at the end", "share"]
+    return _section("At the end", caption, head, rows, right=(2,))
 
 
 def _overall_section(comparison: Comparison) -> str:
     """Return the table over all tasks; empty if there are too few."""
     caption = (
-        f"Ratio of each method's E_hv to that of {comparison.baseline}; every task counts once. Mean with its 95 % "
-        "bootstrap interval over the tasks. Two-sided Wilcoxon signed-rank test of the logarithms over the tasks, "
-        "corrected for the number of methods (Holm)."
+        "Ratio of a method's E_hv to that of another one; every task counts once. Mean with its 95 % bootstrap "
+        "interval over the tasks. Two-sided Wilcoxon signed-rank test of the logarithms over the tasks, corrected for "
+        "the number of comparisons (Holm)."
     )
     rows = [
-        [comparison.label(over.method), _interval(over.ratio, decimals=3), *_test_cells(over.test, over.p_holm)]
+        [
+            comparison.label(over.method),
+            comparison.label(over.baseline),
+            format_interval(over.ratio, decimals=3),
+            *contrast_cells(over.test, over.p_holm),
+        ]
         for over in comparison.overall
     ]
-    return _section("Over all tasks", caption, ["method", "ratio", *TEST_COLUMNS], rows)
+    return _section("Over all tasks", caption, ["method", "against", "ratio", *TEST_COLUMNS], rows)
 
 
 def _contrast_section(comparison: Comparison) -> str:
-    """Return the table of paired tests against the baseline."""
+    """Return the table of paired tests."""
     caption = (
-        f"E_hv of each method minus that of {comparison.baseline}, paired by seed: mean difference with its 95 % "
-        "bootstrap interval. Two-sided Wilcoxon signed-rank test, corrected for the number of comparisons (Holm). "
+        "E_hv of a method minus that of another one, paired by seed: mean difference with its 95 % bootstrap interval. "
+        "Two-sided Wilcoxon signed-rank test, corrected for the number of comparisons (Holm). "
         "Effect: matched-pairs rank-biserial correlation."
     )
     if comparison.is_undecidable:
-        fewest = min(contrast.test.n for contrast in comparison.contrasts)
+        most = max(contrast.test.n for contrast in comparison.contrasts if not can_reject(contrast.test.n))
         caption += (
-            "\n\n**With fewer than six seeds, no test can reject at 5 %**, so no p is shown (seeds in common: "
-            f"{fewest}, smallest possible p: {least_p(fewest):.4g}). `--seeds 20` is enough for most differences."
+            "\n\n**With fewer than six seeds, no test can reject at 5 %**, so no p is shown for them (the smallest p "
+            f"of {most} {'pair' if most == 1 else 'pairs'} is {least_p(most):.4g})."
         )
     rows = [
         [
             contrast.task,
             comparison.label(contrast.method),
-            _interval(contrast.test.difference, sign="+"),
-            *_test_cells(contrast.test, contrast.p_holm),
+            comparison.label(contrast.baseline),
+            format_interval(contrast.test.difference, sign="+"),
+            *contrast_cells(contrast.test, contrast.p_holm),
         ]
         for contrast in comparison.contrasts
     ]
-    return _section("Differences", caption, ["task", "method", "difference", *TEST_COLUMNS], rows)
+    return _section("Differences", caption, ["task", "method", "against", "difference", *TEST_COLUMNS], rows)
 
 
 def _time_section(comparison: Comparison) -> str:
@@ -193,104 +188,60 @@ def _time_section(comparison: Comparison) -> str:
         [
             task,
             comparison.label(method),
-            *(f"{_number(time.median_trials)} ({time.reached} of {time.runs})" for time in times),
+            *(f"{format_number(time.median_trials)} ({time.reached} of {time.runs})" for time in times),
         ]
         for (task, method), times in groupby(comparison.times, lambda time: (time.task, time.method))
     ]
     return _section("Trials to a hypervolume", caption, ["task", "method", *(f"{level:.0%}" for level in LEVELS)], rows)
 
 
-def _proposer_section(comparison: Comparison) -> str:
-    """Return the table of gains and biases of the proposals."""
+def _source_section(comparison: Comparison) -> str:
+    """Return the table of who found the front and the hypervolume."""
     caption = (
-        "Means over the runs. Gained: the share of the final hypervolume that the proposer's designs added when they "
-        "were evaluated. Round: designs whose link lengths are all multiples of 5 cm. In plane: bases on a symmetry "
-        "plane of the targets. Repeats: designs with the joint types of an earlier one and no number more than 1 mm "
-        "from it. In brackets: the black box."
+        "Share of the final front that was found by each source. In brackets: the share of the final hypervolume that "
+        "its designs added when they were evaluated. Means over the runs."
     )
-    head = ["task", "method", "proposals", "on the front", "gained", "round", "in plane", "repeats", "calls", "USD"]
+    found = [
+        (task, comparison.label(method), {share.source: share for share in shares})
+        for task in comparison.tasks
+        for method in comparison.methods
+        if (shares := shares_by_source(comparison.runs_of(method, task)))
+    ]
+    sources = list(dict.fromkeys(source for *_, shares in found for source in shares))
+    rows = [
+        [
+            task,
+            label,
+            *(
+                f"{format_share(s.front)} ({format_share(s.gained)})" if (s := shares.get(source)) else "–"
+                for source in sources
+            ),
+        ]
+        for task, label, shares in found
+    ]
+    return _section("Front by source", caption, ["task", "method", *(look(source).label for source in sources)], rows)
+
+
+def _proposer_section(comparison: Comparison) -> str:
+    """Return the table of the proposals and their biases."""
+    caption = (
+        "Means over the runs. Round: designs whose link lengths are all multiples of 5 cm. In plane: bases on a "
+        "symmetry plane of the targets. Repeats: designs with the joint types of an earlier one and no number more "
+        "than 1 mm from it. Equal neighbours: pairs of consecutive joints with one type. In brackets: the black box."
+    )
+    head = ["task", "method", "proposals", "round", "in plane", "repeats", "equal neighbours", "calls", "USD"]
     rows = [
         [
             record["task"],
             comparison.label(record["method"]),
-            _number(record["proposals"]),
-            _share(record["front_share"]),
-            _share(record["gained_share"]),
-            *(f"{_share(record[bias])} ({_share(record[f'black_box_{bias}'])})" for bias in BIASES),
-            _number(record["calls"]),
-            _number(record["cost_usd"], 4),
+            format_number(record["proposals"]),
+            *(f"{format_share(record[bias])} ({format_share(record[f'black_box_{bias}'])})" for bias in BIASES),
+            format_number(record["calls"]),
+            format_number(record["cost_usd"], 4),
         ]
         for record in proposer_records(comparison)
     ]
     return _section("Proposals", caption, head, rows)
-
-
-def latex(comparison: Comparison, published: Published = NOTHING_PUBLISHED) -> str:
-    """Return the first table in LaTeX (booktabs): E_hv and σ_hv of each task."""
-
-    def cell(mean: float, deviation: float, is_best: bool) -> str:
-        return rf"\textbf{{{mean:.2f}}} & {deviation:.2f}" if is_best else f"{mean:.2f} & {deviation:.2f}"
-
-    tasks = comparison.tasks
-    remarks = [f"published: {published.source}"] if published.values and published.source else []
-    lines = [
-        "% needs \\usepackage{booktabs}",
-        rf"\begin{{tabular}}{{l{'rr' * len(tasks)}}}",
-        r"\toprule",
-        "Method & " + " & ".join(rf"\multicolumn{{2}}{{c}}{{{_tex(task)}}}" for task in tasks) + r" \\",
-        " & " + " & ".join(r"$E_{hv}$ & $\sigma_{hv}$" for _ in tasks) + r" \\",
-        r"\midrule",
-        *(
-            rf"{_tex(label)} & {' & '.join(cells)} \\"
-            for label, *cells in _summary(comparison, published, cell, "-- & --")
-        ),
-        r"\bottomrule",
-        r"\end{tabular}",
-        *(f"% {_tex(remark)}" for remark in (*remarks, *_remarks(comparison))),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _remarks(comparison: Comparison) -> list[str]:
-    """Return the notes that the tables need: excluded runs, shared reference points, stand-ins and models."""
-    notes = [
-        f"{run.method} on {run.task}, seed {run.seed}: excluded, because {run.proposer['fallback_share']:.0%} of its "
-        "proposals failed"
-        for run in comparison.excluded
-    ]
-    notes += [
-        f"{task}: runs had different reference points; all use the largest values, "
-        f"({', '.join(f'{value:.4g}' for value in comparison.reference_point(task))})"
-        for task in comparison.widened
-    ]
-    if any(run.is_scripted for run in comparison.runs):
-        notes.append(
-            "[scripted]: a scripted stand-in answered instead of a language model; these rows say nothing about models"
-        )
-    models: dict[str, set[str]] = {}
-    for run in comparison.runs:
-        if run.proposer.get("model") and not run.is_scripted:
-            models.setdefault(run.method, set()).add(str(run.proposer["model"]))
-    return notes + [f"{method} used {', '.join(sorted(names))}" for method, names in models.items()]
-
-
-def _interval(value: Interval, scale: float = 1.0, unit: str = "", decimals: int = 2, sign: str = "-") -> str:
-    mean, low, high = (f"{scale * end:{sign}.{decimals}f}" for end in (value.mean, value.low, value.high))
-    return f"{mean}{unit} [{low}, {high}]"
-
-
-def _test_cells(test: PairedTest, p_holm: float | None) -> list[str]:
-    """Return the cells of TEST_COLUMNS."""
-    ps = ("–", "–") if p_holm is None else (f"{p:.4f}" if p >= 1e-4 else f"{p:.1e}" for p in (test.p, p_holm))
-    return [f"{test.better} of {test.n}", f"{test.effect:+.2f}", *ps]
-
-
-def _share(value: float | None) -> str:
-    return "–" if value is None else f"{100.0 * value:.0f} %"
-
-
-def _number(value: float | None, decimals: int = 0) -> str:
-    return "–" if value is None else f"{value:.{decimals}f}"
 
 
 def _table(head: Sequence[str], lines: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
@@ -302,13 +253,3 @@ def _table(head: Sequence[str], lines: Sequence[Sequence[str]], right: Sequence[
         rule = "-" * (width - 1) + ":" if i in right else "-" * width
         columns.append([f"{text:{'>' if i in right else '<'}{width}}" for text in (name, rule, *cells)])
     return "\n".join(f"| {' | '.join(row)} |" for row in zip(*columns, strict=True))
-
-
-_TEX = str.maketrans(
-    {c: rf"\{c}" for c in "&%$#_{}"}
-    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-)
-
-
-def _tex(text: str) -> str:
-    return text.translate(_TEX)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ class SourceBias:
         base_on_symmetry_plane: The base is within 1e-6 m of a symmetry plane of the targets; None if they have none.
         repeats: An earlier trial of any source has the same parameters.
         near_repeats: An earlier trial has the same joints and all numbers within 1 mm; includes repeats.
+        equal_neighbours: Share of pairs of consecutive joints with the same type; None if there are no pairs.
     """
 
     designs: int
@@ -37,6 +39,7 @@ class SourceBias:
     base_on_symmetry_plane: float | None
     repeats: float
     near_repeats: float
+    equal_neighbours: float | None
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,7 @@ def source_bias(history: History, source: str, planes: Array) -> SourceBias | No
     designs = [trial.design for trial in history if trial.source == source]
     on_plane = [distance_to_planes(np.array(design.origin), points, planes) <= TOLERANCE for design in designs]
     repeats, near_repeats = repeated(history)
+    equal = [joint == after for design in designs for joint, after in pairwise(design.joints)]
     return SourceBias(
         designs=len(designs),
         lengths_5_cm=_share([are_round(design.links, 0.05) for design in designs]),
@@ -104,6 +108,7 @@ def source_bias(history: History, source: str, planes: Array) -> SourceBias | No
         base_on_symmetry_plane=_share(on_plane) if len(planes) else None,
         repeats=_share(repeats[mine]),
         near_repeats=_share(near_repeats[mine]),
+        equal_neighbours=_share(equal) if equal else None,
     )
 
 
