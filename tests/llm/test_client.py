@@ -14,7 +14,7 @@ from armwright.proposers.llm import LlmProposer
 from armwright.study.progress import StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
-from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer
+from tests.support.chat_server import GOOD_DESIGN, Answer, ChatServer, Request, designer, wants_design
 from tests.support.command_line import PATIENCE
 from tests.support.wire_formats import llm_proposer
 
@@ -77,7 +77,7 @@ def test_refused_design_is_returned_with_the_reason(chat_server: ChatServer, tmp
     refused = {**GOOD_DESIGN, "link_3": 1.4}
 
     def answer(request: Request) -> Answer:
-        if "response_format" in request and len(request["messages"]) == 1:
+        if wants_design(request) and len(request["messages"]) == 1:
             return json.dumps(refused)
         return designer(request)
 
@@ -98,7 +98,7 @@ def test_repeatedly_refused_answer_becomes_a_black_box_trial(
     calls: list[Request] = []
 
     def answer(request: Request) -> Answer:
-        if "response_format" not in request:
+        if not wants_design(request):
             return designer(request)
         calls.append(request)
         return designer(request) if len(calls) == 1 else wrong

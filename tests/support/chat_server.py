@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Literal, Self
 
+from armwright.llm.backend import CHECK
+
 Request = dict[str, Any]
 
 GOOD_DESIGN = {
@@ -46,13 +48,21 @@ Answer = (
 )
 
 
+def is_check(request: Request) -> bool:
+    """Whether this is the question before the first trial."""
+    return CHECK.prompt in json.dumps(request["messages"])
+
+
 def wants_design(request: Request) -> bool:
     """Whether a schema is asked for: natively, by a tool, or by words in the prompt."""
-    return bool(request.keys() & {"response_format", "output_config", "tools"}) or "NewDesign" in json.dumps(request)
+    has_schema = bool(request.keys() & {"response_format", "output_config", "tools"})
+    return not is_check(request) and (has_schema or "NewDesign" in json.dumps(request))
 
 
 def designer(request: Request) -> Answer:
     """Thinks on a free question, and gives GOOD_DESIGN where a schema is asked for."""
+    if is_check(request):
+        return json.dumps({"answer": "ready"})
     return json.dumps(GOOD_DESIGN) if wants_design(request) else "ORIGIN: (0, 0.01, -0.1), and so on."
 
 

@@ -1,16 +1,19 @@
 """Examine what is installed and configured, and whether it works."""
 
+import json
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 
 from armwright.exceptions import ArmwrightError, ModelError
 from armwright.extras import EXTRAS, install_command, is_installed, missing_packages
-from armwright.llm.backend import CallError
+from armwright.llm.backend import CallError, Reply
 from armwright.llm.configuration import configuration_path, configured_model
 from armwright.llm.model_options import ModelOptions
 from armwright.runs.config import versions
+from armwright.text import one_line
 
 OK, MISSING, WRONG = "ok", "--", "!!"
 
@@ -60,11 +63,19 @@ def try_model(options: ModelOptions | None = None) -> str:
     except CallError as fault:
         raise ModelError(f"{fault} ({fault.kind})") from fault
     cost = "price unknown" if reply.cost_usd is None else f"{reply.cost_usd:.6f} USD"
-    answer = " ".join(reply.answer.split())[:60]
     return (
-        f'{OK} call: {configured.options.model} answered "{answer}" in {reply.seconds:.1f} s, '
+        f'{OK} call: {configured.options.model} answered "{_answer(reply)}" in {reply.seconds:.1f} s '
+        f"(output {reply.output_mode}), "
         f"{reply.input_tokens} tokens in, {reply.output_tokens} out, {cost}"
     )
+
+
+def _answer(reply: Reply) -> str:
+    """Return the answer to the check on one line, out of its JSON if it is in the form that was asked for."""
+    answer = reply.answer
+    with suppress(ValueError, TypeError, KeyError):
+        answer = str(json.loads(answer)["answer"])
+    return one_line(answer, 60)
 
 
 def _kernels() -> Finding:

@@ -50,6 +50,7 @@ class Reply:
     Attributes:
         requests: Requests that the server answered; above 1 if an answer was invalid.
         cost_usd: None if the price is unknown.
+        output_mode: How the answer was held to its schema: `tool`, `native` or `prompted`; empty for free text.
     """
 
     answer: str = ""
@@ -58,6 +59,7 @@ class Reply:
     output_tokens: Count = 0
     cost_usd: Amount | None = None
     seconds: Amount = 0.0
+    output_mode: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,16 +99,22 @@ class LlmBackend(Protocol):
     Attributes:
         model: Who answers, for the user.
         origin: What answers: `model`, `manual` (a person) or `scripted` (a stand-in).
+        note: Message for the user about the last check; empty for none.
     """
 
     model: str
     origin: str
+    note: str = ""
 
     def begin(self) -> None:
         """Start a session; an earlier cancellation no longer counts. Does nothing by default."""
 
-    def check(self) -> Reply:
-        """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default."""
+    def check(self, output_mode: str = "") -> Reply:
+        """Ask CHECK before any work is done; raises CallError if there is no answer. Asks nothing by default.
+
+        Args:
+            output_mode: Mode in which an earlier session of the run asked; empty to choose one.
+        """
         return Reply()
 
     def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:

@@ -7,7 +7,7 @@ import re
 import threading
 import time
 import warnings
-from collections.abc import Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import cache
@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from armwright.exceptions import MissingExtraError, SettingsError, UsageError
 from armwright.extras import requires_extra
 from armwright.files import replace_surrogates
-from armwright.llm.answer import last_json_object
+from armwright.llm.answer import last_json_object, object_schema
 from armwright.llm.backend import (
     CHECK,
     MAX_REQUESTS,
@@ -46,7 +46,7 @@ with requires_extra("llm", "a language model"):
     from pydantic_ai.settings import ModelSettings
     from pydantic_ai.usage import UsageLimits
 
-    from armwright.llm.errors import CALL_FAULTS, PASSING, describe_fault, kind_of_fault
+    from armwright.llm.errors import CALL_FAULTS, PASSING, describe_fault, kind_of_fault, may_refuse_output
 
 # `describe_cost` and the budget report unknown prices.
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
@@ -57,6 +57,9 @@ RETRIES = 2  # after a fault that may pass
 RETRY_SECONDS = 0.5  # before the first retry, unless the server states it; doubled before the next
 
 _OUTPUTS: Mapping[str, Any] = {"tool": ToolOutput, "native": NativeOutput, "prompted": PromptedOutput}
+# Modes in the order in which `output: auto` tries them, with a vendor and with another server.
+HOSTED_MODES, SERVER_MODES = ("tool", "native", "prompted"), ("native", "tool", "prompted")
+_CHECK_SCHEMA = object_schema({"answer": {"type": "string"}})
 
 # With OPENAI_LOG=debug and the like, libraries log requests and responses.
 for _logger in ("openai._base_client", "anthropic._base_client", "httpx2", "httpcore2.http11"):
@@ -98,7 +101,8 @@ class _RetryingModel(WrapperModel):
 class ModelClient(LlmBackend):
     """Call one model; it remembers nothing between calls.
 
-    With `output: auto`, hosted models receive the schema as a tool and other servers as a native response format.
+    With `output: auto`, hosted models receive the schema as a tool and other servers as a native response format. If
+    the server refuses that, the first question tries the other modes; the one that it accepts is kept.
 
     Args:
         options: The model and how it is called.
@@ -115,8 +119,8 @@ class ModelClient(LlmBackend):
         self.timeout = options.timeout
         self._server = server_of(options)
         self._model = _RetryingModel(_vendor_model(model) if self._server is None else _model_on(self._server))
-        auto = "tool" if self._server is None else "native"
-        self._output = _OUTPUTS[auto if options.output == "auto" else options.output]
+        automatic = HOSTED_MODES if self._server is None else SERVER_MODES
+        self._modes = automatic if options.output == "auto" else (options.output,)  # one, once it is known
         self._settings = options.model_dump(include={"temperature", "seed"}, exclude_none=True)
         self._pending: set[Future[Any]] = set()
         self._cancelled = False
@@ -125,20 +129,53 @@ class ModelClient(LlmBackend):
         """Start a session."""
         self._cancelled = False
 
-    def check(self) -> Reply:
-        """Ask one tiny question, so that a wrong name, key or address is reported before any work is done."""
-        return self._run(Agent(self._model), CHECK, None, CHECK_SECONDS)
+    def check(self, output_mode: str = "") -> Reply:
+        """Ask one tiny question, so that a wrong name, key or address is reported before any work is done.
+
+        It is asked for a structured answer, which shows the output modes that the server accepts.
+        """
+        if output_mode in self._modes:
+            self._modes = (output_mode,)
+        modes = self._modes
+        reply = self._in_accepted_mode(self._check)
+        refused = modes[: modes.index(reply.output_mode)]
+        if refused:
+            self.note = f"{self.model} refuses output {' and '.join(refused)}; this run uses output {reply.output_mode}"
+        return reply
+
+    def _check(self, mode: str) -> Reply:
+        agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, _CHECK_SCHEMA), retries=0)
+        try:
+            return self._run(agent, CHECK, None, CHECK_SECONDS)
+        except CallError as fault:
+            if fault.kind == "answer" and fault.reply.answer.strip():  # of another form, but the model is there
+                return fault.reply
+            raise
+
+    def _in_accepted_mode(self, ask: Callable[[str], Reply]) -> Reply:
+        """Ask in the first output mode that the server accepts, which is used from then on."""
+        for mode in self._modes:
+            try:
+                reply = ask(mode)
+            except CallError as fault:
+                is_refusal = not fault.reply.requests and may_refuse_output(fault.kind, str(fault))
+                if mode == self._modes[-1] or not is_refusal:
+                    raise
+            else:
+                self._modes = (mode,)
+                return replace(reply, output_mode=mode)
+        raise AssertionError("there is no output mode")
 
     def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
         """Return the answer to a prompt; refusals of its output format are sent back to the model."""
         if output is not None:
-            return self._ask_for(question, output, most_requests)
+            return self._in_accepted_mode(lambda mode: self._ask_for(question, output, mode, most_requests))
         reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, self.timeout)
         if not reply.answer.strip():
             raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
 
-    def _ask_for(self, question: Question, output: OutputFormat, most_requests: int | None) -> Reply:
+    def _ask_for(self, question: Question, output: OutputFormat, mode: str, most_requests: int | None) -> Reply:
         accepted: list[str] = []
         refusals: list[str] = []
 
@@ -151,8 +188,7 @@ class ModelClient(LlmBackend):
                 raise ModelRetry(str(refusal)) from refusal
             return answer
 
-        schema = self._output(StructuredDict(dict(output.schema)))
-        agent: Agent[None, Any] = Agent(self._model, output_type=schema, retries=REASKS)
+        agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, output.schema), retries=REASKS)
         agent.output_validator(accept)
         try:
             reply = self._run(agent, question, most_requests, self.timeout)
@@ -262,7 +298,13 @@ def _model_on(server: Server) -> Model:
         api_key=os.environ.get(server.key_variable) or "no-key",
         default_headers={"OpenAI-Organization": Omit(), "OpenAI-Project": Omit()},  # pyright: ignore[reportArgumentType]
     )
-    return OpenAIChatModel(server.model, provider=OpenAICompatibleProvider("openai-compatible", openai_client=client))
+    provider = OpenAICompatibleProvider("openai-compatible", openai_client=client)
+    # `prompted` asks the server for nothing, not even for its JSON mode.
+    return OpenAIChatModel(server.model, provider=provider, profile={"supports_json_object_output": False})
+
+
+def _output_type(mode: str, schema: Mapping[str, Any]) -> Any:
+    return _OUTPUTS[mode](StructuredDict(dict(schema)))
 
 
 def _json_alone(response: ModelResponse) -> ModelResponse:

@@ -1,5 +1,6 @@
 """Classify and describe the errors of a call to a model."""
 
+import re
 from concurrent.futures import CancelledError
 from typing import Any, cast
 
@@ -53,6 +54,8 @@ PASSING = (
     faults.ModelConnectionError,
 )
 
+_OUTPUT_WORDS = re.compile(r"\b(tools?|tool_choice|functions?|response_format|json|schemas?|grammar|jinja)\b", re.I)
+
 
 def kind_of_fault(fault: Exception) -> str:
     """Classify a failed call in one word, such as key, quota, rate_limit, server, timeout, context or answer."""
@@ -61,6 +64,15 @@ def kind_of_fault(fault: Exception) -> str:
     if isinstance(fault, _MALFORMED):
         return "answer"
     return next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
+
+
+def may_refuse_output(kind: str, message: str) -> bool:
+    """Return whether a server may have refused a request for its tools or its JSON schema.
+
+    No code says so, hence any refusal counts. A status with another meaning (404 of OpenRouter, 500 of llama-server)
+    counts if the message is about tools or schemas.
+    """
+    return kind in ("rejected", "settings") or (kind in ("unknown_model", "server") and _is_about_output(message))
 
 
 def describe_fault(fault: Exception) -> str:
@@ -78,6 +90,10 @@ def describe_fault(fault: Exception) -> str:
         reason = str(behind) or type(behind).__name__
         return fault.message if reason in str(fault) else f"{fault.message.rstrip('.')}: {reason}"
     return str(fault)
+
+
+def _is_about_output(message: str) -> bool:
+    return _OUTPUT_WORDS.search(message) is not None
 
 
 def _message(body: Any) -> str | None:

@@ -95,7 +95,8 @@ class ModelOptions(PromptOptions, frozen=True, extra="forbid", allow_inf_nan=Fal
         base_url: Address of an OpenAI-compatible server, in place of the vendor's.
         temperature: Sent only if set.
         seed: Sent only if set.
-        output: How an answer is held to a schema: "tool", "native" or "prompted"; "auto" chooses by the server.
+        output: How an answer is held to a schema: "tool", "native" or "prompted"; "auto" takes the first of them that
+            the server accepts.
         timeout: Limit of one request, retries included [s].
         in_flight: Calls in flight while black-box trials run; None to wait for each answer.
         max_calls: Limit of requests in the whole run.

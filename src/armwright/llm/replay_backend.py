@@ -28,7 +28,7 @@ class ReplayBackend(LlmBackend):
         self.origin = next((call.origin for call in calls), "model")
         self.differing: list[str] = []
 
-    def check(self) -> Reply:
+    def check(self, output_mode: str = "") -> Reply:
         """Return the first recorded check."""
         return self._play(next(call for call in self.calls if call.step == "check"))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from armwright.exceptions import ModelError, ProposalError
 from armwright.llm.backend import CHECK, CallError, Interrupted, LlmBackend, OutputFormat, Question, Reply
 from armwright.llm.budget import CallBudget
-from armwright.llm.transcript import Call, Transcript, n_requests, total_cost
+from armwright.llm.transcript import Call, Transcript, n_requests, output_mode_of, total_cost
 from armwright.runs.summary import ProposerSummary
 
 UNBILLED = ("missing", "cancelled")  # faults of calls that cost nothing unless a request was answered
@@ -47,6 +47,7 @@ class LlmSession:
             output_tokens=sum(call.output_tokens for call in calls),
             cost_usd=total_cost(calls) if any(call.requests for call in calls) else None,
             call_seconds=round(sum(call.seconds for call in calls), 3),
+            notes={"output_mode": mode} if (mode := output_mode_of(calls)) else {},
         )
 
     def cancel(self) -> None:
@@ -62,17 +63,20 @@ class LlmSession:
         self._over = threading.Event()
         self.backend.begin()
 
-    def check(self) -> None:
-        """Ask a test question; an exhausted budget is reported at the first real question instead.
+    def check(self) -> str:
+        """Ask a test question, and return a message for the user or an empty text.
+
+        An exhausted budget is reported at the first real question instead.
 
         Raises:
             ModelError: There is no answer, or its price is unknown under a cost limit.
         """
+        mode = output_mode_of(self._transcript.calls)
         try:
-            self._call(CHECK, lambda _: self.backend.check(), self._over)
+            self._call(CHECK, lambda _: self.backend.check(mode), self._over)
         except ProposalError as fault:
             if fault.kind == "budget":
-                return
+                return ""
             raise ModelError(
                 f"{fault}. Check the model, its key and base_url; --proposer rules needs none",
                 final=fault.kind if fault.final else None,
@@ -82,6 +86,7 @@ class LlmSession:
                 f"the price of {self.backend.model} is unknown, so max_cost cannot hold; use max_calls",
                 final="budget",
             )
+        return self.backend.note
 
     def _ask(self, question: Question, output: OutputFormat, extraction: Callable[[str], str] = str) -> str:
         """Return the answer in its output format.

@@ -90,6 +90,11 @@ def total_cost(calls: Iterable[Call]) -> float | None:
     return None if None in costs else sum(cost for cost in costs if cost is not None)
 
 
+def output_mode_of(calls: Iterable[Call]) -> str:
+    """Return the mode of the structured answers of a run; empty before the first one."""
+    return next((call.output_mode for call in calls if call.output_mode), "")
+
+
 def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
     """Return the hints in the latest prompt for a proposal."""
     call = last_call(calls, proposal, *FIRST_STEPS)
@@ -114,10 +119,7 @@ def _append(file: FileIO, line: bytes) -> None:
 
 
 def _record(call: Call) -> dict[str, Any]:
-    record = asdict(call)
-    if not call.hints:
-        del record["hints"]
-    return record
+    return {name: value for name, value in asdict(call).items() if value or name not in ("hints", "output_mode")}
 
 
 def _read(path: Path, mend: bool) -> Iterator[Call]:
@@ -146,5 +148,5 @@ def _check_complete(content: Any) -> Any:
     return cast("Any", content)
 
 
-_REQUIRED = {field.name for field in fields(Call)} - {"hints", "fault", "error"}
+_REQUIRED = {field.name for field in fields(Call)} - {"hints", "output_mode", "fault", "error"}
 _CALL = TypeAdapter(Annotated[Call, BeforeValidator(_check_complete)])

@@ -26,8 +26,9 @@ class ManualProposer(PromptedProposer):
         answers = (options or PromptOptions()).model_copy(update={"answer": "text"})
         super().__init__(self.manual, answers, "manual")
 
-    def check(self) -> None:
+    def check(self) -> str:
         """Check nothing: nobody is asked before the first question."""
+        return ""
 
     def announce(self, number: int) -> str:
         """Name the files of the question and of its answer, until it is answered."""

@@ -63,12 +63,15 @@ class Proposer(Protocol):
         """Return a message for the user during the wait for the proposal of trial `number`, or an empty text."""
         return ""
 
-    def check(self) -> None:
-        """Check that proposals are possible. Called before the first trial if a proposal is due.
+    def check(self) -> str:
+        """Check that proposals are possible, and return a message for the user or an empty text.
+
+        Called before the first trial of a session if a proposal is due.
 
         Raises:
             FailureError: The proposer cannot work.
         """
+        return ""
 
     def unused(self, history: History) -> Sequence[Proposal]:
         """Return proposals of earlier sessions of this run that no trial has used yet; they go first."""

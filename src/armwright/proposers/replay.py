@@ -60,10 +60,10 @@ class ReplayProposer(PromptedProposer):
         """Return the source of the replay, and how it was asked."""
         return {"replay": self.source, **super().settings()}
 
-    def check(self) -> None:
+    def check(self) -> str:
         """Replay the recorded check, so that the summary is the same; it cannot fail."""
-        if any(call.step == "check" and call.fault is None for call in self.replayed.calls):
-            super().check()
+        was_checked = any(call.step == "check" and call.fault is None for call in self.replayed.calls)
+        return super().check() if was_checked else ""
 
     def recorded_trials(self) -> Sequence[FinishedTrial]:
         """Return the trials of the recorded run; empty for a transcript without its run."""
@@ -71,8 +71,9 @@ class ReplayProposer(PromptedProposer):
 
     def summary(self) -> ProposerSummary:
         """Return the summary of the replayed calls."""
+        summary = super().summary()
         notes = {"replay": self.source, "differing_prompts": len(self.replayed.differing)}
-        return replace(super().summary(), notes=notes)
+        return replace(summary, notes={**summary.notes, **notes})
 
     def propose(self, history: History, seed: int, number: int) -> Sequence[Proposal]:
         """Return the recorded designs, or raise the recorded error."""

@@ -196,7 +196,9 @@ class Study:
             self._report("beginning", len(self._trials), self._proposer.name, note=forecast)
         self._channel.report("asking", len(self._trials))
         try:
-            self._proposer.check()
+            note = self._proposer.check()
+            if note:
+                self._report("beginning", len(self._trials), self._proposer.name, note=note)
         except ModelError as fault:
             if on_model_failure == "stop" and not self._trials:
                 raise
