@@ -5,6 +5,7 @@ import json
 import shlex
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from armwright.experiments.runner import run_cell
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.recording_file import shipped_recordings
 from armwright.report.tables import write_tables
+from armwright.search.samplers import SAMPLERS
 from armwright.tasks.catalogue import builtin_tasks
 from tests.support.chat_server import ChatServer
 
@@ -92,6 +94,44 @@ def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> No
         assert load_experiment(str(file)) == (plan, tmp_path)
     assert builtin_experiments()["suite"].task_list == tuple(builtin_tasks())
     assert len(builtin_experiments()["rules"].seed_list) == 20
+
+
+def test_samplers_run_alone_and_with_rules(tmp_path: Path) -> None:
+    plan = builtin_experiments()["samplers"]
+    pairs = {(method.sampler, method.proposer) for method in plan.methods.values()}
+    assert pairs == {(sampler, proposer) for sampler in SAMPLERS for proposer in ("none", "rules")}
+    cells, skipped = plan_cells(plan, tmp_path, tmp_path)
+    assert not skipped
+    seeds = Counter((cell.plan.sampler, cell.task_name) for cell in cells if cell.plan.proposer == "rules")
+    assert seeds == {(name, task): 5 if name == "gp" else 20 for name in SAMPLERS for task in plan.task_list}
+
+
+@pytest.mark.parametrize(
+    ("name", "own", "proposals"),
+    [("n-step", 5, 3 * 5 * (100 + 40 + 20 + 4)), ("prompt-sensitivity", 1, 4 * 3 * 5 * 20)],
+)
+def test_experiments_about_a_model_need_one(tmp_path: Path, name: str, own: int, proposals: int) -> None:
+    plan = builtin_experiments()[name]
+    cells, skipped = plan_cells(plan, tmp_path, tmp_path)
+    assert len({cell.method for cell in cells}) == own
+    assert {one.cell.plan.proposer for one in skipped} == {"llm"}
+    cells, skipped = plan_cells(with_model(plan, ModelOptions(model="gpt-x")), tmp_path, tmp_path)
+    assert not skipped
+    assert sum(200 // cell.plan.n_step for cell in cells if cell.plan.needs_a_model) == proposals
+
+
+def test_builtin_experiments_run_with_few_trials(tmp_path: Path) -> None:
+    for name, methods in (
+        ("samplers", ["tpe", "random-rules", "nsga2-rules"]),
+        ("n-step", ["bbo", "rules-2", "rules-50"]),
+    ):
+        plan = with_only(with_seeds(builtin_experiments()[name], 1), methods, ["target-2"])
+        plan = plan.model_copy(update={"n_init": 4, "n_total": 6})
+        cells, _ = plan_cells(plan, tmp_path, tmp_path / name)
+        assert [run_cell(cell).fault for cell in cells] == ["", "", ""]
+        found = collect(plan, cells)
+        first = plan.methods[methods[0]].label
+        assert {(contrast.baseline, contrast.test.n) for contrast in found.contrasts} == {(first, 1)}
 
 
 @pytest.mark.parametrize(

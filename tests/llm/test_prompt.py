@@ -615,6 +615,26 @@ def test_shown_designs_depend_only_on_the_seed() -> None:
         assert not set(draw.others) & set(front)
 
 
+def test_reordered_prompt_has_the_sections_of_plus() -> None:
+    history = fixed_history(PAPER)
+    texts = [load_prompt(name).render(history, 0) for name in ("plus", "plus-reordered")]
+    sections = [re.split(r"(?m)^(?=# )", text.rstrip() + "\n\n") for text in texts]
+    assert sections[0] != sections[1]
+    assert sorted(sections[0]) == sorted(sections[1])
+    assert sections[0][-1] == sections[1][-1]
+
+
+@pytest.mark.parametrize("name", ["plus-reworded-1", "plus-reworded-2"])
+def test_reworded_prompts_differ_from_plus_in_the_instructions_only(name: str) -> None:
+    history = fixed_history(PAPER)
+    plus, reworded = (
+        load_prompt(prompt).render(history, 0).split("Think step by step.\n") for prompt in ("plus", name)
+    )
+    assert plus[0] == reworded[0]
+    assert plus[1] != reworded[1]
+    assert plus[1].split("End your answer")[1:] == reworded[1].split("End your answer")[1:]
+
+
 def test_others_of_all_designs_include_the_front() -> None:
     history = fixed_history(FixedProblem(OPEN, objectives=THREE_OBJECTIVES), 120)
     front = {member.number for member in history.front}

@@ -21,7 +21,10 @@ from armwright.exceptions import FailureError, SettingsError
 
 
 def experiment(
-    name: Annotated[str, typer.Argument(help="A built-in experiment (paper, rules, suite), or a YAML file.")],
+    name: Annotated[
+        str,
+        typer.Argument(help="A built-in experiment (paper, recorded, rules, n-step, samplers, ...), or a YAML file."),
+    ],
     seeds: Annotated[int | None, typer.Option(help="Number of seeds, from 0, instead of the file's.")] = None,
     method: Annotated[list[str] | None, typer.Option(help="Only this method of the file (may be repeated).")] = None,
     task: Annotated[list[str] | None, typer.Option(help="Only this task of the file (may be repeated).")] = None,

@@ -11,7 +11,7 @@ from typing import Any
 from armwright.exceptions import SettingsError, TaskError
 from armwright.experiments.plan import ExperimentPlan, MethodPlan
 from armwright.llm.model_options import ModelOptions
-from armwright.llm.prompt import PROMPTS
+from armwright.llm.prompt import BUILTIN_PROMPTS
 from armwright.llm.recording_file import shipped_recordings
 from armwright.llm.transcript import TRANSCRIPTS
 from armwright.tasks.catalogue import load_task
@@ -166,7 +166,7 @@ def _task(name: str, folder: Path) -> tuple[str, str]:
 def _with_prompt(method: MethodPlan, folder: Path) -> MethodPlan:
     """Return the method with the path of its prompt file made absolute."""
     options = method.model_options
-    if options.prompt in PROMPTS:
+    if options.prompt in BUILTIN_PROMPTS:
         return method
     options = options.model_copy(update={"prompt": str((folder / options.prompt).resolve())})
     return method.model_copy(update={"model_options": options})

@@ -23,6 +23,8 @@ from armwright.runs.history import History
 from armwright.text import end_of, fence, one_line, without_thoughts
 
 PROMPTS = ("plus", "minus", "full")
+VARIANTS = ("plus-reworded-1", "plus-reworded-2", "plus-reordered")  # of the experiment prompt-sensitivity
+BUILTIN_PROMPTS = (*PROMPTS, *VARIANTS)
 
 MAX_TOKENS = 12_000  # longer prompts show fewer designs, earlier proposals and targets
 MAX_ANALYSIS_LENGTH = 40_000  # characters from the end of a free answer that the second call reads
@@ -131,7 +133,7 @@ _TEMPLATE_ERRORS = (
 
 def load_prompt(name: str | Path) -> Prompt:
     """Return a built-in prompt by its name, or that of a template file."""
-    if str(name) in PROMPTS:
+    if str(name) in BUILTIN_PROMPTS:
         return _builtin_prompt(str(name))
     path = Path(name)
     if os.path.isdir(path):
@@ -142,12 +144,12 @@ def load_prompt(name: str | Path) -> Prompt:
         )
     text = read_text(path, MAX_TEMPLATE, SettingsError)
     # A file called "plus" must not pass for the built-in prompt.
-    return Prompt(path.name if path.name not in PROMPTS else f"./{path.name}", text)
+    return Prompt(path.name if path.name not in BUILTIN_PROMPTS else f"./{path.name}", text)
 
 
 @cache
 def _builtin_prompt(name: str) -> Prompt:
-    return Prompt(name, builtin_template(f"{name}.md.j2"))
+    return Prompt(name, builtin_template(f"{name}.md.j2" if name in PROMPTS else f"variants/{name}.md.j2"))
 
 
 def builtin_template(name: str) -> str:
