@@ -104,5 +104,6 @@ def write_drawn(place: Path, drawn: Iterable[tuple[str, Figure]]) -> list[Path]:
 
 def _save(figure: Figure, png: Path) -> str:
     figure.savefig(png)
+    figure.set_layout_engine(None)  # the PDF has the layout of the PNG; computing it again takes as long as drawing
     figure.savefig(png.with_suffix(".pdf"), metadata={"CreationDate": None})
     return png.name
