@@ -99,6 +99,10 @@ class ReplayProposer(PromptedProposer):
         call = last_call(self.replayed.calls, question.proposal, question.step) if self.recording else None
         return question if call is None else replace(question, prompt=call.prompt)
 
+    def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
+        """Return the prompt for the next designs; empty for a recording, whose questions hold theirs."""
+        return "" if self.recording else super().prompt_for(history, seed, hints)
+
     def next_hints(self, number: int) -> tuple[Hint, ...]:
         """Return the hints of the recorded question; there are no new ones."""
         return hints_of(self.replayed.calls, self.identity(number))
