@@ -241,6 +241,7 @@ def test_optimize_shows_its_options_in_groups() -> None:
             'unknown prompt "x"',
         ),
         (("target-1", *model_options(memory="owm")), 'Did you mean "own"?'),
+        (("target-1", "--memory", "chta"), 'unknown memory "chta". Did you mean "chat"?'),
         (("target-1", *model_options(answer="onestep")), 'Did you mean "one-step"?'),
         (
             ("target-1", "--model", "m", *model_options(answer="text", base_url="http://127.0.0.1:9")),

@@ -79,7 +79,7 @@ class _Answered:
 
     def cancel(self) -> None: ...
 
-    def ask(self, question: Any, output: Any = None, most_requests: Any = None) -> Any:
+    def ask(self, question: Any, output: Any = None, most_requests: Any = None, earlier: Any = None) -> Any:
         from armwright.llm.backend import CallError, Reply
 
         try:

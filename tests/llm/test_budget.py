@@ -1,7 +1,7 @@
 """Call and cost budgets of a run, and its forecast."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,10 @@ from pydantic_ai.usage import RequestUsage
 
 from armwright.exceptions import ModelError, ProposalError
 from armwright.llm import client as chat
-from armwright.llm.backend import CHECK, LlmBackend, OutputFormat, Question, Reply
+from armwright.llm.backend import CHECK, LlmBackend, OutputFormat, Question, Reply, Turn
 from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import ModelOptions
+from armwright.llm.prices import ExpectedTokens, describe_cost
 from armwright.llm.servers import server_of
 from armwright.llm.session import LlmSession
 from armwright.problem.problem import Problem
@@ -61,10 +62,16 @@ class Greedy(LlmBackend):
 
     def begin(self) -> None: ...
 
-    def check(self) -> Reply:
+    def check(self, output_mode: str = "") -> Reply:
         return self.ask(CHECK)
 
-    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+    def ask(
+        self,
+        question: Question,
+        output: OutputFormat | None = None,
+        most_requests: int | None = None,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
         taken = min(self.most, most_requests or self.most)
         with self._lock:
             self.requests += taken
@@ -177,7 +184,8 @@ def test_model_on_a_local_server_has_no_vendor_price(chat_server: ChatServer) ->
     ],
 )
 def test_price_depends_on_the_host(model: str, address: str | None, words: str) -> None:
-    assert chat.describe_cost(ModelOptions(model=model, base_url=address), 10**6, 10**6) == words
+    tokens = ExpectedTokens(1, 10**6, 10**6)
+    assert describe_cost(ModelOptions(model=model, base_url=address), tokens) == words
     server = server_of(ModelOptions(model=model, base_url=address))
     if server is not None:
         usage = RequestUsage(input_tokens=10**6, output_tokens=10**6)

@@ -61,8 +61,14 @@ def asked(out: Path) -> list[Call]:
 
 @pytest.mark.parametrize(
     "how",
-    [{}, {"prompt": "minus", "memory": "own"}, {"answer": "one-step", "memory": "own"}, {"prompt": "file"}],
-    ids=["plus", "minus-own", "one-step", "file"],
+    [
+        {},
+        {"prompt": "minus", "memory": "own"},
+        {"answer": "one-step", "memory": "own"},
+        {"prompt": "file"},
+        {"memory": "chat"},
+    ],
+    ids=["plus", "minus-own", "one-step", "file", "chat"],
 )
 def test_printed_prompt_is_the_prompt_sent(chat_server: ChatServer, in_folder: Path, how: dict[str, Any]) -> None:
     out = in_folder / "run"
@@ -82,7 +88,7 @@ def test_printed_prompt_is_the_prompt_sent(chat_server: ChatServer, in_folder: P
     assert before == second.prompt
     assert shown("--after", "run", "--number", "7")[0] == second.prompt
     assert shown("target-1", "--after", "run", "--number", "4")[0] == first.prompt
-    sent = [request["messages"][0]["content"] for request in chat_server.requests]
+    sent = [request["messages"][-1]["content"] for request in chat_server.requests]
     assert before in sent
     schemas = [request["response_format"] for request in chat_server.requests if "response_format" in request]
     printed = json.loads(shown("--after", "run", "--schema")[0])

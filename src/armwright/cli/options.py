@@ -53,6 +53,15 @@ PromptName = Annotated[
         rich_help_panel=MODEL,
     ),
 ]
+MemoryName = Annotated[
+    str | None,
+    typer.Option(
+        help="What the model remembers of a run: none (every question is new), own (a list of its proposals) or chat "
+        "(the whole conversation).",
+        show_default="none",
+        rich_help_panel=MODEL,
+    ),
+]
 MaxCost = Annotated[float | None, typer.Option(help="Stop asking the model after so many USD.", rich_help_panel=MODEL)]
 ModelOptionsFile = Annotated[
     str | None,

@@ -13,6 +13,7 @@ from armwright.cli.options import (
     EvaluatorName,
     Figures,
     MaxCost,
+    MemoryName,
     ModelName,
     ModelOptionsFile,
     Objectives,
@@ -142,6 +143,7 @@ def optimize(
     seed: Seed = 0,
     model: ModelName = None,
     prompt: PromptName = None,
+    memory: MemoryName = None,
     max_cost: MaxCost = None,
     model_options: ModelOptionsFile = None,
     device: DeviceName = "auto",
@@ -179,7 +181,8 @@ def optimize(
     console = open_console(json_)
     problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
-    choice = choose_proposer(proposer, load_model_options(model_options, model=model, prompt=prompt, max_cost=max_cost))
+    given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
+    choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
     if live:

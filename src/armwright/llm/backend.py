@@ -1,6 +1,6 @@
 """What answers questions: a model (client.py), a recording of one (replay_backend.py) or a person (manual.py)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
 
@@ -38,6 +38,14 @@ class Question:
     def trial(self) -> int:
         """Number of the trial that the proposal is for."""
         return int(self.proposal.rpartition("-")[2])
+
+
+@dataclass(frozen=True)
+class Turn:
+    """An earlier question of a conversation and its answer."""
+
+    question: str
+    answer: str
 
 
 CHECK = Question("", "check", "Answer with one word: ready")
@@ -117,13 +125,20 @@ class LlmBackend(Protocol):
         """
         return Reply()
 
-    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+    def ask(
+        self,
+        question: Question,
+        output: OutputFormat | None = None,
+        most_requests: int | None = None,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
         """Return the answer, free text by default; raises CallError if there is none.
 
         Args:
             question: What is asked.
             output: Form of the answer. Its refusals are sent back to the model.
             most_requests: Limit of requests, those after invalid answers included; None for no limit.
+            earlier: Turns of the conversation that the question continues; None for a question on its own.
         """
         ...
 

@@ -4,6 +4,7 @@ import asyncio
 import logging
 import os
 import re
+import sys
 import threading
 import time
 import warnings
@@ -26,6 +27,7 @@ from armwright.llm.backend import (
     OutputFormat,
     Question,
     Reply,
+    Turn,
 )
 from armwright.llm.model_options import MODEL_SECONDS, ModelOptions
 from armwright.llm.redaction import WithoutKeys, redacted
@@ -37,7 +39,7 @@ with requires_extra("llm", "a language model"):
     from openai import AsyncOpenAI, Omit
     from pydantic_ai import Agent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput, capture_run_messages
     from pydantic_ai import exceptions as faults
-    from pydantic_ai.messages import ModelMessage, ModelResponse, TextPart, ToolCallPart
+    from pydantic_ai.messages import ModelMessage, ModelRequest, ModelResponse, TextPart, ToolCallPart, UserPromptPart
     from pydantic_ai.models import Model, ModelRequestParameters, infer_model
     from pydantic_ai.models.openai import OpenAIChatModel
     from pydantic_ai.models.wrapper import WrapperModel
@@ -48,7 +50,7 @@ with requires_extra("llm", "a language model"):
 
     from armwright.llm.errors import CALL_FAULTS, PASSING, describe_fault, kind_of_fault, may_refuse_output
 
-# `describe_cost` and the budget report unknown prices.
+# Forecasts and the budget report unknown prices.
 warnings.filterwarnings("ignore", category=faults.CostCalculationFailedWarning)
 
 CHECK_SECONDS = 60.0  # timeout of a check; a local server may have to load the model first
@@ -99,7 +101,7 @@ class _RetryingModel(WrapperModel):
 
 
 class ModelClient(LlmBackend):
-    """Call one model; it remembers nothing between calls.
+    """Call one model.
 
     With `output: auto`, hosted models receive the schema as a tool and other servers as a native response format. If
     the server refuses that, the first question tries the other modes; the one that it accepts is kept.
@@ -124,6 +126,11 @@ class ModelClient(LlmBackend):
         self._settings = options.model_dump(include={"temperature", "seed"}, exclude_none=True)
         self._pending: set[Future[Any]] = set()
         self._cancelled = False
+
+    @property
+    def context_window(self) -> int:
+        """Tokens that the model can handle in one request; huge if unknown."""
+        return self._model.profile.get("context_window") or sys.maxsize
 
     def begin(self) -> None:
         """Start a session."""
@@ -166,16 +173,29 @@ class ModelClient(LlmBackend):
                 return replace(reply, output_mode=mode)
         raise AssertionError("there is no output mode")
 
-    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+    def ask(
+        self,
+        question: Question,
+        output: OutputFormat | None = None,
+        most_requests: int | None = None,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
         """Return the answer to a prompt; refusals of its output format are sent back to the model."""
         if output is not None:
-            return self._in_accepted_mode(lambda mode: self._ask_for(question, output, mode, most_requests))
-        reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, self.timeout)
+            return self._in_accepted_mode(lambda mode: self._ask_for(question, output, mode, most_requests, earlier))
+        reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, self.timeout, earlier)
         if not reply.answer.strip():
             raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
 
-    def _ask_for(self, question: Question, output: OutputFormat, mode: str, most_requests: int | None) -> Reply:
+    def _ask_for(
+        self,
+        question: Question,
+        output: OutputFormat,
+        mode: str,
+        most_requests: int | None,
+        earlier: Sequence[Turn] | None,
+    ) -> Reply:
         accepted: list[str] = []
         refusals: list[str] = []
 
@@ -191,7 +211,7 @@ class ModelClient(LlmBackend):
         agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, output.schema), retries=REASKS)
         agent.output_validator(accept)
         try:
-            reply = self._run(agent, question, most_requests, self.timeout)
+            reply = self._run(agent, question, most_requests, self.timeout, earlier)
         except CallError as fault:
             if fault.kind != "limit" or not refusals:
                 raise
@@ -205,19 +225,30 @@ class ModelClient(LlmBackend):
         for future in list(self._pending):
             future.cancel()
 
-    def _run(self, agent: Agent[None, Any], question: Question, most_requests: int | None, seconds: float) -> Reply:
+    def _run(
+        self,
+        agent: Agent[None, Any],
+        question: Question,
+        most_requests: int | None,
+        seconds: float,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
         started = time.perf_counter()
         settings = ModelSettings(**self._settings, request_timeout=seconds, max_retries=0)
+        if earlier is not None:
+            settings["cache"] = True  # where a provider does not cache by itself: the next question repeats this one
+        past = _messages(earlier or ())
         limits = UsageLimits(request_limit=most_requests)
+        call = agent.run(question.prompt, message_history=past, model_settings=settings, usage_limits=limits)
         with capture_run_messages() as messages:
             try:
-                self._wait(agent.run(question.prompt, model_settings=settings, usage_limits=limits))
+                self._wait(call)
             except KeyboardInterrupt as fault:
-                raise Interrupted(self._reply(messages, started)) from fault
+                raise Interrupted(self._reply(messages[len(past) :], started)) from fault
             except CALL_FAULTS as fault:
                 message = f"{self.model}: {_one_line(describe_fault(fault))}"
-                raise CallError(kind_of_fault(fault), message, self._reply(messages, started)) from fault
-        return self._reply(messages, started)
+                raise CallError(kind_of_fault(fault), message, self._reply(messages[len(past) :], started)) from fault
+        return self._reply(messages[len(past) :], started)
 
     def _reply(self, messages: Sequence[ModelMessage], started: float) -> Reply:
         responses = [message for message in messages if isinstance(message, ModelResponse)]
@@ -250,32 +281,6 @@ class ModelClient(LlmBackend):
             self._pending.discard(future)
 
 
-def estimated_cost(options: ModelOptions, input_tokens: int, output_tokens: int) -> float | None:
-    """Return about what so many tokens cost [USD], by the prices that calls are accounted with; None if unknown."""
-    server = server_of(options)
-    vendor, _, name = (options.model or "").partition(":")
-    usage = Usage(input_tokens=input_tokens, output_tokens=output_tokens)
-    try:
-        if server is None:
-            price = calc_price(usage, model_ref=name, provider_id=vendor.removesuffix("-chat"))
-        else:
-            price = calc_price(usage, model_ref=server.model, provider_api_url=server.address)
-    except LookupError:
-        return None
-    return float(price.total_price)
-
-
-def describe_cost(options: ModelOptions, input_tokens: int, output_tokens: int) -> str:
-    """Return the estimated cost in one phrase."""
-    cost = estimated_cost(options, input_tokens, output_tokens)
-    if cost is not None:
-        return f"about {cost:.2f} USD by public prices"
-    server = server_of(options)
-    if server is None:
-        return "price unknown"
-    return "on a local server" if server.is_local else f"at {server.address}, price unknown"
-
-
 def _vendor_model(name: str) -> Model:
     """Return a vendor's model; raises SettingsError if its name is unknown or its key is not set."""
     if ":" not in name:
@@ -305,6 +310,18 @@ def _model_on(server: Server) -> Model:
 
 def _output_type(mode: str, schema: Mapping[str, Any]) -> Any:
     return _OUTPUTS[mode](StructuredDict(dict(schema)))
+
+
+def _messages(turns: Sequence[Turn]) -> list[ModelMessage]:
+    """Return turns as messages; structured answers are text, whichever output mode they were given in."""
+    return [
+        message
+        for turn in turns
+        for message in (
+            ModelRequest([UserPromptPart(turn.question)]),
+            ModelResponse([TextPart(turn.answer)]),
+        )
+    ]
 
 
 def _json_alone(response: ModelResponse) -> ModelResponse:

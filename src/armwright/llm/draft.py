@@ -131,10 +131,10 @@ class Drafter(LlmSession):
 
     def forecast(self, description: str) -> str:
         """Return the model and the estimated tokens and cost, in one line."""
-        from armwright.llm.client import describe_cost
+        from armwright.llm.prices import ExpectedTokens, describe_cost
 
         given, configured = _input_tokens(description), self.configured
-        cost = describe_cost(configured.options, given, ANSWER_TOKENS)
+        cost = describe_cost(configured.options, ExpectedTokens(1, given, ANSWER_TOKENS))
         return (
             f"asking {self._by()}{configured.place}, named by {configured.named_by}: about {given:,} tokens in, "
             f"{ANSWER_TOKENS:,} out, up to {MAX_REQUESTS} times; {cost}"
@@ -214,12 +214,12 @@ class Drafter(LlmSession):
 
     def _check_price(self, description: str) -> None:
         """Raise SettingsError if the first question alone may exceed max_cost."""
-        from armwright.llm.client import estimated_cost
+        from armwright.llm.prices import ExpectedTokens, estimated_cost
 
         options = self.configured.options
         if options.max_cost is None:
             return
-        cost = estimated_cost(options, _input_tokens(description), ANSWER_TOKENS)
+        cost = estimated_cost(options, ExpectedTokens(1, _input_tokens(description), ANSWER_TOKENS))
         if cost is None:
             raise SettingsError(f"the price of {options.model} is unknown; use max_calls instead of max_cost")
         if cost > options.max_cost:

@@ -54,6 +54,9 @@ PASSING = (
     faults.ModelConnectionError,
 )
 
+_LENGTH_WORDS = re.compile(
+    r"context (length|window|size|limit)|too many (input )?tokens|(prompt|input) is too long", re.I
+)
 _OUTPUT_WORDS = re.compile(r"\b(tools?|tool_choice|functions?|response_format|json|schemas?|grammar|jinja)\b", re.I)
 
 
@@ -63,7 +66,8 @@ def kind_of_fault(fault: Exception) -> str:
         return "key"
     if isinstance(fault, _MALFORMED):
         return "answer"
-    return next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
+    kind = next((kind for cls, kind in _KINDS if isinstance(fault, cls)), "settings")
+    return "context" if kind == "rejected" and _is_about_length(fault) else kind
 
 
 def may_refuse_output(kind: str, message: str) -> bool:
@@ -90,6 +94,12 @@ def describe_fault(fault: Exception) -> str:
         reason = str(behind) or type(behind).__name__
         return fault.message if reason in str(fault) else f"{fault.message.rstrip('.')}: {reason}"
     return str(fault)
+
+
+def _is_about_length(fault: Exception) -> bool:
+    """Return whether a refusal is about the length of a prompt; several servers say so by their message alone."""
+    is_too_large = isinstance(fault, faults.ModelHTTPError) and fault.status_code == 413
+    return is_too_large or _LENGTH_WORDS.search(describe_fault(fault)) is not None
 
 
 def _is_about_output(message: str) -> bool:

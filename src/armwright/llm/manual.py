@@ -8,7 +8,7 @@ from pathlib import Path
 
 from armwright.exceptions import AnswerPendingError, FailureError, UsageError
 from armwright.files import naming_write_errors
-from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply
+from armwright.llm.backend import CallError, LlmBackend, OutputFormat, Question, Reply, Turn
 
 LOOK_EVERY = 0.5  # [s]
 ENDINGS = ("md", "json", "txt")  # of an answer's file
@@ -48,7 +48,13 @@ class ManualBackend(LlmBackend):
         """Return whether there is an answer that has not been refused."""
         return any(file.is_file() and file.stat().st_size > 0 for file in self._answers(number))
 
-    def ask(self, question: Question, output: OutputFormat | None = None, most_requests: int | None = None) -> Reply:
+    def ask(
+        self,
+        question: Question,
+        output: OutputFormat | None = None,
+        most_requests: int | None = None,
+        earlier: Sequence[Turn] | None = None,
+    ) -> Reply:
         """Return the answer; one that is refused is moved aside with the reason."""
         started = time.perf_counter()
         number = question.trial

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator, model_va
 
 from armwright.exceptions import did_you_mean
 
-MEMORIES = ("none", "own")
+MEMORIES = ("none", "own", "chat")
 OTHERS = ("off-front", "all")
 # Form of the answer in the prompt: free text and a second call, JSON only, or free text alone.
 ANSWERS = {"two-step": "then-schema", "one-step": "schema", "text": "text"}
@@ -20,7 +20,7 @@ ORIGINS = ("model", "scripted")
 ON_FAILURE = ("stop", "continue")
 MAX_PROPOSALS = 100  # per call
 MODEL_SECONDS = 120.0  # default timeout
-DIRECT = ("model", "prompt", "max_cost")  # fields with a command-line option of their own
+DIRECT = ("model", "prompt", "memory", "max_cost")  # fields with a command-line option of their own
 
 _CHOICES: Mapping[str, tuple[str, ...]] = {
     "memory": MEMORIES,
@@ -38,7 +38,8 @@ class PromptOptions(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     Attributes:
         prompt: "plus" (with instructions on how to analyse the parameters), "minus", "full" (also with the whole front,
             the gains of its own designs, joint angles and mechanics), or a template file.
-        memory: "none" (every call is new) or "own" (show the earlier proposals of the run).
+        memory: "none" (every call is new), "own" (show the earlier proposals of the run), or "chat" (send the earlier
+            questions and answers of the run as one conversation).
         answer: "two-step" (free reasoning, then a second call into the schema), "one-step", or "text" (manual answers).
         proposals: Designs per call.
         others: Source of the five designs shown beside the front: "off-front" (designs off the front) or "all".

@@ -8,9 +8,20 @@ from functools import partial
 from pathlib import Path
 
 from armwright.exceptions import ModelError, ProposalError
-from armwright.llm.backend import CHECK, CallError, Interrupted, LlmBackend, OutputFormat, Question, Reply
+from armwright.llm.backend import (
+    CHECK,
+    MAX_REQUESTS,
+    CallError,
+    Interrupted,
+    LlmBackend,
+    OutputFormat,
+    Question,
+    Reply,
+    Turn,
+)
 from armwright.llm.budget import CallBudget
-from armwright.llm.transcript import Call, Transcript, n_requests, output_mode_of, total_cost
+from armwright.llm.conversation import Conversation, conversation, new_part
+from armwright.llm.transcript import FIRST_STEPS, Call, Transcript, n_requests, output_mode_of, total_cost
 from armwright.runs.summary import ProposerSummary
 
 UNBILLED = ("missing", "cancelled")  # faults of calls that cost nothing unless a request was answered
@@ -23,11 +34,13 @@ class LlmSession:
         backend: Who answers.
         name: The `source` of its trials.
         budget: Limits of the whole transcript; None for no limits.
+        chat: Whether the proposals are one conversation, in which each question is sent with the turns before it.
     """
 
-    def __init__(self, backend: LlmBackend, name: str, budget: CallBudget | None = None) -> None:
+    def __init__(self, backend: LlmBackend, name: str, budget: CallBudget | None = None, *, chat: bool = False) -> None:
         self.name = name
         self.backend = backend
+        self.chat = chat
         self._budget = budget or CallBudget()
         self._transcript = Transcript(None)
         self._over = threading.Event()  # set when no more answers are wanted in this session
@@ -98,12 +111,29 @@ class LlmSession:
         """
         over = self._over  # of this session, even if another one begins meanwhile
         if question.step == "reasoning":
-            thoughts = self._call(question, partial(self.backend.ask, question, None), over)
+            thoughts = self._call(question, partial(self._send, question, None), over)
             question = replace(question, step="parameters", prompt=extraction(thoughts), hints=())
-        return self._call(question, partial(self.backend.ask, question, output), over)
+        return self._call(question, partial(self._send, question, output), over)
+
+    def _send(self, question: Question, output: OutputFormat | None, most_requests: int | None) -> Reply:
+        return self.backend.ask(question, output, most_requests, self._earlier(question))
+
+    def _earlier(self, question: Question) -> Sequence[Turn] | None:
+        """Return the turns that go with a question; None for the check and for second questions, which stand alone."""
+        is_turn = self.chat and question.step in FIRST_STEPS
+        return self._conversation(question.trial).turns if is_turn else None
+
+    def _conversation(self, trial: int | None = None) -> Conversation:
+        return conversation(self._transcript.calls, trial)
+
+    def _part_to_ask(self, prompt: str, trial: int) -> str:
+        """Return what a question for a trial says of a prompt: in a chat, what the turns before it do not."""
+        return new_part(prompt, self._conversation(trial).turns) if self.chat else prompt
 
     def _call(self, question: Question, ask: Callable[[int | None], Reply], over: threading.Event) -> str:
         """Return the answer; answer and cost are recorded even if Ctrl-C interrupts the call.
+
+        A question that is too long is repeated without the oldest turns, within its requests.
 
         Args:
             question: What is asked.
@@ -111,12 +141,17 @@ class LlmSession:
             over: Set once no answer is wanted any more.
         """
         with self._budget.reserved(over.is_set) as most_requests:
-            try:
-                reply = ask(most_requests)
-            except (CallError, Interrupted) as fault:
-                if fault.kind not in UNBILLED or fault.reply.requests:
-                    self._keep(question, fault.reply, fault)
-                raise
+            left, reply = most_requests, None
+            while reply is None:
+                earlier = self._earlier(question)
+                try:
+                    reply = ask(left)
+                except (CallError, Interrupted) as fault:
+                    if fault.kind not in UNBILLED or fault.reply.requests:
+                        self._keep(question, fault.reply, fault)
+                    left = (MAX_REQUESTS if left is None else left) - max(1, fault.reply.requests)
+                    if left < 1 or fault.kind != "context" or self._earlier(question) == earlier:
+                        raise
             self._keep(question, reply)
         return reply.answer
 

@@ -19,6 +19,7 @@ from armwright.runs.control import Hint
 
 TRANSCRIPTS = "transcripts.jsonl"  # in a run folder
 FIRST_STEPS = ("reasoning", "answer")  # steps whose prompts show the history and hints
+LAST_STEPS = ("parameters", "answer")  # steps whose answers are designs
 READ = (None, "answer", "limit", "refused", "rejected", "context")  # faults of calls whose prompt was read
 
 
@@ -104,6 +105,12 @@ def hints_of(calls: Sequence[Call], proposal: str) -> tuple[Hint, ...]:
 def last_call(calls: Sequence[Call], proposal: str, *steps: str) -> Call | None:
     """Return the last call for these steps of a proposal: an interrupted run may have repeated a question."""
     return next((call for call in reversed(calls) if call.proposal == proposal and call.step in steps), None)
+
+
+def tries(calls: Sequence[Call], proposal: str, step: str) -> list[Call]:
+    """Return the calls for a step of a proposal that a replay repeats: refusals as too long, then the last call."""
+    found = [call for call in calls if call.proposal == proposal and call.step == step]
+    return [call for call in found[:-1] if call.fault == "context"] + found[-1:]
 
 
 def _append(file: FileIO, line: bytes) -> None:

@@ -1,9 +1,10 @@
 """The language model as a proposer."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from armwright.llm.budget import CallBudget
+from armwright.llm.conversation import RESULTS
 from armwright.llm.feedback import N_LATEST, N_PARETO, N_RANDOM
 from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import MAX_TOKENS, estimated_tokens, parameters_prompt
@@ -11,6 +12,9 @@ from armwright.llm.prompt_values import MAX_TARGETS
 from armwright.problem.problem import Problem
 from armwright.proposers.prompted import PromptedProposer
 from armwright.runs.history import History
+
+if TYPE_CHECKING:
+    from armwright.llm.prices import ExpectedTokens
 
 TOKENS_A_NUMBER, TOKENS_A_DESIGN = 5, 100  # of feedback, measured on prompts
 LINES = 40  # of designs in one line each that a prompt has on average
@@ -29,7 +33,8 @@ class LlmProposer(PromptedProposer):
 
         options = ModelOptions.of(options)
         budget = CallBudget(options.max_calls, options.max_cost)
-        super().__init__(ModelClient(options), options, options.source, budget=budget)
+        self.client = ModelClient(options)
+        super().__init__(self.client, options, options.source, budget=budget)
         self.options = options
 
     def settings(self) -> Mapping[str, Any]:
@@ -39,31 +44,50 @@ class LlmProposer(PromptedProposer):
 
     def forecast(self, problem: Problem, n: int) -> str:
         """Estimate the calls, tokens and cost of `n` proposals."""
-        from armwright.llm.client import describe_cost
+        from armwright.llm.prices import describe_cost
 
-        calls = -(-n // self.options.proposals)
-        given, written = self._tokens_each(problem)
-        steps = 2 if self.options.form == "then-schema" else 1
+        tokens = self._expected_tokens(problem, -(-n // self.options.proposals))
         estimate = (
-            f"{n} proposals: about {steps * calls + 1} calls, {_thousands(calls * given)} tokens in, "
-            f"{_thousands(calls * written)} out"
+            f"{n} proposals: about {tokens.requests + 1} calls, {_thousands(tokens.input)} tokens in, "
+            f"{_thousands(tokens.output)} out"
         )
-        return f"{estimate}; {describe_cost(self.options, calls * given, calls * written)}"
+        return f"{estimate}; {describe_cost(self.options, tokens)}"
 
-    def _tokens_each(self, problem: Problem) -> tuple[int, int]:
-        """Return input and output tokens per proposal: the mean so far, or the estimate for a full prompt."""
+    def _expected_tokens(self, problem: Problem, n: int) -> "ExpectedTokens":
+        """Return the tokens of `n` calls: from the mean so far, or the estimate for a full prompt."""
+        from armwright.llm.prices import ExpectedTokens
+
         calls = [call for call in self._transcript.calls if call.proposal and call.fault is None]
         proposals = {call.proposal for call in calls}
-        if proposals:
-            tokens = sum(call.input_tokens for call in calls), sum(call.output_tokens for call in calls)
-            return tokens[0] // len(proposals), tokens[1] // len(proposals)
-        given = min(
-            MAX_TOKENS, estimated_tokens(self.prompt_for(History(problem, (), 0), 0)) + self._feedback_tokens(problem)
-        )
+        requests = (2 if self.options.form == "then-schema" else 1) * n
         written = self.options.proposals * PARAMETER_TOKENS + THOUGHT_TOKENS
-        if self.options.form == "then-schema":
-            given += estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS
-        return given, written
+        if proposals:
+            written = sum(call.output_tokens for call in calls) // len(proposals)
+        if proposals and not self.chat:
+            given = sum(call.input_tokens for call in calls) // len(proposals)
+            return ExpectedTokens(requests, n * given, n * written)
+        prompt = self.prompt_for(History(problem, (), 0), 0, 0)
+        whole = min(MAX_TOKENS, estimated_tokens(prompt) + self._feedback_tokens(problem))
+        second = estimated_tokens(parameters_prompt(problem, "")) + THOUGHT_TOKENS if requests > n else 0
+        if not self.chat:
+            return ExpectedTokens(requests, n * (whole + second), n * written)
+        problem_tokens = estimated_tokens(prompt.rpartition(RESULTS)[0])
+        asked = self._chat_tokens(whole, whole - problem_tokens, written, n)
+        return ExpectedTokens(requests, sum(asked) + n * second, n * written, sum(asked), sum(asked[:-1]))
+
+    def _chat_tokens(self, whole: int, part: int, written: int, n: int) -> list[int]:
+        """Return the tokens of the next `n` questions of a chat, each with all turns before it.
+
+        Args:
+            whole: Tokens of the first question of a chat.
+            part: Tokens of a later question.
+            written: Tokens of an answer.
+            n: Number of questions.
+        """
+        turns = self._conversation().turns
+        past = sum(estimated_tokens(turn.question) + estimated_tokens(turn.answer) for turn in turns)
+        first = past + part if turns else whole
+        return [min(first + k * (part + written), self.client.context_window) for k in range(n)]
 
     def _feedback_tokens(self, problem: Problem) -> int:
         """Estimate the tokens of the feedback late in a run without evaluating designs, which may be slow."""

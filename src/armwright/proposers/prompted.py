@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,14 +14,12 @@ from armwright.llm.budget import CallBudget
 from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt, parameters_prompt
 from armwright.llm.session import LlmSession
-from armwright.llm.transcript import TRANSCRIPTS, Transcript, hints_of
+from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Transcript, hints_of
 from armwright.problem.problem import Problem
 from armwright.proposers.hints import Hints
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.control import Hint
 from armwright.runs.history import History
-
-LAST_STEPS = ("parameters", "answer")  # the steps whose answers are designs
 
 
 class PromptedProposer(LlmSession, Proposer):
@@ -43,11 +42,13 @@ class PromptedProposer(LlmSession, Proposer):
         prompt: Prompt | None = None,
         budget: CallBudget | None = None,
     ) -> None:
-        super().__init__(backend, name, budget)
+        super().__init__(backend, name, budget, chat=options.memory == "chat")
+        self.overlaps = self.overlaps and not self.chat  # a turn follows the one before it
         self.options = options
         self.per_call = options.proposals
         self.prompt = prompt or load_prompt(options.prompt)
         self._hints = Hints(None)
+        self._told_dropped = False  # in this session
 
     def settings(self) -> Mapping[str, Any]:
         """Return prompt, memory and form of the answer; for a custom prompt also its template."""
@@ -93,8 +94,8 @@ class PromptedProposer(LlmSession, Proposer):
             raise
         finally:
             self._hints.give_back(question.hints)
-        answers = read_text(text, problem, self.options.proposals)
-        return self._proposals(question, answers)
+        first, *others = self._proposals(question, read_text(text, problem, self.options.proposals))
+        return [replace(first, note=self._note_dropped(number)), *others]
 
     def question(self, history: History, seed: int, number: int) -> Question:
         """Return the next question for trial `number`: the second one if the reasoning is recorded already."""
@@ -105,7 +106,7 @@ class PromptedProposer(LlmSession, Proposer):
             prompt = self._extraction_prompt(history.problem, thoughts.answer)
             return Question(identity, "parameters", prompt, thoughts.known)
         hints = self.next_hints(number)
-        prompt = self.prompt_for(history, seed, hints)
+        prompt = self.prompt_for(history, seed, number, hints)
         return Question(identity, "reasoning" if in_steps else "answer", prompt, len(history), hints=hints)
 
     def identity(self, number: int) -> str:
@@ -126,10 +127,23 @@ class PromptedProposer(LlmSession, Proposer):
     def _extraction_prompt(self, problem: Problem, thoughts: str) -> str:
         return parameters_prompt(problem, thoughts, self.options)
 
-    def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
-        """Return the prompt for the next designs."""
+    def prompt_for(self, history: History, seed: int, number: int, hints: Sequence[Hint] = ()) -> str:
+        """Return the prompt for trial `number`; in a chat, the part of it that is new."""
         texts = [hint.text for hint in hints]
-        return self.prompt.render(history, seed, self.options, name=self.name, hints=texts)
+        prompt = self.prompt.render(history, seed, self.options, name=self.name, hints=texts)
+        return self._part_to_ask(prompt, number)
+
+    def _note_dropped(self, number: int) -> str:
+        """Return a message about the turns that were dropped from the chat, once in a session."""
+        n_dropped = self._conversation(number).n_dropped if self.chat and not self._told_dropped else 0
+        self._told_dropped = self._told_dropped or n_dropped > 0
+        if not n_dropped:
+            return ""
+        turns = "turn was" if n_dropped == 1 else f"{n_dropped} turns were"
+        return (
+            f"the chat exceeds the context of {self.backend.model}: the oldest {turns} dropped, except the first; "
+            "so will others"
+        )
 
     def output_format(self, problem: Problem) -> OutputFormat:
         """Return the form of the answer that holds the designs; it is recorded as JSON that `read_text` reads."""

@@ -14,8 +14,8 @@ from armwright.llm.model_options import PromptOptions
 from armwright.llm.prompt import PROMPTS, Prompt, load_prompt
 from armwright.llm.recording_file import find_recording, shipped_recordings
 from armwright.llm.replay_backend import ReplayBackend
-from armwright.llm.transcript import TRANSCRIPTS, Call, Transcript, hints_of, last_call
-from armwright.proposers.prompted import LAST_STEPS, PromptedProposer
+from armwright.llm.transcript import LAST_STEPS, TRANSCRIPTS, Call, Transcript, hints_of, last_call
+from armwright.proposers.prompted import PromptedProposer
 from armwright.proposers.proposer import Proposal
 from armwright.runs.config import RunConfig
 from armwright.runs.control import Hint
@@ -99,9 +99,9 @@ class ReplayProposer(PromptedProposer):
         call = last_call(self.replayed.calls, question.proposal, question.step) if self.recording else None
         return question if call is None else replace(question, prompt=call.prompt)
 
-    def prompt_for(self, history: History, seed: int, hints: Sequence[Hint] = ()) -> str:
-        """Return the prompt for the next designs; empty for a recording, whose questions hold theirs."""
-        return "" if self.recording else super().prompt_for(history, seed, hints)
+    def prompt_for(self, history: History, seed: int, number: int, hints: Sequence[Hint] = ()) -> str:
+        """Return the prompt for trial `number`; empty for a recording, whose questions hold theirs."""
+        return "" if self.recording else super().prompt_for(history, seed, number, hints)
 
     def next_hints(self, number: int) -> tuple[Hint, ...]:
         """Return the hints of the recorded question; there are no new ones."""

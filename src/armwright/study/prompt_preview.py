@@ -49,7 +49,7 @@ def preview(
     assert history.method is not None
     history = replace(history, method=history.method.model_copy(update={"n_total": n_total}))
     proposer = PromptedProposer(ReplayBackend((), Path()), options, "llm")
-    text = proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init))
+    text = proposer.prompt_for(history, ProposalRequests(proposer, seed).seed(n_init), n_init)
     return _preview(proposer, problem, n_init, text)
 
 
@@ -88,13 +88,13 @@ def preview_after(
     requests = ProposalRequests(proposer, config.seed)
     if number is not None:
         past = _history_at(run, config, history, proposer.requested_trials(), number)
-        text = proposer.prompt_for(past, requests.seed(number), proposer.past_hints(number))
+        text = proposer.prompt_for(past, requests.seed(number), number, proposer.past_hints(number))
         return _preview(proposer, history.problem, number, text)
     schedule = request_schedule(requests, config.study, lambda: history)
     number, finished = schedule.upcoming(len(history))
     # With other options the new prompt is shown, even if the run waits for the second call of an answer.
     if given:
-        text = proposer.prompt_for(history, requests.seed(number), proposer.next_hints(number))
+        text = proposer.prompt_for(history, requests.seed(number), number, proposer.next_hints(number))
     else:
         text = proposer.question(history, requests.seed(number), number).prompt
     note = _note(finished - len(history), len(proposer.unused(history)))

@@ -37,7 +37,8 @@ def study_method(
             f"{len(initial_designs)} initial designs do not fit into the n_init = {n_init} first trials"
         )
     if in_flight is not None and proposer is not None and not proposer.overlaps:
-        raise SettingsError(f"in_flight does not go with the proposer {proposer.name}, which is asked one by one")
+        chat = " with memory chat" if proposer.settings().get("memory") == "chat" else ""
+        raise SettingsError(f"in_flight does not go with the proposer {proposer.name}{chat}, which is asked one by one")
     return Method(
         proposer=None if proposer is None else {"name": proposer.name, **proposer.settings()},
         sampler=sampler_name(sampler),

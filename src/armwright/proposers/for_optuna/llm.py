@@ -41,7 +41,8 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         from armwright.llm.client import ModelClient
 
         options = ModelOptions.of(options)
-        super().__init__(ModelClient(options), options.source, CallBudget(options.max_calls, options.max_cost))
+        budget = CallBudget(options.max_calls, options.max_cost)
+        super().__init__(ModelClient(options), options.source, budget, chat=options.memory == "chat")
         self.description = description
         self.options = options
         self.given_space = dict(space or {})
@@ -62,7 +63,7 @@ class StudyLlmProposer(LlmSession, StudyProposer):
         known = sum(trial.state == optuna.trial.TrialState.COMPLETE for trial in trials)
         step = "reasoning" if self.options.form == "then-schema" else "answer"
         text = self._ask(
-            Question(identity, step, prompt, known),
+            Question(identity, step, self._part_to_ask(prompt, number), known),
             self._output_format(parameters, objectives),
             lambda thoughts: parameters_prompt(parameters, objectives, thoughts, self.options.expects),
         )
