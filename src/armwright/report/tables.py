@@ -225,11 +225,12 @@ def _source_section(comparison: Comparison) -> str:
 def _proposer_section(comparison: Comparison) -> str:
     """Return the table of the proposals and their biases."""
     caption = (
-        "Means over the runs. Round: designs whose link lengths are all multiples of 5 cm. In plane: bases on a "
+        "Means over the runs. 5 cm, 1 cm: designs whose link lengths are all multiples of it. In plane: bases on a "
         "symmetry plane of the targets. Repeats: designs with the joint types of an earlier one and no number more "
         "than 1 mm from it. Equal neighbours: pairs of consecutive joints with one type. In brackets: the black box."
     )
-    head = ["task", "method", "proposals", "round", "in plane", "repeats", "equal neighbours", "calls", "USD"]
+    biases = ["5 cm", "1 cm", "in plane", "repeats", "equal neighbours"]
+    head = ["task", "method", "proposals", *biases, "calls", "USD"]
     rows = [
         [
             record["task"],
