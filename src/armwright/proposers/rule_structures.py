@@ -1,18 +1,37 @@
-"""Arm structures that a designer would try first, and their fit to a task and a space."""
+"""Arm structures that a designer would try, sized and placed by the targets."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.problem.problem import Problem
-from armwright.proposers.rule_geometry import affordable_length, needed_length, shoulder
+from armwright.proposers.rule_geometry import needed_length, shoulders
+from armwright.robot.arm import Vector
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 
-LONGEST = 10.0  # times the needed length; a bound in place of the torque budget
-SLACK = 0.03  # length [m] beyond the needed length
+SIZES = 24
+LONGEST, SLACK = 1.25, 0.05  # largest length: share of the needed length, and beyond it [m]
+FLAT = 0.1  # largest spread of targets in a plane, relative to the needed length
 SWAPPED_AXES = str.maketrans("RP", "PR")
+
+
+def any_targets(points: Array) -> bool:
+    """Return True: most structures suit all targets."""
+    return True
+
+
+def at_one_height(points: Array) -> bool:
+    """Return whether the targets (T, 3) lie in a level plane."""
+    return bool(points[:, 2].std() < FLAT * needed_length(points))
+
+
+def before_a_wall(points: Array) -> bool:
+    """Return whether the targets (T, 3) lie in a vertical plane across x."""
+    return bool(points[:, 0].std() < FLAT * needed_length(points))
 
 
 @dataclass(frozen=True)
@@ -21,116 +40,138 @@ class Structure:
 
     Attributes:
         name: for the reason of a proposal.
-        joints: for targets that spread more along x than along y; R and P are exchanged otherwise.
-        links: link lengths, relative to the reach.
-        offset: base relative to the shoulder, in reaches. A base below lets the arm, which starts upright, bring its
-            middle to the targets; a small sideways offset keeps targets off the line of the straight arm, along which
-            they cannot be approached.
-        share: reach, relative to the length that the torque budget allows.
+        joints: joint types, from the base.
+        links: link lengths, relative to the reach; 0 for the shortest that the space allows.
         why: for the reason of a proposal.
+        offset: base relative to the shoulder, in reaches. A base below lets the arm, which starts upright, bring its
+            middle to the targets.
+        shift: base relative to that [m]. A few centimetres or millimetres to the side decide towards which side the
+            first joint turns, and keep targets off the line of the straight arm, along which they cannot be approached.
+        suits: whether it is worth trying for targets (T, 3).
     """
 
     name: str
     joints: str
     links: tuple[float, ...]
-    offset: tuple[float, float, float]
-    share: float
     why: str
+    offset: Vector = (0.0, 0.0, 0.0)
+    shift: Vector = (0.0, 0.0, 0.0)
+    suits: Callable[[Array], bool] = any_targets
+
+    @property
+    def mirrored(self) -> "Structure":
+        """The structure with x and y exchanged, so that its first joint turns about the other axis."""
+        (x, y, z), (a, b, c) = self.offset, self.shift
+        return replace(self, joints=self.joints.translate(SWAPPED_AXES), offset=(y, x, z), shift=(b, a, c))
 
 
-# Orders that are known from practice (shoulder and elbow as in a human arm, SCARA, mast, the paper's own solutions),
-# with the lengths and offsets that a search found on random tasks (`random_task`, seeds 1000 to 1429) and on
-# grids, rings and boxes; in the order of what each adds to those before it.
-OPENING = (
+# The first five suit all targets. Their lengths and offsets were found by searches on random tasks (`random_task`,
+# seeds 1000 to 1499) and on grids, rings and boxes. The last three were read off the answers of a language model.
+STRUCTURES = (
     Structure(
-        "elbow", "RPYR", (0.07, 0.48, 0.14, 0.96), (-0.05, 0.01, -0.33), 0.34,
-        "universal shoulder amid the targets, half of the torque",
+        "upper-arm", "RPYP", (0.03, 0.40, 0.03, 0.55),
+        "shoulder without length, then upper arm and forearm",
+        offset=(-0.04, -0.03, -0.015),
     ),
     Structure(
-        "post", "RPRP", (0.28, 0.09, 0.26, 0.12), (-0.06, 0.10, -0.12), 0.14,
-        "nearly no lever: the least torque, from where the targets are nearest",
+        "elbow", "RPYR", (0.07, 0.48, 0.14, 0.96),
+        "universal shoulder below the targets, long forearm",
+        offset=(-0.05, 0.01, -0.33),
     ),
     Structure(
-        "two-arm", "PRPR", (0.13, 0.78, 0.80, 0.03), (-0.03, 0.04, -0.36), 0.51,
-        "shoulder and elbow in the other plane, two long links that fold",
-    ),
-    Structure(
-        "wrist", "RPRP", (0.04, 0.37, 0.55, 0.04), (-0.01, -0.05, -0.16), 0.34,
-        "universal shoulder and elbow, short links at both ends",
-    ),
-    Structure(
-        "forearm", "RPYR", (0.09, 0.39, 0.25, 0.78), (-0.05, 0.06, 0.01), 0.53,
+        "forearm", "RPYR", (0.09, 0.39, 0.25, 0.78),
         "universal shoulder at the targets' own centre, long forearm",
+        offset=(-0.05, 0.06, 0.01),
     ),
     Structure(
-        "mast", "YYYP", (0.36, 0.14, 0.16, 0.09), (0.0, 0.015, -1.04), 0.19,
+        "mast", "YYYP", (0.36, 0.14, 0.16, 0.09),
         "vertical axes, on which gravity has no torque, carry the tip up to the targets' centre",
+        offset=(0.0, 0.015, -1.04),
     ),
     Structure(
-        "long-arm", "RPYR", (0.05, 0.09, 0.18, 0.50), (-0.025, 0.0, -0.11), 1.63,
-        "all the reach that is needed or affordable",
+        "column", "YYYY", (0.25, 0.25, 0.25, 0.25),
+        "no torque at all: the tip stands still at the point that is nearest to all targets",
+        offset=(0.0, 0.0, -1.0),
     ),
+    # P turns level from a base at the targets' height, so the axes behind it stand vertical and carry nothing. The
+    # short third link folds the arm to the side.
     Structure(
-        "scara", "PRRR", (0.06, 0.45, 0.45, 0.12), (-0.05, 0.02, 0.01), 0.42,
+        "lying", "PRRR", (0.0, 0.38, 0.16, 0.46),
         "base at the targets' height; one P lays the arm down and the axes after it stand vertical",
+        shift=(0.03, 0.015, 0.0), suits=at_one_height,
+    ),
+    # Two short P reach beyond the limits of one, so the arm also turns upside down. R stands vertical for targets at
+    # the base's height, where P has no lever.
+    Structure(
+        "turnover", "PPRY", (0.0, 0.0, 0.5, 0.5),
+        "two short P turn the arm all the way round; R stands vertical at the height of the base",
+        shift=(-0.022, 0.0, -0.028), suits=before_a_wall,
+    ),
+    # A link that stands or hangs has no lever; only the arm behind it, which R holds out, has one.
+    Structure(
+        "pole", "PPRY", (0.0, 0.5, 0.25, 0.25),
+        "P turns a pole up or down, where it has no lever, and R holds an arm out at its end",
+        shift=(-0.003, 0.0, -0.04), suits=before_a_wall,
     ),
 )  # fmt: skip
 
 
-def fitted(structure: Structure, problem: Problem, torque: float) -> Design:
+def fitted(structure: Structure, problem: Problem, lengths: Array) -> list[Design]:
     """Size and place a structure for the problem's targets, within its space.
 
     Args:
         structure: type of arm.
         problem: gives targets and space.
-        torque: α-scaled budget; inf for none.
+        lengths: (N,) of the arms, all links together [m].
     """
-    space, points = problem.space, problem.task.target_positions
-    reach = sized(structure.share, problem, torque)
-    joints, offset = structure.joints, np.array(structure.offset)
-    if across(points):
-        joints, offset = joints.translate(SWAPPED_AXES), offset[[1, 0, 2]]
-    origin = shoulder(points, reach) + reach * offset
-    return space.clipped(
-        origin, adapted_joints(joints, space), reach * np.array(divided(structure.links, space.max_joints))
-    )
+    space = problem.space
+    reach = lengths / sum(structure.links)
+    origins = shoulders(problem.task.target_positions, reach) + reach[:, None] * structure.offset + structure.shift
+    joints, links = adapted(structure, space)
+    return [space.clipped(origin, joints, size * links) for origin, size in zip(origins, reach, strict=True)]
 
 
-def sized(share: float, problem: Problem, torque: float) -> float:
-    """Return a share of the reach [m] that the torque allows, limited to little more than the targets need."""
-    points = problem.task.target_positions
-    needed = needed_length(points)
-    affordable = share * affordable_length(problem.space, len(points), torque, LONGEST * (needed + SLACK))
-    return min(affordable, (0.6 + 0.5 * share) * needed + SLACK)
+def sizes(problem: Problem) -> Array:
+    """Return the lengths (N,) [m] to try, from the shortest arm to one that reaches all targets.
 
-
-def across(points: Array) -> bool:
-    """Return whether the targets spread more along y than along x.
-
-    If so, the first joint should turn about y: gravity on an arm stretched along that axis has no torque about it.
+    Error falls with the length and torque grows with its square, so that lengths at equal distances in the power 1.5
+    enclose equal areas between neighbours on a front.
     """
-    spread = points.std(axis=0)
-    return bool(spread[0] < spread[1])
+    longest = LONGEST * needed_length(problem.task.target_positions) + SLACK
+    shortest = min(problem.space.link[0] * problem.space.max_joints, longest)
+    return np.linspace(math.pow(shortest, 1.5), math.pow(longest, 1.5), SIZES) ** (2 / 3)
 
 
-def adapted_joints(joints: str, space: DesignSpace) -> str:
-    """Adapt joint types to a space: shorten or continue them to its number of joints, of the allowed types."""
+def fitted_structures(problem: Problem) -> Iterator[tuple[Structure, Design]]:
+    """Yield the structures that suit a problem, in both orientations and all sizes."""
+    points, lengths = problem.task.target_positions, sizes(problem)
+    for structure in STRUCTURES:
+        for oriented, seen in ((structure, points), (structure.mirrored, points[:, (1, 0, 2)])):
+            if structure.suits(seen):
+                for design in fitted(oriented, problem, lengths):
+                    yield structure, design
+
+
+def adapted(structure: Structure, space: DesignSpace) -> tuple[str, Array]:
+    """Return joints and relative links (D,) for a space's number of joints and its types.
+
+    A column of Y joints grows and shrinks at its base. Other arms gain idle Y joints at the end, and lose first their Y
+    joints, then their last ones.
+    """
+    joints, links = structure.joints, list(structure.links)
+    column = joints.startswith("Y")
+    while len(joints) > space.max_joints:
+        j = 0 if column else joints.rfind("Y")
+        joints = joints[:j] + joints[j + 1 :] if j >= 0 else joints[:-1]
+        k = max(j - 1, 0) if j >= 0 else len(links) - 2
+        links[k : k + 2] = [links[k] + links[k + 1]]
     while len(joints) < space.max_joints:
-        joints += joints[-2:].translate(SWAPPED_AXES)
-    return "".join(_allowed(kind, space) for kind in joints[: space.max_joints])
+        joints = "Y" + joints if column else joints + "Y"
+        k = 0 if column else len(links) - 1
+        links[k : k + 1] = [links[k] / 2] * 2
+    return "".join(_allowed(kind, space) for kind in joints), np.array(links)
 
 
 def _allowed(kind: str, space: DesignSpace) -> str:
     choices = (kind, kind.translate(SWAPPED_AXES))
     return next((choice for choice in choices if choice in space.joint_types), space.joint_types[-1])
-
-
-def divided(links: tuple[float, ...], n: int) -> list[float]:
-    """Divide the total length into `n` links by joining the last or halving the longest."""
-    parts = list(links)
-    while len(parts) > n:
-        parts[-2:] = [parts[-2] + parts[-1]]
-    while len(parts) < n:
-        longest = int(np.argmax(parts))
-        parts[longest : longest + 1] = [parts[longest] / 2] * 2
-    return parts

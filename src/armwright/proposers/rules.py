@@ -1,59 +1,28 @@
 """Rules that propose arms, without a model.
 
-They begin with the structures that a designer would try, sized and placed by geometry. Then they use the finished
-trials: they fill wide gaps of the front, change the axis of joints that hardly move, and shorten the links that load
-the joints most.
+They know the structures that a designer would try, and forecast the position error and torque of each in all sizes.
+They propose the one with the largest expected gain, and correct the forecasts by results. When changes to the designs
+of the front promise more, they fill its wide gaps, change the axis of joints that hardly move, and shorten the links
+that load the joints most.
 """
-
-import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from armwright.arrays import Array
-from armwright.problem.objectives import PAPER_OBJECTIVES, TORQUE
+from armwright.pareto import hypervolume
+from armwright.problem.objectives import PAPER_OBJECTIVES
+from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
-from armwright.proposers.rule_helpers import MIDDLE, change_until_new, draw_gap, proposal_id, rule_of
-from armwright.proposers.rule_structures import OPENING, fitted
-from armwright.runs.history import FrontMember, History
+from armwright.proposers.rule_candidates import Candidates, candidates
+from armwright.proposers.rule_feedback import RULES, describe, members_inside
+from armwright.proposers.rule_helpers import change_until_new, proposal_id, rule_of
+from armwright.runs.history import History
 from armwright.spaces.parameters import Design
 
-PULL = 0.1  # base displacement [m] if all targets are missed in one direction
-REACHED = 0.005  # error [m] below which a target no longer pulls the base
-BENT = 0.35  # mean angle [rad] above which a joint is bent
-TRIM = 0.8  # scale of a trimmed link
-LEAST_SCALE, MAX_SCALE = 0.4, 1.6
-# Prior gain of each rule, as a share of the hypervolume.
+STRUCTURE = "structure"
+# Prior gain of each rule that changes the front, as a share of the hypervolume.
 EXPECTED = {"fill": 0.01, "trim": 0.002, "swap": 0.002}
-
-
-@dataclass(frozen=True)
-class Gap:
-    """A step of the front between two neighbours.
-
-    Attributes:
-        area: hypervolume that an ideal design in the gap would add.
-        low: neighbour with the smaller position error; None at the edge of the reference box.
-        high: neighbour with the smaller torque; None at the edge of the reference box.
-        more: α-scaled torque of `low`.
-        less: α-scaled torque of `high`.
-    """
-
-    area: float
-    low: FrontMember | None
-    high: FrontMember | None
-    more: float
-    less: float
-
-    @property
-    def description(self) -> str:
-        """The neighbours, as text."""
-        if self.low is None:
-            return "the front's end of least position error"
-        if self.high is None:
-            return "the front's end of least torque"
-        return f"the front's gap between trials {self.low.number} and {self.high.number}"
+FIRST_SIZE, MORE_SIZES = 0.25, (0.1, 1.0)  # of structures without a forecast: share of smaller sizes
+SMALL = 1e-9
 
 
 class RulesProposer(Proposer):
@@ -61,33 +30,74 @@ class RulesProposer(Proposer):
 
     name = "rules"
 
+    def __init__(self) -> None:
+        self._known: tuple[Problem, Candidates] | None = None
+
     def propose(self, history: History, seed: int, number: int) -> Proposal:
-        """Propose the next structure of the opening, then apply the rule with the largest mean gain."""
+        """Propose what promises the largest gain: a structure in some size, or a change to the front."""
         rng = np.random.default_rng(seed)
-        earlier = sum(trial.source == self.name for trial in history.proposed)
-        inside = members_inside(history)
-        if earlier < len(OPENING) or not inside:
-            rule, (design, reason) = "open", open_with(history, earlier, rng)
+        structures, inside = self._candidates(history.problem), members_inside(history)
+        mean = mean_gains(history, self.name) if inside else {"": 0.0}
+        rule = max(mean, key=lambda rule: mean[rule])
+        row, gain = most_promising(structures, history)
+        opened = sum(t.source == self.name and rule_of(t.proposal) == STRUCTURE for t in history.proposed)
+        if gain <= mean[rule] and (not inside or (not can_forecast(history) and opened < len(structures.names))):
+            row, gain = next_structure(structures, opened, rng), np.inf
+        if gain > mean[rule]:
+            rule, design, reason = STRUCTURE, structures.designs[row], explain(structures, row)
         else:
-            rule = best_rule(history, self.name)
             design, reason = RULES[rule](history, inside, rng)
         return Proposal(distinct(design, history, rng), proposal_id(self.name, number, rule), reason)
 
-
-def bounds(history: History) -> tuple[float, ...]:
-    """Return the reference point; infinite if there is none."""
-    return history.reference_point or (np.inf,) * len(history.problem.objectives)
-
-
-def members_inside(history: History) -> list[FrontMember]:
-    """Return the front members inside the reference box, sorted by position error; none without a box."""
-    if history.reference_point is None:
-        return []
-    return [member for member in history.front if np.all(np.array(member.values) < bounds(history))]
+    def _candidates(self, problem: Problem) -> Candidates:
+        """Return the candidates for a problem, which are made once."""
+        if self._known is None or self._known[0] is not problem:
+            self._known = problem, candidates(problem)
+        return self._known[1]
 
 
-def best_rule(history: History, name: str) -> str:
-    """Return the rule with the largest mean hypervolume gain, its prior gain included."""
+def can_forecast(history: History) -> bool:
+    """Return whether the first objectives are position error and torque, and their bounds are known."""
+    return history.problem.objectives[:2] == PAPER_OBJECTIVES and history.reference_point is not None
+
+
+def most_promising(structures: Candidates, history: History) -> tuple[int, float]:
+    """Return the row of the candidate with the largest expected gain, and this gain in hypervolume; 0 if unknown.
+
+    With further objectives, the hypervolume is taken to grow in proportion to the area of the first two.
+    """
+    if not can_forecast(history) or history.reference_point is None:
+        return 0, 0.0
+    expected = structures.expected_gains(history)
+    row = int(np.argmax(expected))
+    gain = float(expected[row])
+    if len(history.reference_point) > 2 and len(history):
+        area = hypervolume(history.masked_objectives[:, :2], history.reference_point[:2])
+        gain *= float(history.hypervolumes[-1]) / max(area, SMALL)
+    return row, gain
+
+
+def next_structure(structures: Candidates, opened: int, rng: np.random.Generator) -> int:
+    """Return the row of the next structure, small at first and then of random size, in its lighter orientation."""
+    name = structures.names[opened % len(structures.names)]
+    rows = np.array([row for row, structure in enumerate(structures.structures) if structure.name == name])
+    share = FIRST_SIZE if opened < len(structures.names) else float(rng.uniform(*MORE_SIZES))
+    lengths = structures.forecast.length[rows]
+    distance = np.abs(lengths - np.quantile(lengths, share))
+    return int(rows[np.lexsort((structures.forecast.torque[rows], distance.round(9)))[0]])
+
+
+def explain(structures: Candidates, row: int) -> str:
+    """Return the reason for a candidate."""
+    structure, found = structures.structures[row], structures.forecast
+    return (
+        f"{structure.name}: {structure.why}; {describe(structures.designs[row])}; "
+        f"forecast: error {found.error[row]:.2f} m, torque {found.torque[row]:.2f}"
+    )
+
+
+def mean_gains(history: History, name: str) -> dict[str, float]:
+    """Return the mean hypervolume gain of each rule that changes the front, its prior gain included."""
     volume = history.hypervolumes
     gain = np.diff(volume, prepend=0.0)
     added = {rule: [expected * float(volume[-1])] for rule, expected in EXPECTED.items()}
@@ -99,125 +109,7 @@ def best_rule(history: History, name: str) -> str:
         del added["swap"]  # no other axis
     if history.problem.objectives != PAPER_OBJECTIVES:
         del added["fill"]  # it reads the front as position error against torque
-    return max(added, key=lambda rule: float(np.mean(added[rule])))
-
-
-def open_with(history: History, earlier: int, rng: np.random.Generator) -> tuple[Design, str]:
-    """Return a structure of the opening; from the second round on, in a random size."""
-    structure = OPENING[earlier % len(OPENING)]
-    torque = dict(zip(history.problem.objectives, bounds(history), strict=True)).get(TORQUE, np.inf)
-    if earlier >= len(OPENING):
-        torque *= rng.uniform(0.1, 1.0) ** 2
-    design = fitted(structure, history.problem, torque)
-    return design, f"{structure.name}: {structure.why}; {describe(design)}"
-
-
-def fill(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
-    """Return a design for the middle of a wide gap of the front.
-
-    Neighbours with equal joints are interpolated. Otherwise one neighbour is scaled, since torque grows with the square
-    of the length, and its base is moved towards the targets that it misses.
-    """
-    gap = wide_gap(inside, bounds(history), rng)
-    share = float(rng.uniform(*MIDDLE))
-    low, high = gap.low, gap.high
-    if low is not None and high is not None and low.design.joints == high.design.joints:
-        design = between(low.design, high.design, share, history)
-        return design, f"fills {gap.description}: between the two; {describe(design)}"
-    sides = [side for side in (low, high) if side is not None]
-    side = sides[int(rng.integers(len(sides)))]
-    torque = share * gap.more + (1.0 - share) * gap.less
-    scale = float(np.clip(np.sqrt(torque / max(side.values[1], 1e-9)), LEAST_SCALE, MAX_SCALE))
-    design = scaled(history, side, scale)
-    return design, f"fills {gap.description}: trial {side.number} at {scale:.2f} of its size; {describe(design)}"
-
-
-def trim(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
-    """Shorten the link of a front member that loads the joints most: length times torque of the joints before it."""
-    member = inside[int(rng.integers(len(inside)))]
-    carried = by_module(history, member, np.abs(history.evaluation([member.number]).motor_torques[0]).mean(axis=0))
-    links = np.array(member.design.links)
-    j = int(np.argmax(links * np.cumsum(carried)))
-    links[j] *= TRIM
-    space = history.problem.space
-    design = space.clipped(pulled_origin(history, member), member.design.joints, links, member.design)
-    return design, f"trims link {j + 1} of trial {member.number}, which weighs most on its joints; {describe(design)}"
-
-
-def swap(history: History, inside: list[FrontMember], rng: np.random.Generator) -> tuple[Design, str]:
-    """Change the axis of the least used joint of a front member, often to Y, which carries no gravity torque."""
-    member = inside[int(rng.integers(len(inside)))]
-    angles = history.evaluation([member.number]).q[0]  # (T, D) [rad]
-    j = int(np.argmin(by_module(history, member, np.ptp(angles, axis=0))))
-    joints, types = member.design.joints, history.problem.space.joint_types
-    others = [kind for kind in types if kind != joints[j]] or [joints[j]]
-    other = "Y" if "Y" in others and rng.random() < 0.5 else others[int(rng.integers(len(others)))]
-    design = history.problem.space.clipped(
-        pulled_origin(history, member), joints[:j] + other + joints[j + 1 :], member.design.links, member.design
-    )
-    return design, f"turns joint {j + 1} of trial {member.number}, the least used, into {other}; {describe(design)}"
-
-
-Rule = Callable[[History, list[FrontMember], np.random.Generator], tuple[Design, str]]
-RULES: dict[str, Rule] = {"fill": fill, "trim": trim, "swap": swap}
-
-
-def wide_gap(inside: list[FrontMember], reference_point: tuple[float, ...], rng: np.random.Generator) -> Gap:
-    """Draw a step of the front by its area, including the steps at the edges of the reference box."""
-    sides: list[FrontMember | None] = [None, *inside, None]
-    corners = [(0.0, reference_point[1]), *((m.values[0], m.values[1]) for m in inside), (reference_point[0], 0.0)]
-    gaps: list[Gap] = []
-    for k, ((error, torque), (more_error, less_torque)) in enumerate(itertools.pairwise(corners)):
-        area = (more_error - error) * (torque - less_torque)
-        gaps.append(Gap(area, sides[k], sides[k + 1], torque, less_torque))
-    return gaps[draw_gap([gap.area for gap in gaps], rng)]
-
-
-def between(a: Design, b: Design, share: float, history: History) -> Design:
-    """Interpolate from `b` (share 0) to `a` (1), two designs with equal joints."""
-    origin, links = (
-        share * np.array(u) + (1.0 - share) * np.array(v) for u, v in ((a.origin, b.origin), (a.links, b.links))
-    )
-    return history.problem.space.clipped(origin, a.joints, links, a)
-
-
-def scaled(history: History, member: FrontMember, scale: float) -> Design:
-    """Return the member with its links scaled about the shoulder and its base moved towards missed targets."""
-    angles = by_module(history, member, np.abs(history.evaluation([member.number]).q[0]).mean(axis=0))
-    height = upright_height(member.design, angles)
-    origin = pulled_origin(history, member) + np.array([0.0, 0.0, (1.0 - scale) * height])
-    links = scale * np.array(member.design.links)
-    return history.problem.space.clipped(origin, member.design.joints, links, member.design)
-
-
-def by_module(history: History, member: FrontMember, values: Array) -> Array:
-    """Return the maximum (M,) of the joint values (J,) over the joints of each module."""
-    modules = np.array(member.design.module_of_joint)
-    return np.array([values[: len(modules)][modules == m].max() for m in range(len(member.design.joints))])
-
-
-def upright_height(design: Design, angles: Array) -> float:
-    """Return the height [m] of the links that stay upright, up to the first bent R or P joint.
-
-    Args:
-        design: the arm.
-        angles: (M,) mean absolute joint angles [rad].
-    """
-    height = 0.0
-    for kind, bend, link in zip(design.joints, angles, design.links, strict=True):
-        if kind != "Y" and bend > BENT:
-            break
-        height += link
-    return height
-
-
-def pulled_origin(history: History, member: FrontMember) -> Array:
-    """Return the base (3,) [m], moved along the mean direction to missed targets: a step of gradient descent."""
-    evaluation = history.evaluation([member.number])
-    miss = evaluation.targets - evaluation.reached[0]  # (T, 3)
-    error = evaluation.position_error[0][:, None]  # (T, 1)
-    direction = np.where(error > REACHED, miss / np.maximum(error, REACHED), 0.0)
-    return np.array(member.design.origin) + PULL * direction.mean(axis=0)
+    return {rule: float(np.mean(gains)) for rule, gains in added.items()}
 
 
 def distinct(design: Design, history: History, rng: np.random.Generator) -> Design:
@@ -229,9 +121,3 @@ def distinct(design: Design, history: History, rng: np.random.Generator) -> Desi
         return history.problem.space.clipped(origin, design.joints, links, design)
 
     return change_until_new(design, history.has_tried, changed)
-
-
-def describe(design: Design) -> str:
-    """Describe joints, total length and base."""
-    x, y, z = design.origin
-    return f"{design.joints}, {sum(design.links):.2f} m long, base at ({x:.2f}, {y:.2f}, {z:.2f}) m"
