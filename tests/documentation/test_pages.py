@@ -48,7 +48,7 @@ NOT_RUN = {
     r"python benchmarks/.*": "half an hour of benchmark; docs/benchmarks.md has the figures",
 }
 # Experiments of minutes to hours: run with --print-commands, so that all of their cells are made and none is run.
-LONG = re.compile(r"armwright experiment (paper|rules|suite|mine\.yaml|examples/\S+)( --model \S+)?")
+LONG = re.compile(r"armwright experiment (paper|recorded|rules|n-step|samplers|suite|mine\.yaml)( --model \S+)?")
 # Pages whose programs are run elsewhere, where what comes of them is looked at, too.
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 
@@ -269,7 +269,7 @@ def test_files_shown_on_a_page_load(block: Block, in_folder: Path) -> None:
         file.write_text(block.text)
         plan, beside = load_experiment("shown.yaml")
         cells, skipped = plan_cells(plan, beside, in_folder / "out")
-        assert len(cells) + len(skipped) == len(plan.methods) * len(plan.task_list) * len(plan.seed_list)
+        assert len(cells) + len(skipped) == len(plan.task_list) * sum(len(plan.seeds_of(key)) for key in plan.methods)
     elif content.keys() <= aw.ModelOptions.model_fields.keys():
         file.write_text(block.text)
         assert load_model_options("shown.yaml").given == content
@@ -300,4 +300,6 @@ def test_keys_of_an_experiment_method_are_options() -> None:
     assert set(ExperimentPlan.model_fields["methods"].annotation.__args__[1].model_fields) <= options | {
         "label",
         "design",
+        "seeds",
+        "against",
     }  # type: ignore[union-attr]
