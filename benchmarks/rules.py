@@ -36,13 +36,13 @@ class SobolProposer(Proposer):
     def __init__(self, run_seed: int) -> None:
         self._run_seed = run_seed
 
-    def propose(self, history: History, seed: int) -> Proposal:
+    def propose(self, history: History, seed: int, number: int) -> Proposal:
         space = history.problem.space
         earlier = sum(trial.source == self.name for trial in history)
         sequence = qmc.Sobol(len(space.parameters), scramble=True, rng=np.random.default_rng(self._run_seed))
         if earlier:
             sequence.fast_forward(earlier)
-        return Proposal(space.design(parameters(space, sequence.random(1)[0])), f"sobol-{len(history):04d}")
+        return Proposal(space.design(parameters(space, sequence.random(1)[0])), f"sobol-{number:04d}")
 
 
 def parameters(space: DesignSpace, point: np.ndarray) -> dict[str, ParameterValue]:
