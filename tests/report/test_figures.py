@@ -7,6 +7,7 @@ import pytest
 from armwright.exceptions import RunFolderError
 from armwright.problem.problem import Problem
 from armwright.report.figures import chosen_members, draw_attribution, draw_hypervolume, draw_samples, write_figures
+from armwright.report.style import line
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task, random_task
@@ -96,3 +97,8 @@ def test_figures_without_all_random_trials_are_refused(tmp_path: Path) -> None:
         optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path, watch=stop)
     with pytest.raises(RunFolderError, match="has only 2 so far"):
         write_figures(tmp_path)
+
+
+def test_lines_of_many_methods_differ() -> None:
+    lines = [line(number) for number in range(40)]
+    assert len({(each.colour, each.pattern) for each in lines}) == len(lines)

@@ -99,5 +99,7 @@ _LINES = (
 
 
 def line(number: int) -> Line:
-    """Return the style of the method with this number; styles repeat after seven."""
-    return _LINES[number % len(_LINES)]
+    """Return the style of the method with this number: after seven, each colour comes with another pattern."""
+    turn, place = divmod(number, len(_LINES))
+    shape = _LINES[(place + 3 * turn) % len(_LINES)]
+    return Line(_LINES[place].colour, shape.pattern, shape.marker)
