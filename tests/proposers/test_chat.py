@@ -176,7 +176,7 @@ def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_pat
     assert users[6] == [first, asked[3], asked[4], asked[5]]
     notes = [progress.note for progress in seen if "chat exceeds" in progress.note]
     assert notes == [
-        "the chat exceeds the context of test-model: the oldest 2 turns were dropped, except the first; so will others"
+        "the chat exceeds the context of test-model; turns dropped so far, from the oldest after the first: 2"
     ]
     assert result.summary["proposer"]["call_failures"] == {"context": 3}
     assert result.summary["proposer"]["failures"] == {}
@@ -188,6 +188,14 @@ def test_oldest_turns_are_dropped_beyond_the_context(server: ChatServer, tmp_pat
     assert again.summary["proposer"]["calls"] == result.summary["proposer"]["calls"]
     played = Transcript(tmp_path / "again" / "transcripts.jsonl").calls
     assert [(call.prompt, call.fault) for call in played] == [(call.prompt, call.fault) for call in calls]
+
+
+def test_transcript_alone_is_replayed_as_a_chat(server: ChatServer, tmp_path: Path) -> None:
+    first = run(chat(server), tmp_path / "run")
+    alone = tmp_path / "alone.jsonl"
+    (tmp_path / "run" / "transcripts.jsonl").rename(alone)
+    again = run(ReplayProposer(alone, strict=True, options=PromptOptions(memory="chat")))
+    assert [trial.values for trial in again.trials] == [trial.values for trial in first.trials]
 
 
 def test_dropping_stays_within_the_requests_of_a_question(server: ChatServer, tmp_path: Path) -> None:

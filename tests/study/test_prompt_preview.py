@@ -100,7 +100,7 @@ def test_options_override_those_of_the_run(chat_server: ChatServer, in_folder: P
     told = shown("--after", "run")[0]
     assert "Step 1" not in told
     assert "Your earlier proposals" in told
-    told = shown("--after", "run", "--prompt", "plus", *model_options(memory="none", proposals=2))[0]
+    told = shown("--after", "run", "--prompt", "plus", "--memory", "none", *model_options(proposals=2))[0]
     assert "Step 1" in told
     assert "Your earlier proposals" not in told
     assert "2 new designs" in told

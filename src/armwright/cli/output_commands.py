@@ -127,11 +127,14 @@ def prompt(
         str | None,
         typer.Option(help="Prompt: plus, minus, full, or a template file.", show_default="the run's, else plus"),
     ] = None,
+    memory: Annotated[
+        str | None, typer.Option(help="Memory: none, own or chat.", show_default="the run's, else none")
+    ] = None,
     model_options: Annotated[
         str | None,
         typer.Option(
             metavar="FILE",
-            help="memory, answer and proposals, in a YAML file or in place, such as '{memory: own}'.",
+            help="answer, proposals and others, in a YAML file or in place, such as '{proposals: 2}'.",
             show_default="the run's",
         ),
     ] = None,
@@ -157,7 +160,7 @@ def prompt(
     if template:
         print(whole_template(prompt or "plus"), end="")
         return
-    options = load_model_options(model_options, prompt=prompt)
+    options = load_model_options(model_options, prompt=prompt, memory=memory)
     if after is None:
         if task is None:
             raise SettingsError("expected a TASK, --after RUN, --template or --variables")

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from armwright.exceptions import MissingExtraError, SettingsError, UsageError
@@ -153,7 +153,7 @@ class ModelClient(LlmBackend):
     def _check(self, mode: str) -> Reply:
         agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, _CHECK_SCHEMA), retries=0)
         try:
-            return self._run(agent, CHECK, None, CHECK_SECONDS)
+            return self._run(agent, CHECK, CHECK_SECONDS)
         except CallError as fault:
             if fault.kind == "answer" and fault.reply.answer.strip():  # of another form, but the model is there
                 return fault.reply
@@ -161,17 +161,18 @@ class ModelClient(LlmBackend):
 
     def _in_accepted_mode(self, ask: Callable[[str], Reply]) -> Reply:
         """Ask in the first output mode that the server accepts, which is used from then on."""
-        for mode in self._modes:
+        *preferred, mode = self._modes
+        for preference in preferred:
             try:
-                reply = ask(mode)
+                reply, mode = ask(preference), preference
+                break
             except CallError as fault:
-                is_refusal = not fault.reply.requests and may_refuse_output(fault.kind, str(fault))
-                if mode == self._modes[-1] or not is_refusal:
+                if fault.reply.requests or not may_refuse_output(fault.kind, str(fault)):
                     raise
-            else:
-                self._modes = (mode,)
-                return replace(reply, output_mode=mode)
-        raise AssertionError("there is no output mode")
+        else:
+            reply = ask(mode)
+        self._modes = (mode,)
+        return replace(reply, output_mode=mode)
 
     def ask(
         self,
@@ -181,21 +182,15 @@ class ModelClient(LlmBackend):
         earlier: Sequence[Turn] | None = None,
     ) -> Reply:
         """Return the answer to a prompt; refusals of its output format are sent back to the model."""
+        run = partial(self._run, question=question, seconds=self.timeout, most_requests=most_requests, earlier=earlier)
         if output is not None:
-            return self._in_accepted_mode(lambda mode: self._ask_for(question, output, mode, most_requests, earlier))
-        reply = self._run(Agent(self._model, retries=REASKS), question, most_requests, self.timeout, earlier)
+            return self._in_accepted_mode(lambda mode: self._ask_for(output, mode, run))
+        reply = run(Agent(self._model, retries=REASKS))
         if not reply.answer.strip():
             raise CallError("answer", f"{self.model} gave an empty answer", reply)
         return reply
 
-    def _ask_for(
-        self,
-        question: Question,
-        output: OutputFormat,
-        mode: str,
-        most_requests: int | None,
-        earlier: Sequence[Turn] | None,
-    ) -> Reply:
+    def _ask_for(self, output: OutputFormat, mode: str, run: Callable[[Agent[None, Any]], Reply]) -> Reply:
         accepted: list[str] = []
         refusals: list[str] = []
 
@@ -211,7 +206,7 @@ class ModelClient(LlmBackend):
         agent: Agent[None, Any] = Agent(self._model, output_type=_output_type(mode, output.schema), retries=REASKS)
         agent.output_validator(accept)
         try:
-            reply = self._run(agent, question, most_requests, self.timeout, earlier)
+            reply = run(agent)
         except CallError as fault:
             if fault.kind != "limit" or not refusals:
                 raise
@@ -229,8 +224,8 @@ class ModelClient(LlmBackend):
         self,
         agent: Agent[None, Any],
         question: Question,
-        most_requests: int | None,
         seconds: float,
+        most_requests: int | None = None,
         earlier: Sequence[Turn] | None = None,
     ) -> Reply:
         started = time.perf_counter()

@@ -139,10 +139,9 @@ class PromptedProposer(LlmSession, Proposer):
         self._told_dropped = self._told_dropped or n_dropped > 0
         if not n_dropped:
             return ""
-        turns = "turn was" if n_dropped == 1 else f"{n_dropped} turns were"
         return (
-            f"the chat exceeds the context of {self.backend.model}: the oldest {turns} dropped, except the first; "
-            "so will others"
+            f"the chat exceeds the context of {self.backend.model}; turns dropped so far, from the oldest after the "
+            f"first: {n_dropped}"
         )
 
     def output_format(self, problem: Problem) -> OutputFormat:
