@@ -2,7 +2,7 @@
 
     python benchmarks/rules.py [--tasks 30] [--seeds 5] [--first-task 0] [--jobs 2]
 
-The structures and constants of the rules were chosen on random tasks 1000 to 1429; the tasks here are others.
+The structures and constants of the rules were chosen on random tasks from 1000 on; the tasks here are others.
 The figure is the hypervolume, averaged over the counted iterations of a run; a task's ratio divides the means
 over its seeds. Intervals: 95 %, bootstrap over the tasks.
 """

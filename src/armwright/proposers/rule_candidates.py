@@ -61,8 +61,8 @@ class Candidates:
             alike = names == name
             values[alike] = self._corrected(values[alike], np.flatnonzero(alike), own)
             feasible[alike] = (1 + sum(history.feasible[trial.number] for _, trial in own)) / (1 + len(own))
-        found = history.masked_objectives[:, :2]
-        expected = feasible * gains(found[front_mask(found)], values, history.reference_point[:2])
+        front = np.array([member.values[:2] for member in history.front]).reshape(-1, 2)
+        expected = feasible * gains(front[front_mask(front)], values, history.reference_point[:2])
         expected[[row for row, _ in results]] = 0.0
         return expected
 

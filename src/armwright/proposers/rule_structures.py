@@ -65,8 +65,9 @@ class Structure:
         return replace(self, joints=self.joints.translate(SWAPPED_AXES), offset=(y, x, z), shift=(b, a, c))
 
 
-# The first five suit all targets. Their lengths and offsets were found by searches on random tasks (`random_task`,
-# seeds 1000 to 1499) and on grids, rings and boxes. The last three were read off the answers of a language model.
+# The first five suit all targets. The lengths and offsets of the first four were found by searches on random tasks
+# (`random_task`, seeds from 1000 on) and on grids, rings and boxes. The last four were read off the answers of a
+# language model.
 STRUCTURES = (
     Structure(
         "upper-arm", "RPYP", (0.03, 0.40, 0.03, 0.55),
