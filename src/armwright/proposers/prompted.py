@@ -63,6 +63,7 @@ class PromptedProposer(LlmSession, Proposer):
         """Open the run's transcript and hints."""
         self._begin(None if folder is None else folder / TRANSCRIPTS)
         self._hints = Hints(folder)
+        self._told_dropped = False
 
     def open_read_only(self, folder: Path) -> None:
         """Open the transcript and hints of a run without changing them."""
