@@ -33,8 +33,7 @@ SamplerFactory = Callable[[int], BaseSampler]
 # to -3, three seeds each:
 #
 #   population            5    10    20    30    50   (TPE)
-#   black box alone    10.3  10.4   8.8   9.8   8.7    12.0
-#   with the rules     14.7  14.7  14.7  14.5  14.5    14.7
+#   without proposals  10.3  10.4   8.8   9.8   8.7    12.0
 #
 # Three seeds separate 10 from 50, but not from 5.
 POPULATION = 10
