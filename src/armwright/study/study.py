@@ -196,8 +196,7 @@ class Study:
             self._report("beginning", len(self._trials), self._proposer.name, note=forecast)
         self._channel.report("asking", len(self._trials))
         try:
-            note = self._proposer.check()
-            if note:
+            if note := self._proposer.check():
                 self._report("beginning", len(self._trials), self._proposer.name, note=note)
         except ModelError as fault:
             if on_model_failure == "stop" and not self._trials:
