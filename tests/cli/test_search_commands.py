@@ -22,7 +22,7 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     assert summary["search"]["evaluations"] >= 4000
     assert summary["folder"] == "runs/target-1-design-seed4"
 
-    armwright("optimize", "target-1", *SHORT, "--out", "mine")
+    armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine")
     refined = armwright("refine", "mine", "--evaluations", "120")
     assert refined.returncode == 0, refined.stderr
     assert "improved designs" in refined.stdout
@@ -31,7 +31,7 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     refined_summary = json.loads((in_folder / "mine" / "summary.json").read_text())
     record = refined_summary["verification"]
     assert record["robust"] + record["sensitive"] == refined_summary["front_size"]
-    again = armwright("optimize", "target-1", *SHORT, "--out", "mine")
+    again = armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine")
     assert "is finished; nothing was computed again" in again.stdout
 
     from_run = armwright("design", "target-1", "--budget", "300", "--from", "mine", "--no-figures", "--out", "from-run")

@@ -7,6 +7,7 @@ import sys
 import warnings
 from pathlib import Path
 
+import mujoco  # noqa: F401 (here, since its window library starts a process, which no fast test may)
 import pytest
 from typer.testing import CliRunner
 
