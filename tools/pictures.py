@@ -60,9 +60,9 @@ def report(folder: Path, page: Page, file: Path) -> None:
 
 def dark_report(folder: Path, page: Page, file: Path) -> None:
     """Compare two designs in the dark theme."""
-    open_report(page, target_2(folder), (1280, 800), "#design=50", dark=True)
+    open_report(page, target_2(folder), (1280, 800), "#design=120", dark=True)
     page.locator("#compare").click()
-    page.goto(page.url.partition("#")[0] + "#design=101")
+    page.goto(page.url.partition("#")[0] + "#design=140")
     page.wait_for_timeout(1000)
     page.screenshot(path=file)
 
@@ -106,7 +106,7 @@ def arm_of(task: str, space: str, search: tuple[object, ...], at: str) -> Shot:
 
 
 def arms(folder: Path, page: Page, file: Path) -> None:
-    """Show four designs of one run."""
+    """Show the designs of one run that its figure arms.png picks."""
     shutil.copy(target_2(folder) / "figures/arms.png", file)
 
 
@@ -147,7 +147,7 @@ PICTURES: dict[str, Shot] = {
         "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", ("design", "--budget", 60000), "#design=3&target=9"
     ),
     "example-obstacles.png": arm_of(
-        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", ("optimize",), "#design=111&target=3"
+        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", ("optimize",), "#design=78&target=3"
     ),
     "dashboard.png": dashboard,
 }

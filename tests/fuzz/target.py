@@ -87,10 +87,12 @@ def file_of(data: bytes, name: str) -> Path:
     return path
 
 
-def shipped(place: str) -> list[bytes]:
-    """Return YAML files of the package."""
-    found = (resources.files("armwright") / place).iterdir()
-    return [file.read_bytes() for file in sorted(found, key=lambda file: file.name) if file.name.endswith(".yaml")]
+def shipped(room: str) -> list[bytes]:
+    """Return the YAML files in the folder `builtin` of a subpackage."""
+    files = (resources.files("armwright") / room / "builtin").iterdir()
+    found = [file.read_bytes() for file in sorted(files, key=lambda file: file.name) if file.name.endswith(".yaml")]
+    assert found, room
+    return found
 
 
 def of_examples(part: str) -> list[bytes]:

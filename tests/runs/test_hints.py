@@ -11,7 +11,7 @@ import pytest
 from armwright.exceptions import AnswerPendingError
 from armwright.llm import client as chat
 from armwright.llm.model_options import PromptOptions
-from armwright.llm.prompt import Prompt, load_prompt, whole_template
+from armwright.llm.prompt import PROMPTS, Prompt, load_prompt, whole_template
 from armwright.llm.transcript import hints_of, used_hints
 from armwright.proposers.manual import ManualProposer
 from armwright.proposers.replay import ReplayProposer
@@ -200,6 +200,12 @@ def test_extended_template_places_hints_as_the_builtin_one() -> None:
         assert text.index(NOTE) < text.index("End your answer")
     emptied = Prompt("own", '{% extends "proposal.md.j2" %}{% block hints %}{% endblock %}')
     assert emptied.render(history, 3, hints=["first"]).endswith(f"\n\n{NOTE}first\n")
+
+
+@pytest.mark.parametrize("name", PROMPTS)
+def test_whole_template_renders_the_built_in_prompt(name: str) -> None:
+    history = fixed_history(PAPER)
+    assert Prompt("own", whole_template(name)).render(history, 3) == load_prompt(name).render(history, 3)
 
 
 def test_template_may_place_hints_itself() -> None:
