@@ -165,7 +165,10 @@ def start_seeds() -> list[bytes]:
 def actuator_seeds() -> list[bytes]:
     record = {"name": "mine", "maker": "me", "kind": "servo", "voltage": 12.0, "mass": 0.3, "stall_torque": 6.0,
               "rated_torque": 2.0, "peak_torque": 7.0, "speed": 5.0, "width": 0.03, "height": 0.05, "depth": 0.04,
-              "price": 120.0, "source": "https://example.org", "note": "so"}  # fmt: skip
+              "price": 120.0, "source": "https://example.org", "note": "so",
+              "corner_speed": 1.0, "gear_ratio": 200.0, "rotor_inertia": 0.01, "coulomb_friction": 0.1,
+              "viscous_friction": 0.05, "backlash": 0.004, "position_gain": 20.0, "damping_gain": 1.0, "current": 2.5,
+              "estimates": ["rotor_inertia"]}  # fmt: skip
     spaces = [
         {"name": "a", "actuators": [record], "actuator_torque": kind, "safety_factor": 2.0}
         for kind in ("stall", "rated", "peak")

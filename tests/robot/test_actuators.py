@@ -17,7 +17,7 @@ from armwright.kinematics.arm_arrays import FLOATS, stack_arms
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import named_objectives
 from armwright.problem.problem import Problem
-from armwright.robot.actuators import ActuatorRecord, catalogue
+from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue, catalogue_sources
 from armwright.robot.arm import Actuator, Arm, Joint, Link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
@@ -26,6 +26,7 @@ from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, load_space
 from armwright.study.study import optimize
 from armwright.tasks.task import Task
+from tests import ROOT
 
 BIG = {"name": "big", "mass": 0.165, "stall_torque": 10.6, "rated_torque": 4.0, "speed": 3.1, "price": 400.0}
 MID = {"name": "mid", "mass": 0.082, "stall_torque": 4.1, "price": 250.0}
@@ -117,6 +118,10 @@ def test_single_actuator_is_not_a_parameter() -> None:
         ({"actuators": [BIG, dict(BIG)]}, "actuators has duplicates"),
         ({"actuators": [MID], "actuator_torque": "rated"}, "mid has no rated torque, its stall torque is known"),
         ({"actuators": [{"name": "x", "mass": -1.0}]}, "mass"),
+        ({"actuators": [{"name": "x", "mass": 1.0}]}, "actuator x states no torque; give stall_torque"),
+        ({"actuators": [MID | {"kind": "hydraulic"}]}, "kind"),
+        ({"actuators": [BIG | {"corner_speed": 4.0}]}, "corner_speed is above the no-load speed of 3.1 rad/s"),
+        ({"actuators": [MID | {"estimates": ["speed"]}]}, "estimates names speed, which has no value"),
         ({"actuators": "XM430-W350"}, "expected a list of names"),
         ({"actuators": [MID], "safety_factor": 0.0}, "safety_factor"),
     ],
@@ -153,6 +158,64 @@ def test_catalogue_names_a_source_for_each_actuator() -> None:
         assert any((record.stall_torque, record.rated_torque, record.peak_torque)), name
     assert records["XM430-W350"].stall_torque == 4.1
     assert records["XM430-W350"].mass == 0.082
+
+
+def test_catalogue_states_a_source_for_each_value_of_its_drives() -> None:
+    own = ("gear_ratio", "rotor_inertia", "coulomb_friction", "viscous_friction", "corner_speed", "backlash",
+           "position_gain", "damping_gain", "current")  # fmt: skip
+    for name, record in catalogue().items():
+        sources = catalogue_sources()[name]
+        stated = {key for key in own if getattr(record, key) is not None}
+        assert stated <= sources.keys(), name
+        assert all(source.address.startswith("https://") and source.statement for source in sources.values()), name
+
+
+def test_catalogue_completes_every_actuator_and_counts_assumed_values() -> None:
+    records = catalogue().values()
+    for record in records:
+        completed = record.completed()
+        values = [getattr(completed, name) for name in UNITS if name not in ("stall_torque", "gear_ratio", "price")]
+        assert all(value is not None for value in values[:-3]), record.name  # sizes may be missing
+        stated = [name for name in UNITS if getattr(record, name) is not None and name not in record.estimates]
+        assert not set(stated) & set(record.assumed)
+        assert completed.rated_torque <= completed.peak_torque, record.name
+        assert 0.0 <= completed.corner_speed < completed.speed, record.name
+        friction = completed.coulomb_friction + completed.viscous_friction * completed.speed
+        assert friction < completed.peak_torque, record.name  # else it would not reach its no-load speed
+    n_values = sum(getattr(record.completed(), name) is not None for record in records for name in UNITS)
+    n_assumed = sum(len(record.assumed) for record in records)
+    n_estimates = sum(len(record.estimates) for record in records)
+    guide = (ROOT / "docs" / "spaces.md").read_text(encoding="utf-8")
+    assert f"{n_assumed} of the catalogue's {n_values} values are assumed" in guide
+    assert f"{n_assumed - n_estimates} defaults and {n_estimates} estimates" in guide
+
+
+def test_defaults_are_ratios_of_the_reference_torque() -> None:
+    record = ActuatorRecord(name="x", mass=0.1, stall_torque=4.0, speed=5.0, voltage=12.0, backlash=0.01)
+    completed = record.completed()
+    assert (completed.peak_torque, completed.rated_torque, completed.corner_speed) == (4.0, 1.0, 0.0)
+    assert completed.rotor_inertia == pytest.approx(0.047 * 4.0 / 5.0)
+    assert completed.damping_gain == pytest.approx(4.0 / 5.0)
+    assert completed.current == pytest.approx(1.6 * 4.0 * 5.0 / 12.0)
+    assert not {"backlash", "stall_torque", "peak_torque"} & set(record.assumed)
+    assert "rotor_inertia" in record.assumed
+    rated = ActuatorRecord(name="x", mass=0.1, kind="geared drive", rated_torque=4.0)
+    assert rated.completed().peak_torque == 4.0
+    assert rated.completed().coulomb_friction == pytest.approx(0.07 * 8.0)
+    assert rated.completed().rotor_inertia is None  # needs the speed
+    assert "peak_torque" in rated.assumed
+
+
+def test_command_lists_the_sources_of_an_actuator() -> None:
+    runner = CliRunner()
+    shown = runner.invoke(app, ["actuators", "XL330-M288"], env={"COLUMNS": "300"}).output
+    assert "https://github.com/Rhoban/bam" in shown
+    assert "assumed: default of a servo" in shown
+    listed = json.loads(runner.invoke(app, ["actuators", "STS3215-12V", "--json"]).output)
+    assert "rotor_inertia" in listed[0]["assumed"]
+    assert listed[0]["rotor_inertia"] == 0.0284
+    with pytest.raises(SpaceError, match='Did you mean "XL330-M288"'):
+        runner.invoke(app, ["actuators", "XL330-M28"], catch_exceptions=False)
 
 
 def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:

@@ -101,16 +101,23 @@ def tasks(
         show_task(console, task, known[task.name], stored[task.name])
 
 
-def actuators(json_: Json = False) -> None:
-    """List the catalogue of actuators that a space file may name."""
-    from armwright.cli.show_inputs import show_actuators
-    from armwright.robot.actuators import catalogue
+def actuators(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help="Actuators to list in full.")] = None,
+    json_: Json = False,
+) -> None:
+    """List the catalogue of actuators that a space file may name, or the values of some and where they are from."""
+    from armwright.cli.show_inputs import show_actuator, show_actuators
+    from armwright.robot.actuators import catalogue, named_actuator
 
-    records = list(catalogue().values())
+    records = [named_actuator(name) for name in names] if names else list(catalogue().values())
     if json_:
-        print_json([record.model_dump(exclude_none=True) for record in records])
-    else:
-        show_actuators(open_console(), records)
+        print_json([r.completed().model_dump(exclude_none=True) | {"assumed": r.assumed} for r in records])
+        return
+    console = open_console()
+    if not names:
+        show_actuators(console, records)
+    for record in records if names else ():
+        show_actuator(console, record)
 
 
 def draft(

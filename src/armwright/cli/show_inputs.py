@@ -11,7 +11,7 @@ from rich.text import Text
 from armwright.cli.streams import format_point, plain_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.llm.draft import Draft
-from armwright.robot.actuators import ActuatorRecord
+from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
 from armwright.tasks.targets import describe_targets
 from armwright.tasks.task import Task as DesignTask
 
@@ -34,7 +34,7 @@ def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
 
 
 def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
-    """Print the catalogue; values that a data sheet lacks are empty."""
+    """Print the catalogue; torques and prices that a data sheet lacks are empty."""
     heads = ("V", "g", "stall N m", "rated N m", "peak N m", "rad/s", "USD")
     table = plain_table("actuator", "maker", *heads, "source", right=heads)
     table.columns[0].no_wrap = table.columns[1].no_wrap = True
@@ -43,6 +43,31 @@ def show_actuators(console: Console, records: Sequence[ActuatorRecord]) -> None:
         numbers = (record.voltage, 1e3 * record.mass, record.stall_torque, record.rated_torque, record.peak_torque)
         shown = ("" if n is None else f"{n:.4g}" for n in (*numbers, record.speed, record.price))
         table.add_row(record.name, Text(record.maker), *shown, Text(record.source))
+    console.print(table)
+    n_values = sum(value_of(record.completed(), name) is not None for record in records for name in UNITS)
+    n_assumed = sum(len(record.assumed) for record in records)
+    console.print(
+        f"\n{n_values} values of {len(records)} actuators, {n_assumed} of them assumed: estimates, or defaults of the "
+        "kind of actuator.\narmwright actuators NAME lists the values of one with their sources."
+    )
+
+
+def show_actuator(console: Console, record: ActuatorRecord) -> None:
+    """Print the values of an actuator of the catalogue with their sources."""
+    completed, sources = record.completed(), catalogue_sources()[record.name]
+    console.print(Text(record.name, style="bold") + Text(f": {record.kind} by {record.maker}"))
+    console.print(Text(f"page: {record.source}\nnote: {record.note}"))
+    table = plain_table("", "value", "", "source", right=("value",))
+    table.columns[0].no_wrap = table.columns[2].no_wrap = True
+    for name, unit in UNITS.items():
+        value = value_of(completed, name)
+        if value is None:
+            continue
+        found = sources.get(name)
+        shown = "page, or as the note says" if found is None else f"{found.address} ({found.statement})"
+        if name in record.assumed:
+            shown = f"assumed: estimate from {shown}" if found else f"assumed: default of a {record.kind}"
+        table.add_row(name, f"{value:.4g}", unit, Text(shown))
     console.print(table)
 
 

@@ -1,44 +1,96 @@
 """Real actuators from the data sheets of their makers, in actuators.csv.
 
-A space file names actuators of the catalogue, or describes others. Values without a source are empty.
+A space file names actuators of the catalogue, or describes others. Values that no source states are empty in the file,
+and get the default of the actuator's kind.
 """
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import SpaceError, did_you_mean
+from armwright.robot.actuator_defaults import ActuatorKind, default_values
 from armwright.robot.arm import Actuator
 
 CATALOGUE = "actuators.csv"
+SOURCES = "actuator_sources.csv"
 TorqueKind = Literal["stall", "rated", "peak"]
+ESTIMATE = "~"  # before the code of a source from which a value is estimated
+UNITS: Mapping[str, str] = {
+    "voltage": "V", "mass": "kg", "stall_torque": "N m", "rated_torque": "N m", "peak_torque": "N m", "speed": "rad/s",
+    "corner_speed": "rad/s", "gear_ratio": "", "rotor_inertia": "kg m²", "coulomb_friction": "N m",
+    "viscous_friction": "N m s/rad", "backlash": "rad", "position_gain": "N m/rad", "damping_gain": "N m s/rad",
+    "current": "A", "width": "m", "height": "m", "depth": "m", "price": "USD",
+}  # fmt: skip
 
 
 class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """The data sheet of an actuator; None for values that it does not state.
-
-    Masses in kg, torques in N m, speed in rad/s without load, size in m, price in USD.
-    """
+    """The data sheet of an actuator, all values at its output; None for values that it does not state."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,39}$")  # used in space files and tables
     maker: str = Field(default="", max_length=100)
-    kind: str = Field(default="", max_length=40)  # such as servo or gear motor
+    kind: ActuatorKind = "servo"  # selects the defaults of missing values
     voltage: float | None = Field(default=None, gt=0.0)  # for which the values hold [V]
     mass: float = Field(ge=0.0, le=1e4)  # [kg]
     stall_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # [N m]
     rated_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # continuous [N m]
     peak_torque: float | None = Field(default=None, gt=0.0, le=1e6)  # intermittent [N m]
-    speed: float | None = Field(default=None, gt=0.0)  # no-load [rad/s]
+    speed: float | None = Field(default=None, gt=0.0, le=1e6)  # no-load [rad/s]
+    corner_speed: float | None = Field(default=None, ge=0.0)  # up to which the peak torque is available [rad/s]
+    gear_ratio: float | None = Field(default=None, gt=0.0)
+    rotor_inertia: float | None = Field(default=None, ge=0.0, le=1e6)  # of rotor and gear at the output [kg m²]
+    coulomb_friction: float | None = Field(default=None, ge=0.0, le=1e6)  # [N m]
+    viscous_friction: float | None = Field(default=None, ge=0.0, le=1e6)  # [N m s/rad]
+    backlash: float | None = Field(default=None, ge=0.0)  # [rad]
+    position_gain: float | None = Field(default=None, gt=0.0)  # of its position control [N m/rad]
+    damping_gain: float | None = Field(default=None, ge=0.0)  # of its position control [N m s/rad]
+    current: float | None = Field(default=None, gt=0.0)  # drawn from the supply at the peak torque [A]
     width: float | None = Field(default=None, gt=0.0)  # [m]
     height: float | None = Field(default=None, gt=0.0)  # [m]
     depth: float | None = Field(default=None, gt=0.0)  # [m]
     price: float | None = Field(default=None, ge=0.0)  # [USD]
+    estimates: tuple[str, ...] = ()  # the stated values that are estimated from a source, not stated by it
     source: str = Field(default="", max_length=500)
     note: str = Field(default="", max_length=1000)
+
+    @model_validator(mode="after")
+    def _check(self) -> "ActuatorRecord":
+        if self.stall_torque is None and self.peak_torque is None and self.rated_torque is None:
+            raise ValueError(f"actuator {self.name} states no torque; give stall_torque, peak_torque or rated_torque")
+        if self.speed is not None and (self.corner_speed or 0.0) > self.speed:
+            raise ValueError(f"actuator {self.name}: corner_speed is above the no-load speed of {self.speed:g} rad/s")
+        for name in self.estimates:
+            if name not in UNITS or getattr(self, name) is None:
+                raise ValueError(f"actuator {self.name}: estimates names {name}, which has no value")
+        return self
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Names of the values that are estimates or defaults of the kind, in the order of the catalogue."""
+        defaults = self._defaults()
+        return tuple(name for name in UNITS if name in self.estimates or name in defaults)
+
+    def completed(self) -> "ActuatorRecord":
+        """Return the record with the defaults of its kind in place of missing values.
+
+        Without a no-load speed or a voltage, the values that depend on it stay missing.
+        """
+        return self.model_copy(update={"peak_torque": self.peak_torque or self.stall_torque} | self._defaults())
+
+    def _defaults(self) -> dict[str, float]:
+        """Return the defaults of the values that are not stated. The stall torque is a peak torque, if it is stated."""
+        rated = self.rated_torque or 0.0
+        # Without a published peak, the rated torque is all that may be drawn; rotor and friction suit twice as much.
+        reference = self.stall_torque or self.peak_torque or 2.0 * rated
+        values = default_values(self.kind, reference, self.speed, self.voltage, self.position_gain)
+        if self.stall_torque is None:
+            values["peak_torque"] = rated
+        return {name: value for name, value in values.items() if getattr(self, name) is None}
 
     def torque(self, kind: TorqueKind) -> float | None:
         """Return the stall, rated or peak torque [N m]."""
@@ -58,26 +110,80 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         return Actuator(self.name, self.mass, torque / safety_factor, self.speed, self.price)
 
 
+def value_of(record: ActuatorRecord, name: str) -> float | None:
+    """Return the value of this name, a key of UNITS."""
+    value: float | None = getattr(record, name)
+    return value
+
+
+@dataclass(frozen=True)
+class Source:
+    """The source of a value.
+
+    Attributes:
+        address: Where it is published.
+        statement: What is stated there, and how the value follows from it.
+    """
+
+    address: str
+    statement: str
+
+
 @cache
 def catalogue() -> Mapping[str, ActuatorRecord]:
     """Return the actuators that come with armwright, by name."""
-    text = (resources.files("armwright.robot") / CATALOGUE).read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if not line.startswith("#")]
-    records = [
-        ActuatorRecord.model_validate({key: value for key, value in row.items() if value})
-        for row in csv.DictReader(lines)
-    ]
-    return {record.name: record for record in records}
+    records: dict[str, ActuatorRecord] = {}
+    for row in _rows(CATALOGUE):
+        codes = _codes(row.pop("sources"))
+        values: dict[str, Any] = {key: value for key, value in row.items() if value}
+        values["estimates"] = tuple(name for name, code in codes.items() if code.startswith(ESTIMATE))
+        records[row["name"]] = ActuatorRecord.model_validate(values)
+    return records
+
+
+@cache
+def catalogue_sources() -> Mapping[str, Mapping[str, Source]]:
+    """Return the sources of values by actuator and value; other values are stated by the source of the actuator."""
+    known = {row["code"]: Source(row["address"], row["statement"]) for row in _rows(SOURCES)}
+    sources: dict[str, Mapping[str, Source]] = {}
+    for row in _rows(CATALOGUE):
+        found = {name: known[code.removeprefix(ESTIMATE)] for name, code in _codes(row["sources"]).items()}
+        sources[row["name"]] = {
+            name: replace(one, address=row["source"]) if one.address == "page" else one for name, one in found.items()
+        }
+    return sources
+
+
+def _rows(file: str) -> Iterator[dict[str, str]]:
+    text = (resources.files("armwright.robot") / file).read_text(encoding="utf-8")
+    yield from csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+
+
+def _codes(sources: str) -> dict[str, str]:
+    """Return the codes of sources by name of the value."""
+    return {name: code for name, _, code in (part.partition("=") for part in sources.split())}
+
+
+def named_actuator(name: str) -> ActuatorRecord:
+    """Return an actuator of the catalogue.
+
+    Raises:
+        SpaceError: It does not have one of this name.
+    """
+    known = catalogue()
+    if name not in known:
+        raise SpaceError(
+            f'unknown actuator "{name}".{did_you_mean(name, known)} `armwright actuators` lists the {len(known)} of '
+            "the catalogue; others are described by name, mass [kg] and stall_torque [N m]"
+        )
+    return known[name]
 
 
 def resolve_actuator(entry: Any) -> Any:
     """Return the record of a named actuator; anything else unchanged, for pydantic to validate."""
     if not isinstance(entry, str):
         return entry
-    known = catalogue()
-    if entry not in known:
-        raise ValueError(
-            f'unknown actuator "{entry}".{did_you_mean(entry, known)} `armwright actuators` lists the {len(known)} of '
-            "the catalogue; others are described by name, mass [kg] and stall_torque [N m]"
-        )
-    return known[entry]
+    try:
+        return named_actuator(entry)
+    except SpaceError as error:
+        raise ValueError(str(error)) from None

@@ -1,0 +1,81 @@
+"""Defaults of actuators by kind, for values that no source states; docs/spaces.md gives the evidence."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+ActuatorKind = Literal["servo", "coreless servo", "geared drive", "quasi-direct-drive", "harmonic"]
+
+
+@dataclass(frozen=True)
+class KindDefaults:
+    """Ratios of one kind of actuator: τ is its reference torque, ω its no-load speed, V its voltage.
+
+    Attributes:
+        time_constant: Rotor inertia x ω / τ [s].
+        coulomb: Coulomb friction / τ.
+        viscous: Viscous friction x ω / τ.
+        corner: Corner speed / ω.
+        backlash: Backlash [rad].
+        stiffness: Position gain / τ [1/rad].
+        damping: Damping gain / position gain [s]; None for τ / ω, the back-EMF of a motor driven by a voltage.
+        current: Supply current at the peak torque x V / (τ ω).
+        continuous: Continuous torque / τ.
+    """
+
+    time_constant: float
+    coulomb: float
+    viscous: float
+    corner: float
+    backlash: float
+    stiffness: float
+    damping: float | None
+    current: float
+    continuous: float = 0.25
+
+
+_GEARED = KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 4.0, 0.05, 2.5)
+DEFAULTS: Mapping[ActuatorKind, KindDefaults] = {
+    "servo": KindDefaults(0.047, 0.025, 0.09, 0.0, math.radians(0.5), 4.6, None, 1.6),
+    "coreless servo": KindDefaults(0.016, 0.025, 0.09, 0.0, math.radians(0.25), 4.6, None, 1.6),
+    "geared drive": _GEARED,
+    "quasi-direct-drive": KindDefaults(0.007, 0.02, 0.045, 0.3, math.radians(0.2), 1.6, 0.05, 1.0),
+    "harmonic": KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.005), 4.0, 0.05, 2.5),
+}
+
+
+def default_values(
+    kind: ActuatorKind, torque: float, speed: float | None, voltage: float | None, position_gain: float | None
+) -> dict[str, float]:
+    """Return the defaults of a kind, without those for which speed or voltage is missing.
+
+    Args:
+        kind: The kind of actuator.
+        torque: Its reference torque [N m].
+        speed: Its no-load speed [rad/s].
+        voltage: Its supply voltage [V].
+        position_gain: Its position gain [N m/rad]; None for the default.
+    """
+    ratios = DEFAULTS[kind]
+    gain = ratios.stiffness * torque if position_gain is None else position_gain
+    values = {
+        "rated_torque": ratios.continuous * torque,
+        "coulomb_friction": ratios.coulomb * torque,
+        "backlash": ratios.backlash,
+        "position_gain": gain,
+    }
+    if ratios.damping is not None:
+        values["damping_gain"] = ratios.damping * gain
+    if speed is None:
+        return values
+    values |= {
+        "rotor_inertia": ratios.time_constant * torque / speed,
+        "viscous_friction": ratios.viscous * torque / speed,
+        "corner_speed": ratios.corner * speed,
+    }
+    if ratios.damping is None:
+        values["damping_gain"] = torque / speed
+    if voltage is not None:
+        values["current"] = ratios.current * torque * speed / voltage
+    return values
