@@ -122,7 +122,7 @@ def print_joints_and_targets() -> None:
         (4, 8, "float64"),
     ):
         space = paper_space(dof)
-        arrays = stack_designs(space, space.matrix(space.sample(2000, seed=0)), precision)
+        arrays = stack_designs(space, space.matrix(space.sample(2000, seed=0)), precision=precision)
 
         def work(_: int, t: int = t, arrays: ArmArrays = arrays, precision: Precision = precision) -> None:
             solve_postures(arrays, points[:t], precision=precision)

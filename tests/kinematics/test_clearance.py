@@ -19,6 +19,7 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.obstacles import Box, Cylinder, Ground, Obstacle, Sphere
+from armwright.tasks.tool import Tool
 from tests.support.arms import moving_arms
 
 Array = NDArray[np.float64]
@@ -345,9 +346,9 @@ def test_threads_do_not_change_clearance() -> None:
 
 def test_prismatic_and_fixed_joints_place_their_links() -> None:
     content = {"joints": [2, 5], "joint_types": ["P", "O", "F", "X", "S"], "link_directions": ["+z", "+x"]}
-    space = DesignSpace.model_validate({**content, "mount": ["ceiling"], "tool": [0.1, 0.0, 0.0]})
+    space = DesignSpace.model_validate({**content, "mount": ["ceiling"]})
     designs = [d for d in space.sample(60, 4) if d.joints[0] == "P"]
-    arms = [space.arm(design) for design in designs]
+    arms = [space.arm(design, Tool(tip=(0.1, 0.0, 0.0))) for design in designs]
     targets = np.random.default_rng(0).uniform(-0.5, 0.5, (4, 3))
     ball = Sphere(kind="sphere", center=(0.2, 0.1, 0.3), radius=0.05)
     evaluation = evaluate(arms, targets, obstacles=[ball])

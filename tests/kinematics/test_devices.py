@@ -170,7 +170,7 @@ def test_results_do_not_depend_on_chunks(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_many_targets_are_solved_in_chunks() -> None:
     asked = Problem(load_task("target-1"))
-    arms = problem.stack_designs(asked.space, asked.space.matrix(asked.space.sample(3, 4)))
+    arms = asked.arms(asked.space.matrix(asked.space.sample(3, 4)))
     targets = np.random.default_rng(4).uniform(-0.7, 0.7, (2000, 3))
     postures = solve_postures(arms, targets, updates=5)
     assert postures.q.shape == (3, 2000, 4)

@@ -22,7 +22,7 @@ from armwright.kinematics.jacobian import jacobian_rate, jacobians
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import MOVE_QUANTITIES, TIMED_QUANTITIES, named_objectives
 from armwright.problem.problem import Problem
-from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, uniform_link
+from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, uniform_link
 from armwright.robot.link_geometry import inertia_tensor
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
@@ -61,7 +61,7 @@ def any_arms(n: int, seed: int) -> list[Arm]:
         kinds = rng.choice(["revolute", "revolute", "prismatic", "fixed"], int(rng.integers(2, 7))).tolist()
         kinds[0] = kinds[0] if kinds[0] != "fixed" else "revolute"
         joints = tuple(map(joint, kinds))
-        arms.append(Arm(vector(0.5), joints, tuple(link() for _ in kinds), tool=vector(0.1)))
+        arms.append(Arm(vector(0.5), joints, tuple(link() for _ in kinds), tool=MountedTool(vector(0.1))))
     return arms
 
 
@@ -77,7 +77,7 @@ def motions(arms: Sequence[Arm], k: int, seed: int) -> tuple[Any, Array, Array, 
 def loaded(arm: Arm, payload: float) -> Arm:
     """The same with a payload as a link of its own, fixed to the tip."""
     carried = Link(offset=(0.0, 0.0, 0.0), mass=payload, com=(0.0, 0.0, 0.0), radius=1e-9)
-    end = Link(offset=arm.tool, mass=0.0, com=(0.0, 0.0, 0.0), radius=1e-9)
+    end = Link(offset=arm.tool.tip, mass=0.0, com=(0.0, 0.0, 0.0), radius=1e-9)
     fixed = Joint("fixed", "x")
     return Arm(arm.base, (*arm.joints, fixed, fixed), (*arm.links, end, carried))
 

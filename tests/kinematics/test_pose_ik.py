@@ -14,7 +14,7 @@ from armwright.kinematics import ik as solve
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.kinematics.ik import solve_postures
 from armwright.problem.evaluation import Evaluation, Scene, evaluate, evaluate_arrays
-from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
 from armwright.spaces.batch_builder import stack_designs
@@ -43,13 +43,13 @@ def tooled_arms(n: int, dof: int, seed: int) -> list[Arm]:
     """General arms whose tools point anywhere."""
     frames = target_arrays([3] * n, seed + 1).rotation
     return [
-        replace(arm, tool_axis=tuple(frame[:, 2].tolist()), tool_side=tuple(frame[:, 0].tolist()))
+        replace(arm, tool=MountedTool(axis=tuple(frame[:, 2].tolist()), side=tuple(frame[:, 0].tolist())))
         for arm, frame in zip(general_arms(n, dof, seed), frames, strict=True)
     ]
 
 
 def tools(arms: list[Arm]) -> tuple[Array, Array]:
-    return np.array([arm.tool_axis for arm in arms]), np.array([arm.tool_side for arm in arms])
+    return np.array([arm.tool.axis for arm in arms]), np.array([arm.tool.side for arm in arms])
 
 
 # The reference against Pinocchio
@@ -283,7 +283,7 @@ def _turned_arm(arm: Arm) -> Arm:
     links = tuple(replace(link, offset=vector(link.offset), com=vector(link.com)) for link in arm.links)
     return replace(
         arm, base=vector(arm.base), joints=tuple(map(joint, arm.joints)), links=links,
-        tool_axis=vector(arm.tool_axis), tool_side=vector(arm.tool_side),
+        tool=MountedTool(axis=vector(arm.tool.axis), side=vector(arm.tool.side)),
     )  # fmt: skip
 
 
@@ -317,7 +317,7 @@ def _mirrored(arm: Arm) -> Arm:
     links = tuple(replace(link, offset=across(link.offset), com=across(link.com)) for link in arm.links)
     return replace(
         arm, base=across(arm.base), joints=joints, links=links,
-        tool_axis=across(arm.tool_axis), tool_side=across(arm.tool_side),
+        tool=MountedTool(axis=across(arm.tool.axis), side=across(arm.tool.side)),
     )  # fmt: skip
 
 

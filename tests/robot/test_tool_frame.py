@@ -11,7 +11,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from armwright.kinematics.forward import joint_positions
-from armwright.robot.arm import Arm, Joint
+from armwright.robot.arm import Arm, Joint, MountedTool
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.sdf import to_sdf
 from armwright.robot.xacro import to_xacro
@@ -58,7 +58,7 @@ def test_tip_has_the_tool_orientation_at_zero(tip: Callable[[Arm, Array], Array]
     odd = [np.linalg.qr(np.random.default_rng(61 + n).normal(size=(3, 3)))[0][:2] for n in range(10)]
     joint = Joint("revolute", "y", -1.0, 1.0)
     for axis, side in [*signed, *odd]:
-        arm = replace(ARMS[0], joints=(joint,) * 4, tool=(0.1, 0.2, 0.3), tool_axis=tuple(axis), tool_side=tuple(side))
+        arm = replace(ARMS[0], joints=(joint,) * 4, tool=MountedTool((0.1, 0.2, 0.3), tuple(axis), tuple(side)))
         pose = tip(arm, np.zeros(4))
         assert np.abs(pose[:3, 2] - axis).max() < 1e-9
         assert np.abs(pose[:3, 0] - side).max() < 1e-9

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from armwright.robot.arm import Arm, Joint, Link, uniform_link
+from armwright.robot.arm import Arm, Joint, Link, MountedTool, uniform_link
 from armwright.robot.link_geometry import joint_limits
 from armwright.robot.urdf_writer import to_urdf
 from armwright.robot.xacro import to_xacro
@@ -87,7 +87,10 @@ def test_xacro_arguments_change_the_arm(arm: Arm) -> None:
         x, y, z = (factor * value for value in link.offset)
         u, v, w = (factor * value if link.length > 0.0 else value for value in link.com)
         links.append(Link((x, y, z), mass + slope * length, (u, v, w), radius, end))
-    assert_same(processed(to_xacro(arm), **arguments), replace(arm, base=base, links=tuple(links), tool=tool))
+    assert_same(
+        processed(to_xacro(arm), **arguments),
+        replace(arm, base=base, links=tuple(links), tool=MountedTool(tool, arm.tool.axis, arm.tool.side)),
+    )
 
 
 MASSES = (

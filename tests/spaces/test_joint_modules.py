@@ -24,6 +24,7 @@ from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, builtin_spaces, load_space, paper_space
 from armwright.spaces.joint_modules import MODULES, MOUNTS
 from armwright.tasks.catalogue import load_task
+from armwright.tasks.tool import Tool
 
 EVERYTHING: dict[str, Any] = {
     "name": "everything",
@@ -31,20 +32,20 @@ EVERYTHING: dict[str, Any] = {
     "joint_types": list(MODULES),
     "link_directions": ["+x", "-y", "+z", "-z"],
     "mount": list(MOUNTS),
-    "tool": [0.05, -0.02, 0.1],
     "stroke": [0.1, 0.6],
     "limit": [0.5, 2.4],
     "travel": 0.004,
     "actuators": ["XL430-W250", "XM430-W350", "XM540-W270"],
     "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
 }
+TOOL = Tool(tip=(0.05, -0.02, 0.1), rpy=(0.3, -0.7, 2.0))
 MIXED = DesignSpace.model_validate(EVERYTHING)
 TARGETS = load_task("target-2").target_positions
 
 
 def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:
     """Of designs at random, those that have a joint that moves."""
-    arms = [space.arm(design) for design in space.sample(n, seed)]
+    arms = [space.arm(design, TOOL) for design in space.sample(n, seed)]
     return [arm for arm in arms if any(joint.kind != "fixed" for joint in arm.joints)]
 
 
@@ -53,8 +54,8 @@ def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:
 @pytest.mark.fast_cases(3)
 def test_stacked_designs_equal_stacked_arms_to_the_bit(space: DesignSpace, precision: Any) -> None:
     designs = space.sample(300, 7)
-    one = stack_designs(space, space.matrix(designs), precision)
-    other = stack_arms([space.arm(design) for design in designs], precision)
+    one = stack_designs(space, space.matrix(designs), TOOL, precision)
+    other = stack_arms([space.arm(design, TOOL) for design in designs], precision)
     for field in fields(one):
         mine, theirs = getattr(one, field.name), getattr(other, field.name)
         if field.name == "actuation":
@@ -66,7 +67,7 @@ def test_stacked_designs_equal_stacked_arms_to_the_bit(space: DesignSpace, preci
                 assert np.array_equal(getattr(mine, part)[:, :room], getattr(theirs, part)), part
                 assert not getattr(mine, part)[:, room:].any()
             continue
-        of_arm = field.name in ("base", "tool", "tool_axis", "tool_side")
+        of_arm = field.name in ("base", "tip", "tool_axis", "tool_side")
         if mine.ndim > 1 and not of_arm:  # there is room for more joints than any of these has
             assert not (one.motion[:, theirs.shape[1] :] < 6).any()
             mine = mine[:, : theirs.shape[1]]
@@ -139,7 +140,7 @@ def test_batch_does_not_change_the_bits() -> None:
 @pytest.mark.parametrize("mount", list(MOUNTS))
 def test_mounted_arm_is_the_floor_arm_rotated(mount: Any) -> None:
     content = {"joint_types": ["R", "P", "Y", "O", "X", "T", "S"], "joints": 5, "link_directions": ["+z", "+x"]}
-    content |= {"tool": [0.03, 0.0, 0.05], **{f"origin_{axis}": [0.0, 0.0] for axis in "xyz"}}
+    content |= {f"origin_{axis}": [0.0, 0.0] for axis in "xyz"}
     floor = DesignSpace.model_validate(content)
     other = DesignSpace.model_validate({**content, "mount": mount})
     turn = np.zeros((3, 3))
@@ -148,7 +149,7 @@ def test_mounted_arm_is_the_floor_arm_rotated(mount: Any) -> None:
     assert np.linalg.det(turn) == pytest.approx(1.0)
     rng = np.random.default_rng(0)
     for design in floor.sample(30, 5):
-        standing, turned = floor.arm(design), other.arm(design)
+        standing, turned = floor.arm(design, TOOL), other.arm(design, TOOL)
         mirrored = [1.0 if a.lower == b.lower else -1.0 for a, b in zip(standing.joints, turned.joints, strict=True)]
         q = rng.uniform(0.0, 0.3, len(standing.joints))
         signs = np.array([
@@ -228,7 +229,6 @@ def test_samples_respect_ties_and_grids() -> None:
         ({"limit": [0.0, 2.0]}, "limit"),
         ({"mount": ["sky"]}, "mount"),
         ({"mount": ["floor", "floor"]}, "mount has duplicates"),
-        ({"tool": [0.0, 2000.0, 0.0]}, "tool"),
         ({"tie": {"link_9": "link_1"}}, 'unknown parameter "link_9"'),
         ({"tie": {"link_2": "origin_x"}}, "different ranges"),
         ({"tie": {"link_2": "link_3", "link_3": "link_4"}}, "tied itself"),

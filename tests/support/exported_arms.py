@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio
 import xacro
 
-from armwright.robot.arm import Actuator, Arm, Joint, Link, uniform_link
+from armwright.robot.arm import Actuator, Arm, Joint, Link, MountedTool, uniform_link
 from armwright.robot.urdf_writer import to_urdf
 from tests.support import reference_kinematics as reference
 from tests.support.arms import general_arms, paper_arms
@@ -33,9 +33,7 @@ MIXED = Arm(
         uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),
         Link((0.0, 0.12, 0.0), 0.0, (0.0, 0.0, 0.0), 0.01, end_mass=0.25),
     ),
-    tool=(0.01, -0.02, 0.03),
-    tool_axis=(0.0, 1.0, 0.0),
-    tool_side=(0.0, 0.0, 1.0),
+    tool=MountedTool((0.01, -0.02, 0.03), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
     base_mass=0.3,
 )
 
@@ -52,7 +50,8 @@ def odd_arms(n: int, dof: int, seed: int) -> list[Arm]:
         links = (replace(link, end_mass=float(max(0.0, rng.uniform(-1.0, 1.0)))) for link in arm.links)
         axis, side = np.linalg.qr(rng.normal(size=(3, 3)))[0][:2].tolist()
         tool = rng.uniform(-0.1, 0.1, 3).tolist()
-        arms.append(Arm(arm.base, tuple(joints), tuple(links), tuple(tool), tuple(axis), tuple(side)))
+        mounted = MountedTool(tuple(tool), tuple(axis), tuple(side))
+        arms.append(Arm(arm.base, tuple(joints), tuple(links), mounted))
     return arms
 
 

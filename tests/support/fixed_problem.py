@@ -14,7 +14,6 @@ from armwright.problem.objectives import PAPER_OBJECTIVES, POSITION_ERROR
 from armwright.problem.problem import Problem
 from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
 from armwright.tasks.moves import sample_moves
@@ -42,7 +41,7 @@ class FixedProblem(Problem):
         mass = self.space.max_joints * self.space.mass.mass(self.space.link[1])
         lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
-        arms = stack_designs(self.space, rows)
+        arms = self.arms(rows)
         error = np.linalg.norm(reached - targets, axis=-1)
         angle = np.zeros_like(error)
         evaluation = Evaluation(

@@ -13,7 +13,7 @@ from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import OBJECTIVES, UNREACHED_TARGETS, named_objectives
 from armwright.problem.problem import Problem
 from armwright.problem.unreached_reason import unreached_reason
-from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.robot.arm import Arm, Joint, MountedTool, uniform_link
 from armwright.rotations import rotation_from_rpy
 from armwright.runs.folder import read_config
 from armwright.runs.verification import verify
@@ -171,10 +171,9 @@ def test_reasons_of_missed_targets() -> None:
 
 
 def test_tools_of_arms_are_checked() -> None:
-    link = uniform_link((0, 0, 0.3), 0.1, 0.01)
     for axis, side in (((0, 0, 2), (1, 0, 0)), ((0, 0, 1), (0, 0, 1)), ((0, 0, float("nan")), (1, 0, 0))):
         with pytest.raises(ArmError, match="unit vectors at right angles"):
-            Arm((0, 0, 0), (Joint("revolute", "y", -1, 1),), (link,), tool_axis=axis, tool_side=side)
+            MountedTool(axis=axis, side=side)
 
 
 # Prompts and run folders

@@ -33,7 +33,7 @@ def check_problem(problem: Problem) -> dict[str, Any]:
         "space": {
             "name": space.name,
             "joints": [space.min_joints, space.max_joints],
-            "max_reach": space.max_reach,
+            "max_reach": problem.max_reach,
             "free_parameters": len(free_parameters(space)),
             "parameters": {parameter.name: _describe_range(parameter) for parameter in space.parameters},
             "tie": dict(space.tie),
@@ -77,7 +77,7 @@ def free_parameters(space: DesignSpace) -> list[Parameter]:
 
 def geometry_warnings(problem: Problem) -> list[str]:
     """Return a line for each target that no arm can reach, or that lies inside an obstacle."""
-    reach = problem.space.max_reach
+    reach = problem.max_reach
     warnings: list[str] = []
     for number, target in enumerate(problem.task.targets, start=1):
         distance = _distance_to_bases(problem.space, target)

@@ -36,6 +36,7 @@ from armwright.robot.urdf_reader import UrdfArm, read_urdf
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import FrontMember, History
 from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.tool_mount import with_tool
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 
@@ -128,7 +129,7 @@ def compare_arms(
     placed: list[Arm] = []
     compared: list[ComparedArm] = []
     for name, arm in zip(_names(arms, described), described, strict=True):
-        geared = with_travel(arm.arm, problem.space.travel)
+        geared = with_tool(with_travel(arm.arm, problem.space.travel), problem.task.tool)
         position = search_base(problem, geared, seed) if base is None else base
         placed.append(placed_at(geared, position))
         compared.append(_compared(problem, history, name, placed[-1], position, arm.notes))
@@ -200,8 +201,8 @@ def _history(run: Path, task: Task, space: DesignSpace | None) -> History:
     own = history.problem.task
     if not len(history):
         raise RunFolderError(f"{run} has no finished trial yet, so there is nothing to compare with")
-    if task.targets != own.targets or not np.array_equal(task.payloads, own.payloads):
-        raise TaskError(f"{run} is a run of the task {own.name}, with other targets or payloads")
+    if (task.targets, task.tool) != (own.targets, own.tool) or not np.array_equal(task.payloads, own.payloads):
+        raise TaskError(f"{run} is a run of the task {own.name}, with other targets, another tool or other payloads")
     return history
 
 

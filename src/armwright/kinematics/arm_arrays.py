@@ -107,7 +107,7 @@ class ArmArrays(_PerArm):
     com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next [m]
     mass: Floats  # (N, D) [kg]
     radius: Floats  # (N, D) of the link after a joint [m]; 0 if there is none
-    tool: Array  # (N, 3) from the end of the last link to the tip [m], in its frame; included in `offset`
+    tip: Array  # (N, 3) from the end of the last link to the tip [m], in its frame; included in `offset`
     tool_axis: Floats  # (N, 3) the tool's own z in the world with all joints at 0, and so in the last local frame
     tool_side: Floats  # (N, 3) likewise the tool's own x
     n_joints: Ints  # (N,) number of an arm's joints, at most D
@@ -182,7 +182,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
         travel[i, own] = [joint.travel for joint in arm.joints]
         offset[i, own] = [link.offset for link in arm.links]
-        offset[i, len(arm.joints) - 1] += arm.tool
+        offset[i, len(arm.joints) - 1] += arm.tool.tip
         com[i, own] = [link.total_com for link in arm.links]
         mass[i, own] = [link.total_mass for link in arm.links]
         radius[i, own] = [link.radius if link.length > 0.0 else 0.0 for link in arm.links]
@@ -197,9 +197,9 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         com=com.astype(precision),
         mass=mass.astype(precision),
         radius=radius.astype(precision),
-        tool=np.array([arm.tool for arm in arms]),
-        tool_axis=np.array([arm.tool_axis for arm in arms], dtype=precision),
-        tool_side=np.array([arm.tool_side for arm in arms], dtype=precision),
+        tip=np.array([arm.tool.tip for arm in arms]),
+        tool_axis=np.array([arm.tool.axis for arm in arms], dtype=precision),
+        tool_side=np.array([arm.tool.side for arm in arms], dtype=precision),
         n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
         travel=travel,
         length=np.array([arm.length for arm in arms]),

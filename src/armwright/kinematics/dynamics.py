@@ -150,7 +150,7 @@ def _path_derivatives(arms: ArmArrays, q: Array, frames: Frames, line: Array) ->
 
 def _damping(arms: ArmArrays) -> Array:
     """Return the (N,) damping on the diagonal of J Jᵀ [m²], by an arm's size: its length, and 1 m for slides."""
-    size = np.hypot(arms.length + np.linalg.norm(arms.tool, axis=1), arms.prismatic.any(axis=1))
+    size = np.hypot(arms.length + np.linalg.norm(arms.tip, axis=1), arms.prismatic.any(axis=1))
     return (DAMPING * np.where(size > 0.0, size, 1.0)) ** 2  # an arm without size does not move its tip at all
 
 

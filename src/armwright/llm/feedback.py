@@ -51,7 +51,7 @@ class Digits:
     def of(cls, history: History) -> "Digits":
         """Derive the decimals from the space's longest arm and the largest objectives so far."""
         space = history.problem.space
-        reach = space.max_reach
+        reach = history.problem.max_reach
         weight = space.max_joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
         heaviest = GRAVITY * reach * weight  # [N m], more than any torque
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()

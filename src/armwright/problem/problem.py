@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import EvaluatorError, SettingsError, TaskError
-from armwright.kinematics.arm_arrays import ArmArrays
+from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, read_constraints
@@ -86,7 +86,7 @@ class Problem:
     """Find the arms of a design space that serve a task best.
 
     Attributes:
-        task: targets, moves, payloads, obstacles and constraints.
+        task: targets, moves, tool, payloads, obstacles and constraints.
         space: the designs to choose from.
         tolerance: build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms
             with the base or one link off by this much.
@@ -162,8 +162,17 @@ class Problem:
         return any(quantity.name in used for quantity in quantities)
 
     def arm(self, design: Design) -> Arm:
-        """Return the physical arm that a design builds."""
-        return self.space.arm(design)
+        """Return the arm that a design builds, with the task's tool."""
+        return self.space.arm(design, self.task.tool)
+
+    def arms(self, matrix: Array, precision: Precision = "float32") -> ArmArrays:
+        """Return the arms of N designs with the task's tool, stacked; matrix: (N, P)."""
+        return stack_designs(self.space, matrix, self.task.tool, precision)
+
+    @property
+    def max_reach(self) -> float:
+        """The length of the longest possible arm, with its tool and all slides extended [m]."""
+        return self.space.max_reach + self.task.tool.length
 
     def evaluate(self, designs: Sequence[Design]) -> Outcomes:
         """Evaluate N designs: objectives and constraint violations, the worst of all cases and tolerances.
@@ -191,7 +200,7 @@ class Problem:
             designs: N designs, or (N, P) their matrix, which may lie outside the ranges of the space.
         """
         matrix = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
-        return self.physics_of_arms(stack_designs(self.space, matrix))
+        return self.physics_of_arms(self.arms(matrix))
 
     def physics_of_arms(self, arms: ArmArrays, case: int = 0) -> Evaluation:
         """Return the kinematics and statics of arms at all targets, in one case of the task."""
@@ -238,7 +247,7 @@ class Problem:
         for rows in (matrix, *(perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
             yield self.physics(rows)
             for case in range(1, len(self.scenes)):
-                yield self.physics_of_arms(stack_designs(self.space, rows), case)
+                yield self.physics_of_arms(self.arms(rows), case)
 
     @cached_property
     def _postures(self) -> int:

@@ -15,7 +15,6 @@ from armwright.kinematics.arm_arrays import PRISMATIC
 from armwright.problem.objectives import TORQUE_SCALE
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.parameters import Design
 
 LEFT = 0.01  # position error that the inverse kinematics leaves at a target [m]
@@ -71,7 +70,7 @@ def gravity_share(axis: Array, direction: Array) -> Array:
 
 def _stretched(problem: Problem, designs: Sequence[Design]) -> tuple[Array, Array, Array, Array]:
     """Return first axis (N, 3), pivot (N, 3) [m], length from there (N,) [m] and first moment of mass (N,) [kg m]."""
-    arms = stack_designs(problem.space, problem.space.matrix(designs))
+    arms = problem.arms(problem.space.matrix(designs))
     rows = np.arange(len(arms))
     ends = arms.base[:, None] + np.cumsum(arms.offset, axis=1)  # (N, D, 3)
     places = np.concatenate([arms.base[:, None], ends], axis=1).astype(np.float64)  # (N, D + 1, 3) joints and tip

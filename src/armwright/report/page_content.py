@@ -30,6 +30,7 @@ from armwright.runs.history import REFINE, History
 from armwright.runs.results import read_summary
 from armwright.runs.selection import bounded_numbers, numbers_of
 from armwright.runs.trials_file import TrialsReader
+from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
 from armwright.spaces.parameters import FloatParameter
 
 KINDS = ("revolute", "prismatic", "fixed")
@@ -172,6 +173,9 @@ def _designs(history: History, numbers: range) -> Arrays:
         "params": space.matrix([trial.design for trial in trials]),
         "violations": history.violations[numbers.start : numbers.stop],
         "q": evaluation.q.astype(np.float32),
+        "up": np.array(
+            [mounted_vector(DIRECTIONS["+z"], space.mount_of(trial.design)) for trial in trials], np.float32
+        ),
         **_arm_arrays(arms, evaluation.arms.dof),
     }
 
@@ -185,7 +189,10 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
         return np.array(rows, dtype=np.float32)
 
     return {
-        **{name: floats([getattr(arm, name) for arm in arms]) for name in ("base", "tool", "tool_axis", "tool_side")},
+        "base": floats([arm.base for arm in arms]),
+        "tip": floats([arm.tool.tip for arm in arms]),
+        "tool_axis": floats([arm.tool.axis for arm in arms]),
+        "tool_side": floats([arm.tool.side for arm in arms]),
         "joints": np.array([len(arm.joints) for arm in arms], dtype=np.uint8),
         "kind": np.array([[KINDS.index(j.kind) for j in row] for row in joints], dtype=np.uint8),
         "axis": np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.uint8),

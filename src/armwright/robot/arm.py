@@ -144,6 +144,29 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
+class MountedTool:
+    """A tool, in a frame at the end of the last link that is parallel to the world frame with all joints at 0.
+
+    Attributes:
+        tip: Position of the tip [m].
+        axis: Direction of the z axis of the tip frame.
+        side: Direction of the x axis of the tip frame.
+    """
+
+    tip: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+    side: Vector = (1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(v) for v in self.tip):
+            raise ArmError(f"the tip of the tool must be finite: {self.tip} m")
+        axis, side = self.axis, self.side
+        across = sum(a * b for a, b in zip(axis, side, strict=True))
+        if not max(abs(math.hypot(*axis) - 1.0), abs(math.hypot(*side) - 1.0), abs(across)) < UNIT:
+            raise ArmError(f"tool: axis = {axis} and side = {side} must be unit vectors at right angles")
+
+
+@dataclass(frozen=True, slots=True)
 class Arm:
     """A serial arm. With all joints at 0, every local frame is parallel to the world frame.
 
@@ -151,9 +174,7 @@ class Arm:
         base: The position of the first joint in the world [m].
         joints: Joint j moves link j and everything after it.
         links: The links, one after each joint.
-        tool: Vector from the end of the last link to the tip, in the frame of that link [m].
-        tool_axis: World direction of the tool's z axis with all joints at 0.
-        tool_side: World direction of the tool's x axis with all joints at 0.
+        tool: The tool on the end of the last link.
         base_mass: Mass that does not move, such as the first joint's actuator [kg].
 
     Examples:
@@ -168,9 +189,7 @@ class Arm:
     base: Vector
     joints: tuple[Joint, ...]
     links: tuple[Link, ...]
-    tool: Vector = (0.0, 0.0, 0.0)
-    tool_axis: Vector = (0.0, 0.0, 1.0)
-    tool_side: Vector = (1.0, 0.0, 0.0)
+    tool: MountedTool = MountedTool()
     base_mass: float = 0.0
 
     def __post_init__(self) -> None:
@@ -181,12 +200,6 @@ class Arm:
             )
         if not all(math.isfinite(v) for v in self.base):
             raise ArmError(f"the base position must be finite: {self.base} m")
-        if not all(math.isfinite(v) for v in self.tool):
-            raise ArmError(f"the tool's offset must be finite: {self.tool} m")
-        axis, side = self.tool_axis, self.tool_side
-        across = sum(a * b for a, b in zip(axis, side, strict=True))
-        if not max(abs(math.hypot(*axis) - 1.0), abs(math.hypot(*side) - 1.0), abs(across)) < UNIT:
-            raise ArmError(f"tool_axis = {axis} and tool_side = {side} must be unit vectors at right angles")
 
     @property
     def mass(self) -> float:
@@ -202,7 +215,7 @@ class Arm:
     def reach(self) -> float:
         """The largest possible distance of the tip from the first joint [m]."""
         strokes = sum(max(abs(j.lower), abs(j.upper)) for j in self.joints if j.kind == "prismatic")
-        return strokes + self.length + math.hypot(*self.tool)
+        return strokes + self.length + math.hypot(*self.tool.tip)
 
 
 def uniform_link(offset: Vector, mass: float, radius: float) -> Link:

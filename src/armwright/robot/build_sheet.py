@@ -98,12 +98,9 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         lines.append(f"| {' | '.join(cells)} |")
     length, mass = sum(row.length for row in rows), sum(row.mass for row in rows)
     lines += ["", f"Together {1e3 * length:.1f} mm of links, {1e3 * mass:.4g} g."]
-    if any(arm.tool):
-        shift = ", ".join(f"{1e3 * value:.1f}" for value in arm.tool)
+    if any(arm.tool.tip):
+        shift = ", ".join(f"{1e3 * value:.1f}" for value in arm.tool.tip)
         lines += ["", f"The tool reaches ({shift}) mm from the end of the last link to the tip."]
-    if arm.tool_axis != (0.0, 0.0, 1.0):
-        up = ", ".join(f"{value:g}" for value in arm.tool_axis)
-        lines += ["", f"Axes are the world's, with all joints at 0; the mounted arm's own z then points along ({up})."]
     motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
     if motors:
         prices = [motor.price for motor in motors]

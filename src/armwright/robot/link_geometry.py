@@ -122,14 +122,14 @@ def rpy_along(offset: Vector) -> Vector:
 
 def tip_position(arm: Arm) -> Vector:
     """Return the position of the tip in the frame of the last link [m]."""
-    (x, y, z), (u, v, w) = arm.links[-1].offset, arm.tool
+    (x, y, z), (u, v, w) = arm.links[-1].offset, arm.tool.tip
     return (x + u, y + v, z + w)
 
 
 def tip_rpy(arm: Arm) -> Vector:
     """Return roll, pitch and yaw [rad] of the tip frame in the last link: z is the tool's axis and x its side."""
-    z = np.array(arm.tool_axis) / np.linalg.norm(arm.tool_axis)
-    y = np.cross(z, arm.tool_side)
+    z = np.array(arm.tool.axis) / np.linalg.norm(arm.tool.axis)
+    y = np.cross(z, arm.tool.side)
     y = y / np.linalg.norm(y)
     x = np.cross(y, z)
     level = math.hypot(x[0], x[1])

@@ -16,7 +16,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, did_you_mean
-from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, Vector
+from armwright.robot.arm import AXES, Actuator, Arm, Joint, Link, MountedTool, Vector
 from armwright.robot.urdf_xml import Pose, UrdfDocument, UrdfJoint, read_document, rotation_about
 
 SNAP = 1e-3  # [rad]; an axis within it of x, y or z is aligned with it
@@ -117,8 +117,7 @@ def _arm(
         base=_vector(positions[0]),
         joints=tuple(joints),
         links=tuple(links),
-        tool_axis=_vector(rotation[:, 2]),
-        tool_side=_vector(rotation[:, 0]),
+        tool=MountedTool(axis=_vector(rotation[:, 2]), side=_vector(rotation[:, 0])),
         base_mass=sum(tree.document.links[name].mass for name in bodies[0]),
     )
     names = tuple(joint.name for joint in moving)

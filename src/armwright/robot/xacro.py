@@ -79,7 +79,7 @@ def _evaluated(terms: Sequence[str]) -> str:
 def _add_arguments(robot: Element, arm: Arm, mass_per_metre: float) -> None:
     SubElement(robot, "xacro:arg", name="prefix", default="")
     values = {f"base_{axis}": value for axis, value in zip("xyz", arm.base, strict=True)}
-    values |= {f"tool_{axis}": value for axis, value in zip("xyz", arm.tool, strict=True)}
+    values |= {f"tool_{axis}": value for axis, value in zip("xyz", arm.tool.tip, strict=True)}
     for n, link in enumerate(arm.links, start=1):
         growing = mass_per_metre * link.length
         # If all of the mass is proportional to the length, do not leave a rounding error as a constant part.

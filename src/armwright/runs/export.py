@@ -20,6 +20,7 @@ from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.selection import pick
 from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
 
 OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
 
@@ -50,6 +51,10 @@ def _sheet(history: History, member: FrontMember) -> str:
     notes = [f"Masses: {space.mass_note}."]
     if task.payloads.any():
         notes.append(f"Torques with the payload of {task.payloads.max():g} kg at most; of the arm alone they are less.")
+    up = mounted_vector(DIRECTIONS["+z"], space.mount_of(member.design))
+    if up != DIRECTIONS["+z"]:
+        shown = ", ".join(f"{value:g}" for value in up)
+        notes.append(f"Axes are the world's, with all joints at 0; the arm's own z then points along ({shown}).")
     evaluation = history.evaluation([member.number])
     angle = f" and {np.degrees(evaluation.angle_error.max()):.2f}°" if evaluation.target_arrays.oriented else ""
     notes.append(f"Targets are missed by {1e3 * evaluation.position_error.max():.2f} mm{angle} at most.")

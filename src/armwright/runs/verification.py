@@ -18,7 +18,6 @@ from armwright.pareto import masked_objectives
 from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.problem import Outcomes, Problem, worst_case
 from armwright.runs.history import History
-from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.parameters import Design
 from armwright.spaces.tolerance import perturbed
 
@@ -72,7 +71,7 @@ def verify(
     matrix = problem.space.matrix(designs)
     exact = _outcomes(problem, matrix)
     moved = worst_case([_outcomes(problem, copies) for copies in perturbed(problem.space, matrix)])
-    dof = stack_designs(problem.space, matrix).dof
+    dof = problem.arms(matrix).dof
     starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), dof))
     started = worst_case([_outcomes(problem, matrix, start) for start in starts])
     allowed = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
@@ -90,6 +89,6 @@ def _within(outcomes: Outcomes, allowed: Array) -> NDArray[np.bool_]:
 
 def _outcomes(problem: Problem, matrix: Array, start: Array | None = None) -> Outcomes:
     """Evaluate designs in float64; start: (T, D) angles [rad], None for the straight start."""
-    arrays = stack_designs(problem.space, matrix, "float64")
+    arrays = problem.arms(matrix, "float64")
     evaluations = [evaluate_arrays(arrays, scene, "cpu", start) for scene in problem.scenes]
     return worst_case([problem.outcomes(evaluation) for evaluation in evaluations])

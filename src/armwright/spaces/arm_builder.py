@@ -13,6 +13,8 @@ from armwright.spaces.joint_modules import (
 )
 from armwright.spaces.parameters import Design
 from armwright.spaces.space_schema import SpaceSchema
+from armwright.spaces.tool_mount import mounted_tools
+from armwright.tasks.tool import Tool
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
@@ -20,11 +22,11 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 class ArmBuilder:
     """Builder of the joints and links of one design; modules are counted from 0."""
 
-    def __init__(self, space: SpaceSchema, design: Design) -> None:
-        self._space, self._design, self._params = space, design, design.params
+    def __init__(self, space: SpaceSchema, design: Design, tool: Tool) -> None:
+        self._space, self._design, self._params, self._tool = space, design, design.params, tool
         self._modules = design.modules
         self._lengths = design.links
-        self._mount: Mount = cast("Mount", design.mount or space.mount[0])
+        self._mount: Mount = space.mount_of(design)
         self._actuators = {actuator.name: actuator for actuator in space.arm_actuators}
 
     def arm(self) -> Arm:
@@ -34,9 +36,7 @@ class ArmBuilder:
             base=self._design.origin,
             joints=tuple(self._joint(i, slot) for i in every for slot in range(len(self._modules[i].joints))),
             links=tuple(link for i in every for link in self._links(i)),
-            tool=mounted_vector(self._space.tool, self._mount),
-            tool_axis=mounted_vector(DIRECTIONS["+z"], self._mount),
-            tool_side=mounted_vector(DIRECTIONS["+x"], self._mount),
+            tool=mounted_tools(self._tool)[self._mount],
             base_mass=self._carried_mass(0),
         )
 

@@ -17,6 +17,8 @@ from armwright.robot.arm import AXES
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS
 from armwright.spaces.parameters import CategoricalParameter
+from armwright.spaces.tool_mount import mounted_tools
+from armwright.tasks.tool import NO_TOOL, Tool
 
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.intp]
@@ -35,7 +37,9 @@ _SIGNS = np.array([[1.0 if world[0] == "+" else -1.0 for world in row] for row i
 _VECTORS = np.array(list(DIRECTIONS.values()))  # (directions, 3)
 
 
-def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "float32") -> ArmArrays:
+def stack_designs(
+    space: DesignSpace, matrix: Array, tool: Tool = NO_TOOL, precision: Precision = "float32"
+) -> ArmArrays:
     """Build the arms of a matrix of designs.
 
     Equal to the bit to `stack_arms` of the arms built one by one.
@@ -43,6 +47,7 @@ def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "flo
     Args:
         space: The design space.
         matrix: (N, P) designs, as from `DesignSpace.matrix`; values outside the ranges of the space are allowed.
+        tool: The tool at the end of each arm.
         precision: The precision of the arrays that the kernels read.
     """
     columns = _Columns(space, matrix)
@@ -65,8 +70,8 @@ def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "flo
     present = _flatten(present)
     flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
     n_joints = present.sum(axis=1).astype(np.int32)
-    tool = _rotate_one(np.array(space.tool), columns)
-    flat["offset"][np.arange(columns.n), n_joints - 1] += tool
+    tip, axis, side = _mounted(tool, columns)
+    flat["offset"][np.arange(columns.n), n_joints - 1] += tip
     return ArmArrays(
         base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
         motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
@@ -76,9 +81,9 @@ def stack_designs(space: DesignSpace, matrix: Array, precision: Precision = "flo
         com=flat["com"].astype(precision),
         mass=flat["mass"].astype(precision),
         radius=flat["radius"].astype(precision),
-        tool=tool,
-        tool_axis=_rotate_one(_VECTORS[4], columns).astype(precision),
-        tool_side=_rotate_one(_VECTORS[0], columns).astype(precision),
+        tip=tip,
+        tool_axis=axis.astype(precision),
+        tool_side=side.astype(precision),
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(columns.links, axis=1)[:, -1],
@@ -259,9 +264,10 @@ def _rotate(vectors: Array, mount: Indices) -> Array:
     return rotated
 
 
-def _rotate_one(vector: Array, columns: _Columns) -> Array:
-    """Rotate the same vector (3,) of every base into world axes (N, 3)."""
-    return _rotate(np.broadcast_to(vector, (columns.n, 1, 3)), columns.mount)[:, 0]
+def _mounted(tool: Tool, columns: _Columns) -> list[Array]:
+    """Return the tip [m], the z axis and the x axis of the tool of every arm, (N, 3) each."""
+    tools = mounted_tools(tool).values()
+    return [np.array([getattr(one, name) for one in tools])[columns.mount] for name in ("tip", "axis", "side")]
 
 
 def _in_last_slot(values: Array, n_slots: int) -> Array:

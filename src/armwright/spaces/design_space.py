@@ -20,6 +20,7 @@ from armwright.spaces.arm_builder import ArmBuilder
 from armwright.spaces.design_parameters import ConditionalParameter, check_parameters, conditional_parameters
 from armwright.spaces.parameters import CategoricalParameter, Design, Parameter, ParameterValue
 from armwright.spaces.space_schema import SpaceSchema
+from armwright.tasks.tool import NO_TOOL, Tool
 from armwright.yaml_documents import check_document, parse_document, read_document
 
 TOY_MASS = 0.1  # [kg] of a whole arm
@@ -174,15 +175,15 @@ class DesignSpace(SpaceSchema, frozen=True):
         rows = [[parameter.sample(rng) for parameter in parameters] for _ in range(n)]
         return self.designs(np.array(rows, dtype=np.float64).reshape(n, len(parameters)))
 
-    def arm(self, design: Design) -> Arm:
-        """Return the physical chain that a design builds.
+    def arm(self, design: Design, tool: Tool = NO_TOOL) -> Arm:
+        """Return the arm that a design builds, with a tool at its end.
 
         Raises:
             DesignError: If the design is not in the space.
         """
         if not self.min_joints <= len(design.joints) == len(design.links) <= self.max_joints:
             self.design(design.params)  # raises the reason
-        return ArmBuilder(self, design).arm()
+        return ArmBuilder(self, design, tool).arm()
 
     @property
     def is_toy(self) -> bool:

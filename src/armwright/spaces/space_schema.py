@@ -7,10 +7,10 @@ from typing import Any, Self, cast
 from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
 
 from armwright.robot.actuators import ActuatorRecord, TorqueKind, resolve_actuator
-from armwright.robot.arm import Actuator, Vector
+from armwright.robot.arm import Actuator
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
 from armwright.spaces.link_mass import MassModel, MassPerMetre
-from armwright.spaces.parameters import Range
+from armwright.spaces.parameters import Design, Range
 
 Restriction = float | str | Range | tuple[str, ...]
 
@@ -53,8 +53,6 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     """Direction of a link in the frame of its joint; several choices add the parameters direction_j."""
     link_radius: float = Field(default=0.015, gt=0.0, le=1.0)
     """Radius of all links [m]."""
-    tool: Vector = (0.0, 0.0, 0.0)
-    """Offset from the end of the last link to the tip, in the frame of that link [m]."""
     mass: MassModel = MassPerMetre()
     """Mass of the links."""
     actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MAX_ACTUATORS)
@@ -128,12 +126,16 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         """The actuators as an arm has them, in the order of the file."""
         return _arm_actuators(self)
 
+    def mount_of(self, design: Design) -> Mount:
+        """Return the surface that the arm of a design is mounted on."""
+        return cast("Mount", design.mount or self.mount[0])
+
     @property
     def max_reach(self) -> float:
-        """The longest possible arm, with all slides extended [m]."""
+        """The length of the longest possible arm without a tool, with all slides extended [m]."""
         has_slides = any(MODULES[letter].is_prismatic for letter in self.joint_types)
         stroke = self.stroke if isinstance(self.stroke, (int, float)) else self.stroke[1]
-        return self.max_joints * (self.link[1] + (stroke if has_slides else 0.0)) + math.hypot(*self.tool)
+        return self.max_joints * (self.link[1] + (stroke if has_slides else 0.0))
 
 
 @lru_cache(maxsize=64)
@@ -165,8 +167,6 @@ def _check_ranges(space: SpaceSchema) -> None:
         raise ValueError(f"link = [{space.link[0]:g}, {space.link[1]:g}] m: a link must be longer than 0 m")
     if not MIN_STROKE <= space.min_stroke <= MAX_LENGTH:
         raise ValueError(f"stroke = {space.min_stroke:g} m is outside {MIN_STROKE:g} <= stroke <= {MAX_LENGTH:g} m")
-    if max(abs(value) for value in space.tool) > MAX_LENGTH:
-        raise ValueError(f"tool = {list(space.tool)} m exceeds ±{MAX_LENGTH:g}")
 
 
 def _check_joint_ranges(space: SpaceSchema) -> None:

@@ -26,6 +26,7 @@ from armwright.tasks.targets import (
     position_targets,
     stack_targets,
 )
+from armwright.tasks.tool import NO_TOOL, Tool, read_tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_REGIONS, Region
 from armwright.yaml_documents import check_document
 
@@ -51,6 +52,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     Attributes:
         targets: Points [m]. Tool directions, tolerances and weights of targets are in `target_arrays`.
+        tool: The tool at the end of the last link.
         payload: Mass that the tip carries, at all targets or at each [kg].
         payload_factors: Factors by which the payload may be heavier; each objective takes its worst case.
         target_noise: Distance by which all targets may be off along x, y or z [m]; likewise.
@@ -67,6 +69,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # also names run folders
     targets: tuple[Point, ...] = Field(max_length=MAX_TARGETS)
+    tool: Tool = NO_TOOL
     payload: float | tuple[float, ...] = 0.0
     payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MAX_PAYLOAD_FACTOR)], ...] = Field(
         default=(), max_length=10
@@ -131,6 +134,13 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         else:
             corners = tuple(dict.fromkeys(corner for region in regions for corner in region.corners))
         return {**cast("dict[str, Any]", content), "targets": corners}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_tool(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or isinstance(cast("Any", content).get("tool", NO_TOOL), Tool):
+            return cast("Any", content)
+        return {**cast("dict[str, Any]", content), "tool": read_tool(content["tool"])}
 
     @field_validator("moves", mode="before")
     @classmethod

@@ -321,9 +321,9 @@ function drawPosture(group, arm, q, paints) {
     group.add(joint);
   }
   const radius = thick(arm, 0);
-  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.tool_axis[k]); // end of the base plate
+  const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.up[k]); // end of the base plate
   group.add(rod(behind(2.05 * radius), behind(1.15 * radius), 2.4 * radius, paints.base));
-  if (length(arm.tool) > 0) group.add(rod(ends.at(-1), joints.at(-1), 0.6 * radius, paints.base));
+  if (length(arm.tip) > 0) group.add(rod(ends.at(-1), joints.at(-1), 0.6 * radius, paints.base));
   const tip = ball(joints.at(-1), 1.15 * radius, paints.link);
   tip.userData.joint = q.length;
   group.add(tip);

@@ -38,7 +38,7 @@ export function chain(arm, q) {
     ends.push(place);
   }
   const [x, z] = [turned(frame, arm.tool_side), turned(frame, arm.tool_axis)];
-  return { joints: [...joints, add(place, turned(frame, arm.tool))], ends, axes, centres, tool: [x, cross(z, x), z] };
+  return { joints: [...joints, add(place, turned(frame, arm.tip))], ends, axes, centres, tool: [x, cross(z, x), z] };
 }
 
 // Returns the joint torques [N m] that hold the arm and its payload [kg] against gravity.
@@ -72,7 +72,7 @@ export function angleOff(tool, frame, isWhole) {
 
 // Returns the largest possible distance of the tip from the first joint [m].
 export function reach(arm) {
-  let sum = length(arm.tool);
+  let sum = length(arm.tip);
   for (let j = 0; j < arm.kind.length; j++) {
     sum += linkLength(arm, j) + (arm.kind[j] === PRISMATIC ? Math.max(Math.abs(arm.lower[j]), Math.abs(arm.upper[j])) : 0);
   }

@@ -1,0 +1,47 @@
+"""Tools of tasks, mounted on the ends of arms."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.robot.arm import Arm, MountedTool, Vector
+from armwright.rotations import rotation_from_rpy
+from armwright.spaces.joint_modules import DIRECTIONS, MOUNTS, Mount, mounted_vector
+from armwright.tasks.tool import NO_TOOL, Tool
+
+
+@lru_cache(maxsize=64)
+def mounted_tools(tool: Tool) -> Mapping[Mount, MountedTool]:
+    """Return a tool as the arms of a design space carry it, for each mount."""
+    return {mount: _mounted(tool, _mount_frame(mount), np.zeros(3)) for mount in MOUNTS}
+
+
+def with_tool(arm: Arm, tool: Tool) -> Arm:
+    """Return an existing arm with a tool on its tip."""
+    if tool == NO_TOOL:
+        return arm
+    z, x = np.array(arm.tool.axis), np.array(arm.tool.side)
+    return replace(arm, tool=_mounted(tool, np.column_stack([x, np.cross(z, x), z]), np.array(arm.tool.tip)))
+
+
+def _mount_frame(mount: Mount) -> Array:
+    """Return the (3, 3) rotation of the base, its axes in the world as columns."""
+    return np.column_stack([mounted_vector(DIRECTIONS[direction], mount) for direction in ("+x", "+y", "+z")])
+
+
+def _mounted(tool: Tool, frame: Array, start: Array) -> MountedTool:
+    """Return a tool whose own frame has these axes (3, 3) and this origin (3,) [m] in the frame of the last link."""
+    tip_frame = frame @ rotation_from_rpy(*tool.rpy)
+    return MountedTool(
+        tip=_vector(start + frame @ tool.tip),
+        axis=_vector(tip_frame[:, 2]),
+        side=_vector(tip_frame[:, 0]),
+    )
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (values + 0.0).tolist()  # no -0.0
+    return (x, y, z)
