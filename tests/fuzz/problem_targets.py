@@ -21,7 +21,7 @@ targets:
   - {position: [0.4, 0.0, 0.1], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}
   - {position: [0.4, 0.2, 0.1], orientation: [3.1416, 0, 1.5708]}
   - [0.1, 0.35, 0.5]
-tool: {tip: [0.02, 0.0, 0.1], rpy: [0.0, 0.3, 0.0]}
+tool: {tip: [0.02, 0.0, 0.1], rpy: [0.0, 0.3, 0.0], mass: 0.3, center: [0.0, 0.0, 0.05], inertia: [3.0e-4, 3e-4, 0]}
 payload: [0.5, 0.5, 0.0]
 payload_factors: [0.0, 1.2]
 target_noise: 0.005

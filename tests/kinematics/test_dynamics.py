@@ -29,6 +29,7 @@ from armwright.robot.urdf_writer import to_urdf
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.tasks.moves import Moves, quintic_rates, sample_moves, time_samples
 from armwright.tasks.task import Task
+from tests.support.exported_arms import a_body
 
 Array = NDArray[np.float64]
 CORNERS = ((0.35, 0.1, 0.3), (0.1, 0.45, 0.2), (0.3, -0.3, 0.3))
@@ -40,7 +41,7 @@ def task(**more: Any) -> Task:
 
 def any_arms(n: int, seed: int) -> list[Arm]:
     """Of all kinds of joints, links in any direction, loads at their ends or off them, and tools."""
-    rng = np.random.default_rng(seed)
+    rng, of_tools = np.random.default_rng(seed), np.random.default_rng([seed, 1])
 
     def vector(size: float) -> tuple[float, float, float]:
         x, y, z = np.round(rng.uniform(-size, size, 3), 3).tolist()
@@ -61,7 +62,8 @@ def any_arms(n: int, seed: int) -> list[Arm]:
         kinds = rng.choice(["revolute", "revolute", "prismatic", "fixed"], int(rng.integers(2, 7))).tolist()
         kinds[0] = kinds[0] if kinds[0] != "fixed" else "revolute"
         joints = tuple(map(joint, kinds))
-        arms.append(Arm(vector(0.5), joints, tuple(link() for _ in kinds), tool=MountedTool(vector(0.1))))
+        arm = Arm(vector(0.5), joints, tuple(link() for _ in kinds))
+        arms.append(replace(arm, tool=MountedTool(vector(0.1), **a_body(of_tools))))
     return arms
 
 
@@ -78,8 +80,10 @@ def loaded(arm: Arm, payload: float) -> Arm:
     """The same with a payload as a link of its own, fixed to the tip."""
     carried = Link(offset=(0.0, 0.0, 0.0), mass=payload, com=(0.0, 0.0, 0.0), radius=1e-9)
     end = Link(offset=arm.tool.tip, mass=0.0, com=(0.0, 0.0, 0.0), radius=1e-9)
-    fixed = Joint("fixed", "x")
-    return Arm(arm.base, (*arm.joints, fixed, fixed), (*arm.links, end, carried))
+    fixed, (x, y, z) = Joint("fixed", "x"), arm.tool.tip
+    u, v, w = arm.tool.com
+    tool = replace(arm.tool, tip=(0.0, 0.0, 0.0), com=(u - x, v - y, w - z))
+    return Arm(arm.base, (*arm.joints, fixed, fixed), (*arm.links, end, carried), tool)
 
 
 # Inverse dynamics
@@ -141,9 +145,9 @@ def test_power_equals_change_of_energy() -> None:
         speed = v + a * t
         kinetic = 0.5 * (speed * inverse_dynamics(arrays, at, 0.0 * v, speed, load, 0.0)).sum(axis=(1, 2))
         frames = forward_kinematics(arrays, at)
-        bodies = arrays.bodies
-        heights = (frames.position + (frames.rotation @ bodies.total_com[:, None, :, :, None])[..., 0])[..., 2]
-        potential = 9.81 * ((bodies.total_mass[:, None] * heights).sum(axis=2) + load * frames.tip[..., 2])
+        bodies = arrays.rigid_bodies
+        heights = (frames.position + (frames.rotation @ bodies.com[:, None, :, :, None])[..., 0])[..., 2]
+        potential = 9.81 * ((bodies.mass[:, None] * heights).sum(axis=2) + load * frames.tip[..., 2])
         return kinetic + potential[:, 0]
 
     h = 1e-5

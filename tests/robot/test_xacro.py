@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from armwright.robot.arm import Arm, Joint, Link, MountedTool, uniform_link
+from armwright.robot.arm import Arm, Joint, Link, uniform_link
 from armwright.robot.link_geometry import joint_limits
 from armwright.robot.urdf_writer import to_urdf
 from armwright.robot.xacro import to_xacro
@@ -89,7 +89,7 @@ def test_xacro_arguments_change_the_arm(arm: Arm) -> None:
         links.append(Link((x, y, z), mass + slope * length, (u, v, w), radius, end))
     assert_same(
         processed(to_xacro(arm), **arguments),
-        replace(arm, base=base, links=tuple(links), tool=MountedTool(tool, arm.tool.axis, arm.tool.side)),
+        replace(arm, base=base, links=tuple(links), tool=replace(arm.tool, tip=tool)),
     )
 
 

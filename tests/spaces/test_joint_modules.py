@@ -38,7 +38,9 @@ EVERYTHING: dict[str, Any] = {
     "actuators": ["XL430-W250", "XM430-W350", "XM540-W270"],
     "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
 }
-TOOL = Tool(tip=(0.05, -0.02, 0.1), rpy=(0.3, -0.7, 2.0))
+TOOL = Tool(
+    tip=(0.05, -0.02, 0.1), rpy=(0.3, -0.7, 2.0), mass=0.4, center=(0.01, 0.03, 0.06), inertia=(3e-4, 2e-4, 1e-4)
+)
 MIXED = DesignSpace.model_validate(EVERYTHING)
 TARGETS = load_task("target-2").target_positions
 
@@ -67,7 +69,10 @@ def test_stacked_designs_equal_stacked_arms_to_the_bit(space: DesignSpace, preci
                 assert np.array_equal(getattr(mine, part)[:, :room], getattr(theirs, part)), part
                 assert not getattr(mine, part)[:, room:].any()
             continue
-        of_arm = field.name in ("base", "tip", "tool_axis", "tool_side")
+        if field.name == "tool":
+            assert all(np.array_equal(getattr(mine, part.name), getattr(theirs, part.name)) for part in fields(mine))
+            continue
+        of_arm = field.name in ("base", "tool_axis", "tool_side")
         if mine.ndim > 1 and not of_arm:  # there is room for more joints than any of these has
             assert not (one.motion[:, theirs.shape[1] :] < 6).any()
             mine = mine[:, : theirs.shape[1]]

@@ -33,15 +33,28 @@ MIXED = Arm(
         uniform_link((0.0, 0.0, -0.1), 0.2, 0.02),
         Link((0.0, 0.12, 0.0), 0.0, (0.0, 0.0, 0.0), 0.01, end_mass=0.25),
     ),
-    tool=MountedTool((0.01, -0.02, 0.03), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    tool=MountedTool((0.01, -0.02, 0.03), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), 0.2, (0.01, 0.02, 0.03)),
     base_mass=0.3,
 )
+
+
+def a_body(rng: np.random.Generator) -> dict[str, Any]:
+    """Mass, centre and inertia of three bars at right angles, turned anyhow."""
+    bars = rng.uniform(1e-4, 1e-2, 3)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    tensor = turn @ np.diag(bars.sum() - bars) @ turn.T
+    tensor = (tensor + tensor.T) / 2.0
+    return {
+        "mass": float(rng.uniform(0.1, 2.0)),
+        "com": tuple(rng.uniform(-0.1, 0.1, 3).tolist()),
+        "inertia": tuple(tuple(row) for row in tensor.tolist()),
+    }
 
 
 def odd_arms(n: int, dof: int, seed: int) -> list[Arm]:
     """General arms; about half of their joints slide by what they would turn [m], half of their links end in a mass.
 
-    Their tools point anywhere.
+    Their tools point anywhere, and half of them have mass.
     """
     rng = np.random.default_rng([seed, dof])
     arms: list[Arm] = []
@@ -51,6 +64,8 @@ def odd_arms(n: int, dof: int, seed: int) -> list[Arm]:
         axis, side = np.linalg.qr(rng.normal(size=(3, 3)))[0][:2].tolist()
         tool = rng.uniform(-0.1, 0.1, 3).tolist()
         mounted = MountedTool(tuple(tool), tuple(axis), tuple(side))
+        if rng.random() < 0.5:
+            mounted = replace(mounted, **a_body(rng))
         arms.append(Arm(arm.base, tuple(joints), tuple(links), mounted))
     return arms
 
@@ -79,7 +94,7 @@ def full(arm: Arm, q: Array) -> Array:
 
 def load(arm: Arm) -> float:
     """The arm's weight at its reach [N m], the size of its torques."""
-    return reference.GRAVITY * sum(link.total_mass for link in arm.links) * max(1.0, arm.reach)
+    return reference.GRAVITY * (sum(link.total_mass for link in arm.links) + arm.tool.mass) * max(1.0, arm.reach)
 
 
 class Peer:

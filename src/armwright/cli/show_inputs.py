@@ -95,6 +95,7 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
     for name, value in (
         ("objectives", ", ".join(task.objectives or ())),
         ("constraints", ", ".join(task.constraints)),
+        ("tool", task.tool.describe()),
         ("payload [kg]", payloads if task.payloads.any() else ""),
         ("evaluated by the worst case, also", task.cases_description),
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),

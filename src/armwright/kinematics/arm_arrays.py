@@ -2,14 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Literal, Self, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
-from armwright.robot.arm import AXES, Arm, Joint
+from armwright.kinematics.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
+from armwright.robot.arm import AXES, Arm, Joint, MountedTool
 
 MAX_JOINTS = 16
 MAX_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
@@ -25,16 +26,8 @@ FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_
 ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
 
 
-class _PerArm:
-    """Arrays over arms, of which a slice is the same of fewer arms."""
-
-    def __getitem__(self, part: slice) -> Self:
-        values = vars(self).items()
-        return type(self)(**{name: None if value is None else value[part] for name, value in values})
-
-
 @dataclass(frozen=True)
-class Actuation(_PerArm):
+class Actuation(PerArm):
     """Actuators of N arms of up to D joints.
 
     Attributes:
@@ -49,51 +42,7 @@ class Actuation(_PerArm):
 
 
 @dataclass(frozen=True)
-class Bodies(_PerArm):
-    """Rigid bodies of the links of N arms of up to D joints, in float64 whatever the precision of the arms.
-
-    A link is a solid cylinder that carries a point mass at its end (`armwright.robot.arm.Link`).
-    """
-
-    mass: Array  # (N, D) of the cylinder [kg]
-    com: Array  # (N, D, 3) of the cylinder, from its joint [m]
-    offset: Array  # (N, D, 3) along the cylinder, from its joint to the next or to the end of the last link [m]
-    radius: Array  # (N, D) [m]
-    end_mass: Array  # (N, D) [kg]
-    end_mass_position: Array  # (N, D, 3) of the point mass, from the link's joint [m]
-
-    @property
-    def total_mass(self) -> Array:
-        """(N, D) mass of cylinder and point mass [kg]."""
-        return self.mass + self.end_mass
-
-    @property
-    def total_com(self) -> Array:
-        """(N, D, 3) centre of mass of cylinder and point mass, from the joint [m]."""
-        total = self.total_mass[..., None]
-        both = self.mass[..., None] * self.com + self.end_mass[..., None] * self.end_mass_position
-        return both / np.where(total > 0.0, total, 1.0)
-
-    @property
-    def inertia(self) -> Array:
-        """(N, D, 3, 3) about the total centre of mass, in the link's frame [kg m²]; equal to the exported files'."""
-        square = (self.offset**2).sum(axis=-1)
-        length = np.sqrt(square)[..., None]
-        axis = np.where(length > 0.0, self.offset / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
-        along = axis[..., :, None] * axis[..., None, :]
-        across_axis = (self.mass * (3.0 * self.radius**2 + square) / 12.0)[..., None, None]
-        around_axis = (self.mass * self.radius**2 / 2.0)[..., None, None]
-        tensor = across_axis * (np.eye(3) - along) + around_axis * along
-        centre = self.total_com
-        for mass, position in ((self.mass, self.com), (self.end_mass, self.end_mass_position)):
-            lever = position - centre
-            squared = (lever**2).sum(axis=-1)[..., None, None] * np.eye(3)
-            tensor += mass[..., None, None] * (squared - lever[..., :, None] * lever[..., None, :])
-        return tensor
-
-
-@dataclass(frozen=True)
-class ArmArrays(_PerArm):
+class ArmArrays(PerArm):
     """N arms of up to D joints. A shorter arm ends with fixed joints that have neither length nor mass.
 
     All floats that the kernels read are of one precision; the others are float64.
@@ -104,17 +53,17 @@ class ArmArrays(_PerArm):
     lower: Floats  # (N, D) [rad] or [m]; ±1 for fixed joints, so that nothing divides by 0
     upper: Floats  # (N, D) [rad] or [m]
     offset: Floats  # (N, D, 3) from a joint to the next, or to the tip of the tool [m]
-    com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next [m]
-    mass: Floats  # (N, D) [kg]
+    com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next, or the tool [m]
+    mass: Floats  # (N, D) [kg]; of the last link with the tool
     radius: Floats  # (N, D) of the link after a joint [m]; 0 if there is none
-    tip: Array  # (N, 3) from the end of the last link to the tip [m], in its frame; included in `offset`
+    tool: Tools  # included in the last link's `offset`, `com` and `mass`
     tool_axis: Floats  # (N, 3) the tool's own z in the world with all joints at 0, and so in the last local frame
     tool_side: Floats  # (N, 3) likewise the tool's own x
     n_joints: Ints  # (N,) number of an arm's joints, at most D
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
     length: Array  # (N,) of all links [m]
     base_mass: Array  # (N,) mass fixed to the base [kg]
-    bodies: Bodies  # for dynamics alone
+    bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
 
     def __len__(self) -> int:
@@ -129,6 +78,11 @@ class ArmArrays(_PerArm):
     def dof(self) -> int:
         """Number D of joints of the longest arm, fixed ones included."""
         return self.motion.shape[1]
+
+    @property
+    def rigid_bodies(self) -> RigidBodies:
+        """What moves with each joint, the tool included."""
+        return rigid_bodies(self.bodies, self.tool, self.n_joints - 1)
 
     @property
     def motions(self) -> Motions:
@@ -182,12 +136,14 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         upper[i, own] = [1.0 if joint.kind == "fixed" else joint.upper for joint in arm.joints]
         travel[i, own] = [joint.travel for joint in arm.joints]
         offset[i, own] = [link.offset for link in arm.links]
-        offset[i, len(arm.joints) - 1] += arm.tool.tip
         com[i, own] = [link.total_com for link in arm.links]
         mass[i, own] = [link.total_mass for link in arm.links]
         radius[i, own] = [link.radius if link.length > 0.0 else 0.0 for link in arm.links]
         for part in fields(Bodies):
             getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
+    n_joints = np.array([len(arm.joints) for arm in arms], dtype=np.int32)
+    tool = stack_tools([arm.tool for arm in arms])
+    add_tools(tool, n_joints - 1, offset, com, mass)
     return ArmArrays(
         base=np.array([arm.base for arm in arms], dtype=precision),
         motion=motion,
@@ -197,16 +153,37 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         com=com.astype(precision),
         mass=mass.astype(precision),
         radius=radius.astype(precision),
-        tip=np.array([arm.tool.tip for arm in arms]),
-        tool_axis=np.array([arm.tool.axis for arm in arms], dtype=precision),
-        tool_side=np.array([arm.tool.side for arm in arms], dtype=precision),
-        n_joints=np.array([len(arm.joints) for arm in arms], dtype=np.int32),
+        tool=tool,
+        tool_axis=tool.axis.astype(precision),
+        tool_side=tool.side.astype(precision),
+        n_joints=n_joints,
         travel=travel,
         length=np.array([arm.length for arm in arms]),
         base_mass=np.array([arm.base_mass for arm in arms]),
         bodies=bodies,
         actuation=_actuation(arms, dof),
     )
+
+
+def stack_tools(tools: Sequence[MountedTool]) -> Tools:
+    """Stack tools into arrays."""
+    return Tools(*(np.array([getattr(tool, part.name) for tool in tools]) for part in fields(Tools)))
+
+
+def add_tools(tools: Tools, last: NDArray[np.integer], offset: Array, com: Array, mass: Array) -> None:
+    """Add tools to the last links of N arms, in place.
+
+    Args:
+        tools: The tools.
+        last: (N,) index of the last link.
+        offset: (N, D, 3) of the links [m].
+        com: (N, D, 3) [m].
+        mass: (N, D) [kg].
+    """
+    own = np.arange(len(last)), last
+    if tools.mass.any():
+        mass[own], com[own] = joined(mass[own], com[own], tools.mass, offset[own] + tools.com)
+    offset[own] += tools.tip
 
 
 def round_down(limits: Array, precision: Precision) -> Any:

@@ -61,7 +61,7 @@ def _distances(
     real, vector, dim = kernels.real, kernels.Vector3, q.shape[:2]
     starts, ends = (wp.empty(q.shape, dtype=vector, device=device) for _ in range(2))
     offset = arms.offset.copy()
-    offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tip.astype(arms.precision)
+    offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
     motion = on_device(arms.motion, wp.int32)
     posed = [on_device(arms.base, vector), motion, on_device(offset, vector)]
     posed.append(on_device(q.astype(arms.precision), real))

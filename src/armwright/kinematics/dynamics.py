@@ -47,8 +47,8 @@ def _newton_euler(
     arms: ArmArrays, frames: Frames, velocity: Array, acceleration: Array, payload: Array, gravity: float
 ) -> Array:
     n, k, dof = velocity.shape
-    bodies = arms.bodies
-    mass, com, inertia = bodies.total_mass[..., None], bodies.total_com, bodies.inertia
+    bodies = arms.rigid_bodies
+    mass, com, inertia = bodies.mass[..., None], bodies.com, bodies.inertia
     prismatic = arms.prismatic[:, None, :, None]  # (N, 1, D, 1)
     rate, rate_change = frames.axis * velocity[..., None], frames.axis * acceleration[..., None]  # (N, K, D, 3)
     angular_rate, angular_change = np.where(prismatic, 0.0, rate), np.where(prismatic, 0.0, rate_change)
@@ -150,7 +150,7 @@ def _path_derivatives(arms: ArmArrays, q: Array, frames: Frames, line: Array) ->
 
 def _damping(arms: ArmArrays) -> Array:
     """Return the (N,) damping on the diagonal of J Jᵀ [m²], by an arm's size: its length, and 1 m for slides."""
-    size = np.hypot(arms.length + np.linalg.norm(arms.tip, axis=1), arms.prismatic.any(axis=1))
+    size = np.hypot(arms.length + np.linalg.norm(arms.tool.tip, axis=1), arms.prismatic.any(axis=1))
     return (DAMPING * np.where(size > 0.0, size, 1.0)) ** 2  # an arm without size does not move its tip at all
 
 

@@ -52,7 +52,8 @@ class Digits:
         """Derive the decimals from the space's longest arm and the largest objectives so far."""
         space = history.problem.space
         reach = history.problem.max_reach
-        weight = space.max_joints * space.mass.mass(space.link[1]) + 2.0 * float(history.problem.task.payloads.max())
+        task = history.problem.task
+        weight = space.max_joints * space.mass.mass(space.link[1]) + task.tool.mass + 2.0 * float(task.payloads.max())
         heaviest = GRAVITY * reach * weight  # [N m], more than any torque
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres

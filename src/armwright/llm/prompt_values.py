@@ -30,6 +30,7 @@ from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DE
 from armwright.spaces.tolerance import length_columns
 from armwright.tasks.targets import REACHED, describe_targets
 from armwright.tasks.task import IN_ORDER, Task
+from armwright.tasks.tool import Tool
 from armwright.text import one_line
 
 MAX_TARGETS = 64  # shown
@@ -82,6 +83,7 @@ VARIABLES = {
     "description": "description of the task, on one line",
     "targets": "target points as text; n_targets_shown of n_targets",
     "restricted": "parameters that are fixed or narrower than the space's ranges: name with low and high, or choices",
+    "tool": "mass of the tool, as text",
     "payload": "payload of the tip at the targets, as text; empty if there is none",
     "obstacles": "obstacles, each as text",
     "collisions": "true if contact counts in an objective",
@@ -184,6 +186,7 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "gravity": GRAVITY,
         "task": task,
         "description": one_line(task.description, MAX_DESCRIPTION_LENGTH),
+        "tool": _describe_tool(task.tool),
         "payload": _describe_payload(task),
         "obstacles": [obstacle.describe() for obstacle in task.obstacles],
         "collisions": problem.uses(*CLEARANCE_QUANTITIES),
@@ -212,6 +215,18 @@ def _task_specific(objective: Objective, task: Task) -> Objective:
     if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(target_arrays.weight != 1.0):
         return replace(objective, description=f"{objective.description}, times the target's weight")
     return objective
+
+
+def _describe_tool(tool: Tool) -> str:
+    """Describe the mass of the tool."""
+    if tool.mass == 0.0:
+        return "the tip has no mass of its own"
+    centre = ", ".join(f"{value:g}" for value in tool.center)
+    inertia = f" and moments of inertia of ({', '.join(f'{value:g}' for value in tool.inertia)}) kg m² around it"
+    return (
+        f"the tool has {tool.mass:g} kg, with its centre of mass at ({centre}) m from the end of the last link in that "
+        f"link's own frame{inertia if any(tool.inertia) else ''}"
+    )
 
 
 def _describe_payload(task: Task) -> str:

@@ -120,7 +120,7 @@ RMS_TORQUE = Objective(
 MASS = Objective(
     name="mass",
     unit="kg",
-    description="the mass of the arm, its actuators included, without its payload",
+    description="the mass of the arm, its actuators and tool included, without its payload",
     each=lambda e: e.arms.mass.sum(axis=1, dtype=np.float64) + e.arms.base_mass,
     over="arm",
 )

@@ -176,6 +176,8 @@ def _designs(history: History, numbers: range) -> Arrays:
         "up": np.array(
             [mounted_vector(DIRECTIONS["+z"], space.mount_of(trial.design)) for trial in trials], np.float32
         ),
+        "com": evaluation.arms.com,
+        "mass": evaluation.arms.mass,
         **_arm_arrays(arms, evaluation.arms.dof),
     }
 
@@ -198,8 +200,6 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
         "axis": np.array([[AXES.index(j.axis) for j in row] for row in joints], dtype=np.uint8),
         **{name: floats([[getattr(j, name) for j in row] for row in joints]) for name in ("lower", "upper", "travel")},
         "offset": floats([[link.offset for link in row] for row in links]),
-        "com": floats([[link.total_com for link in row] for row in links]),
-        "mass": floats([[link.total_mass for link in row] for row in links]),
         "radius": floats([[link.radius for link in row] for row in links]),
     }
 

@@ -151,15 +151,23 @@ class MountedTool:
         tip: Position of the tip [m].
         axis: Direction of the z axis of the tip frame.
         side: Direction of the x axis of the tip frame.
+        mass: [kg].
+        com: Centre of mass [m].
+        inertia: (3, 3) about the centre of mass [kg m²].
     """
 
     tip: Vector = (0.0, 0.0, 0.0)
     axis: Vector = (0.0, 0.0, 1.0)
     side: Vector = (1.0, 0.0, 0.0)
+    mass: float = 0.0
+    com: Vector = (0.0, 0.0, 0.0)
+    inertia: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def __post_init__(self) -> None:
-        if not all(math.isfinite(v) for v in self.tip):
-            raise ArmError(f"the tip of the tool must be finite: {self.tip} m")
+        if not all(math.isfinite(v) for v in (*self.tip, self.mass, *self.com, *sum(self.inertia, ()))):
+            raise ArmError(f"a tool's numbers must be finite: {self}")
+        if self.mass < 0.0:
+            raise ArmError(f"a tool needs mass >= 0 kg, not {self.mass} kg")
         axis, side = self.axis, self.side
         across = sum(a * b for a, b in zip(axis, side, strict=True))
         if not max(abs(math.hypot(*axis) - 1.0), abs(math.hypot(*side) - 1.0), abs(across)) < UNIT:
@@ -203,8 +211,8 @@ class Arm:
 
     @property
     def mass(self) -> float:
-        """The total mass, including the base mass [kg]."""
-        return self.base_mass + sum(link.total_mass for link in self.links)
+        """The total mass, including the base mass and the tool [kg]."""
+        return self.base_mass + sum(link.total_mass for link in self.links) + self.tool.mass
 
     @property
     def length(self) -> float:

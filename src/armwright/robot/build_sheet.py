@@ -101,6 +101,8 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
     if any(arm.tool.tip):
         shift = ", ".join(f"{1e3 * value:.1f}" for value in arm.tool.tip)
         lines += ["", f"The tool reaches ({shift}) mm from the end of the last link to the tip."]
+    if arm.tool.mass > 0.0:
+        lines += ["", f"The tool has {1e3 * arm.tool.mass:.4g} g."]
     motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
     if motors:
         prices = [motor.price for motor in motors]

@@ -139,6 +139,11 @@ def tip_rpy(arm: Arm) -> Vector:
     return (roll + 0.0, pitch + 0.0, yaw + 0.0)  # no -0.0
 
 
+def tool_moments(arm: Arm) -> dict[str, str]:
+    """Return the moments of the tool about its centre of mass [kg m²], by their URDF names."""
+    return {name: f"{arm.tool.inertia[row][column]:.17g}" for name, (row, column) in TENSOR_INDICES.items()}
+
+
 def midpoint(link: Link) -> Vector:
     """Return the point halfway to the next joint [m]."""
     x, y, z = link.offset

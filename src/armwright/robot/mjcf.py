@@ -18,6 +18,7 @@ from armwright.robot.link_geometry import (
     tip_position,
     tip_rpy,
     to_xml,
+    tool_moments,
 )
 
 TYPES = {"revolute": "hinge", "prismatic": "slide"}  # a fixed joint is a body without a joint
@@ -29,8 +30,9 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     """Return the MJCF of an arm: `base`, link_1 on joint_1, …, a site `tip`, and motor_1 on joint_1, ….
 
     Names, frames, masses, inertias and colours are those of `to_urdf`: link frames are at their joints, and with all
-    joints at 0 they are parallel to the world frame. Each moving joint has a motor with gear 1, limited to the torque
-    of its actuator if it has one. `ctrl` is the torque [N m] or force [N] on that joint.
+    joints at 0 they are parallel to the world frame. A tool with mass is a body `tool` at the end of the last link.
+    Each moving joint has a motor with gear 1, limited to the torque of its actuator if it has one. `ctrl` is the torque
+    [N m] or force [N] on that joint.
 
     Geometry is for display only. It has no mass, since the mass of each link is stated, and no contacts: links overlap
     at their joints, so contacts would push them apart.
@@ -49,6 +51,7 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
         _add_joint(body, f"joint_{segment.number}", segment.joint)
         _add_link(body, segment.joint, segment.link)
     _add_tip(body, arm)
+    _add_tool(body, arm)
     actuators = SubElement(root, "actuator")
     for n, joint in moving_joints(arm):
         motor = {"name": f"motor_{n}", "joint": f"joint_{n}", "gear": "1"}
@@ -103,3 +106,11 @@ def _add_tip(body: Element, arm: Arm) -> None:
     if any(rpy):
         tip["euler"] = numbers(rpy)
     SubElement(body, "site", tip)
+
+
+def _add_tool(body: Element, arm: Arm) -> None:
+    if arm.tool.mass == 0.0:
+        return
+    tool = SubElement(body, "body", name="tool", pos=numbers(arm.links[-1].offset))
+    inertial = {"pos": numbers(arm.tool.com), "mass": number(arm.tool.mass)}
+    SubElement(tool, "inertial", inertial | {"fullinertia": " ".join(tool_moments(arm).values())})

@@ -1,6 +1,7 @@
 """An arm as SDFormat, which Gazebo and Drake load."""
 
 import re
+from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement
 
 from armwright.exceptions import ArmError
@@ -22,6 +23,7 @@ from armwright.robot.link_geometry import (
     tip_position,
     tip_rpy,
     to_xml,
+    tool_moments,
 )
 
 VERSION = "1.9"  # read by Gazebo Fortress and later
@@ -59,6 +61,8 @@ def to_sdf(arm: Arm, name: str = "arm") -> str:
             _add_axis(joint, segment.joint, segment.name)
     tip = SubElement(model, "frame", name="tip", attached_to=f"link_{len(arm.links)}")
     SubElement(tip, "pose").text = f"{numbers(tip_position(arm))} {numbers(tip_rpy(arm))}"
+    if arm.tool.mass > 0.0:
+        _add_tool(model, arm)
     return to_xml(sdf)
 
 
@@ -81,12 +85,28 @@ def _add_inertial(element: Element, link: Link) -> None:
     inertial = SubElement(element, "inertial")
     SubElement(inertial, "mass").text = number(max(link.total_mass, MIN_MASS))
     SubElement(inertial, "pose").text = f"{numbers(link.total_com)} {numbers(inertia_rpy(link))}"
-    inertia = SubElement(inertial, "inertia")
     # The smallest moment of a cylinder is at least m r² / 4, and a mass at its end only adds to it.
     added = MIN_MOMENT if link.mass * link.radius**2 / 4.0 < MIN_MOMENT else 0.0
-    for key, value in inertia_moments(link).items():
+    _add_moments(inertial, inertia_moments(link), added)
+
+
+def _add_moments(inertial: Element, moments: Mapping[str, str], added: float) -> None:
+    """Add the inertia, with `added` on its diagonal [kg m²]."""
+    inertia = SubElement(inertial, "inertia")
+    for key, value in moments.items():
         text = f"{float(value) + added:.17g}" if key in ("ixx", "iyy", "izz") else value
         SubElement(inertia, key).text = text
+
+
+def _add_tool(model: Element, arm: Arm) -> None:
+    last, tool = f"link_{len(arm.links)}", arm.tool
+    element = SubElement(model, "link", name="tool")
+    SubElement(element, "pose", relative_to=last).text = f"{numbers(arm.links[-1].offset)} 0 0 0"
+    inertial = SubElement(element, "inertial")
+    SubElement(inertial, "mass").text = number(max(tool.mass, MIN_MASS))
+    SubElement(inertial, "pose").text = f"{numbers(tool.com)} 0 0 0"
+    _add_moments(inertial, tool_moments(arm), MIN_MOMENT)
+    _add_joint(model, "tool_joint", "fixed", last, "tool")
 
 
 def _add_link(element: Element, segment: Segment) -> None:

@@ -20,6 +20,7 @@ from armwright.robot.link_geometry import (
     tip_position,
     tip_rpy,
     to_xml,
+    tool_moments,
 )
 
 FIXED = Joint("fixed", "z")
@@ -30,7 +31,7 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
 
     Link frames are at their joints; with all joints at 0 they are parallel to the world frame. The z axis of the tip
     frame is the tool's axis, its x axis the tool's side. Links are solid cylinders of uniform density from joint to
-    joint, for inertia, collision and display.
+    joint, for inertia, collision and display. A tool with mass is a link `tool` at the end of the last link.
 
     Example:
         >>> import armwright as aw
@@ -57,7 +58,11 @@ def urdf_tree(arm: Arm, name: str) -> Element:
         name, position = f"joint_{segment.number}", numbers(segment.position)
         add_joint(robot, name, segment.parent, segment.name, position, joint=segment.joint)
     SubElement(robot, "link", name="tip")
-    add_joint(robot, "tip_joint", f"link_{len(arm.links)}", "tip", numbers(tip_position(arm)), numbers(tip_rpy(arm)))
+    last = f"link_{len(arm.links)}"
+    add_joint(robot, "tip_joint", last, "tip", numbers(tip_position(arm)), numbers(tip_rpy(arm)))
+    if arm.tool.mass > 0.0:
+        add_tool(robot, arm, "tool")
+        add_joint(robot, "tool_joint", last, "tool", numbers(arm.links[-1].offset))
     return robot
 
 
@@ -83,6 +88,14 @@ def add_joint(
     if joint.kind != "fixed":
         SubElement(element, "axis", xyz=AXIS_VECTORS[joint.axis])
         SubElement(element, "limit", {key: number(value) for key, value in joint_limits(joint).items()})
+
+
+def add_tool(robot: Element, arm: Arm, name: str) -> None:
+    """Add the link of a tool with mass."""
+    inertial = SubElement(SubElement(robot, "link", name=name), "inertial")
+    SubElement(inertial, "origin", xyz=numbers(arm.tool.com), rpy="0 0 0")
+    SubElement(inertial, "mass", value=number(arm.tool.mass))
+    SubElement(inertial, "inertia", tool_moments(arm))
 
 
 def _add_link(robot: Element, segment: Segment) -> None:

@@ -15,7 +15,7 @@ from armwright.robot.link_geometry import (
     tip_rpy,
     to_xml,
 )
-from armwright.robot.urdf_writer import add_cylinder, add_header, add_joint, add_marker
+from armwright.robot.urdf_writer import add_cylinder, add_header, add_joint, add_marker, add_tool
 
 NAMESPACE = "http://www.ros.org/wiki/xacro"
 NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
@@ -56,9 +56,13 @@ def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float = 0.0) -> str:
         terms = _scaled(_direction(segment.link), segment.number)
         position = _evaluated(terms)
     SubElement(robot, "link", name=_prefixed("tip"))
+    end = position
     position = " ".join(f"${{{term} + tool_{axis}}}" for axis, term in zip("xyz", terms, strict=True))
     last = _prefixed(f"link_{len(arm.links)}")
     add_joint(robot, _prefixed("tip_joint"), last, _prefixed("tip"), position, numbers(tip_rpy(arm)))
+    if arm.tool.mass > 0.0:
+        add_tool(robot, arm, _prefixed("tool"))
+        add_joint(robot, _prefixed("tool_joint"), last, _prefixed("tool"), end)
     return to_xml(robot)
 
 

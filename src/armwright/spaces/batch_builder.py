@@ -12,7 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Actuation, ArmArrays, Bodies, Precision, round_down
+from armwright.kinematics.arm_arrays import (
+    FIXED,
+    PRISMATIC,
+    Actuation,
+    ArmArrays,
+    Precision,
+    add_tools,
+    round_down,
+    stack_tools,
+)
+from armwright.kinematics.rigid_bodies import Bodies, Tools
 from armwright.robot.arm import AXES
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS
@@ -70,8 +80,8 @@ def stack_designs(
     present = _flatten(present)
     flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
     n_joints = present.sum(axis=1).astype(np.int32)
-    tip, axis, side = _mounted(tool, columns)
-    flat["offset"][np.arange(columns.n), n_joints - 1] += tip
+    tools = _mounted(tool)[columns.mount]
+    add_tools(tools, n_joints - 1, flat["offset"], flat["com"], flat["mass"])
     return ArmArrays(
         base=np.ascontiguousarray(matrix[:, :3], dtype=precision),
         motion=np.ascontiguousarray(flat["motion"], dtype=np.int32),
@@ -81,9 +91,9 @@ def stack_designs(
         com=flat["com"].astype(precision),
         mass=flat["mass"].astype(precision),
         radius=flat["radius"].astype(precision),
-        tip=tip,
-        tool_axis=axis.astype(precision),
-        tool_side=side.astype(precision),
+        tool=tools,
+        tool_axis=tools.axis.astype(precision),
+        tool_side=tools.side.astype(precision),
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(columns.links, axis=1)[:, -1],
@@ -264,10 +274,10 @@ def _rotate(vectors: Array, mount: Indices) -> Array:
     return rotated
 
 
-def _mounted(tool: Tool, columns: _Columns) -> list[Array]:
-    """Return the tip [m], the z axis and the x axis of the tool of every arm, (N, 3) each."""
-    tools = mounted_tools(tool).values()
-    return [np.array([getattr(one, name) for one in tools])[columns.mount] for name in ("tip", "axis", "side")]
+@cache
+def _mounted(tool: Tool) -> Tools:
+    """Return a tool for each mount."""
+    return stack_tools(list(mounted_tools(tool).values()))
 
 
 def _in_last_slot(values: Array, n_slots: int) -> Array:

@@ -39,7 +39,15 @@ def _mounted(tool: Tool, frame: Array, start: Array) -> MountedTool:
         tip=_vector(start + frame @ tool.tip),
         axis=_vector(tip_frame[:, 2]),
         side=_vector(tip_frame[:, 0]),
+        mass=tool.mass,
+        com=_vector(start + frame @ tool.center),
+        inertia=_tensor(frame @ np.diag(tool.inertia) @ frame.T),
     )
+
+
+def _tensor(values: Array) -> tuple[Vector, Vector, Vector]:
+    x, y, z = map(_vector, values)
+    return (x, y, z)
 
 
 def _vector(values: Array) -> Vector:

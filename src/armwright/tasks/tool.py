@@ -1,10 +1,11 @@
 """The tool that an arm carries at the end of its last link."""
 
 import math
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Self, cast
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
+from armwright.tasks.moments import MAX_MASS, Moments, check_moments
 from armwright.tasks.targets import Position
 from armwright.yaml_documents import check_document
 
@@ -17,15 +18,37 @@ class Tool(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     Attributes:
         tip: Position of the tip [m].
         rpy: Roll, pitch and yaw of the tip frame about the fixed x, then y, then z [rad].
+        mass: [kg].
+        center: Centre of mass [m].
+        inertia: Moments about the centre of mass, around x, y and z [kg m²]; those of a point mass by default.
     """
 
     tip: Position = (0.0, 0.0, 0.0)
     rpy: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+    mass: float = Field(default=0.0, ge=0.0, le=MAX_MASS)
+    center: Position = (0.0, 0.0, 0.0)
+    inertia: Moments = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in ("center", "inertia"):
+            if self.mass == 0.0 and any(getattr(self, name)):
+                raise ValueError(f"{name} needs a mass above 0 kg, such as mass: 0.35")
+        check_moments(self.inertia)
+        return self
 
     @property
     def length(self) -> float:
         """Distance from the end of the last link to the tip [m]."""
         return math.hypot(*self.tip)
+
+    def describe(self) -> str:
+        """Return the tool on one line; empty without a tool."""
+        parts = [f"tip at {_vector(self.tip)} m"] if any(self.tip) else []
+        parts += [f"rpy {_vector(self.rpy)} rad"] if any(self.rpy) else []
+        parts += [f"{self.mass:g} kg at {_vector(self.center)} m"] if self.mass else []
+        parts += [f"inertia {_vector(self.inertia)} kg m²"] if any(self.inertia) else []
+        return ", ".join(parts)
 
 
 NO_TOOL = Tool()
@@ -34,5 +57,9 @@ NO_TOOL = Tool()
 def read_tool(value: Any) -> Tool:
     """Return the tool of a record in a task file; raise ValueError if it is not one."""
     if not isinstance(value, dict):
-        raise ValueError(f"tool: expected a record such as {{tip: [0, 0, 0.1]}}, got {value!r:.80}")
+        raise ValueError(f"tool: expected a record such as {{tip: [0, 0, 0.1], mass: 0.35}}, got {value!r:.80}")
     return check_document(cast("dict[Any, Any]", value), Tool, ValueError, "tool")
+
+
+def _vector(values: tuple[float, float, float]) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"
