@@ -63,7 +63,6 @@ actuators:
   - XM540-W270
   - XL430-W250
   - {name: mine, maker: me, kind: servo, voltage: 12, mass: 0.3, stall_torque: 6.0, speed: 5.0, price: 120, source: me}
-actuator_torque: stall
 safety_factor: 2.0
 restrict: {joint_1: [R, P], origin_y: 0.0, link_3: [0.1, 0.2]}
 grid: {link: 0.005, origin_x: 0.1}
@@ -169,8 +168,7 @@ def actuator_seeds() -> list[bytes]:
               "corner_speed": 1.0, "gear_ratio": 200.0, "rotor_inertia": 0.01, "coulomb_friction": 0.1,
               "viscous_friction": 0.05, "backlash": 0.004, "position_gain": 20.0, "damping_gain": 1.0, "current": 2.5,
               "estimates": ["rotor_inertia"]}  # fmt: skip
-    spaces = [
-        {"name": "a", "actuators": [record], "actuator_torque": kind, "safety_factor": 2.0}
-        for kind in ("stall", "rated", "peak")
-    ]
+    plain = {"name": "plain", "mass": 0.1}
+    records = ([record], [record, plain | {"rated_torque": 3.0, "kind": "harmonic"}], [plain | {"peak_torque": 3.0}])
+    spaces = [{"name": "a", "actuators": listed, "safety_factor": 2.0} for listed in records]
     return [yaml.safe_dump(space).encode() for space in spaces]

@@ -163,7 +163,7 @@ REFUSED = {
     "unknown actuator": (answer_with(space={"actuators": ["XM430-W351"]}), 'unknown actuator "XM430-W351"'),
     "actuators missing": (json.dumps({**FULL, "space": None}), "needs actuators"),
     "price missing": (answer_with(space={"actuators": ["MG996R"]}), "objective price needs the price of every"),
-    "torque missing": (answer_with(space={"actuators": ["AK60-6"]}), "actuator AK60-6 has no stall torque"),
+    "torque missing": (answer_with(space={"actuators": [{"name": "x", "mass": 1.0}]}), "actuator x states no torque"),
     "range": (answer_with(space={"link": [0.4, 0.1]}), "link"),
     "default's name": (answer_with(space={"name": "paper"}), "the space needs its own name"),
     "built-in name": (answer_with(task={"name": "shelf"}), '"shelf" is that of a built-in task'),

@@ -1,7 +1,7 @@
 """Actuators: their masses as loads and their torques as limits."""
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import mujoco
@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.exceptions import ArmError, SettingsError, SpaceError
+from armwright.kinematics.actuation import Actuation
 from armwright.kinematics.arm_arrays import FLOATS, stack_arms
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import named_objectives
@@ -55,10 +56,11 @@ def test_stacked_designs_and_arms_have_equal_actuators() -> None:
     one, other = stack_designs(SPACE, SPACE.matrix(designs)), stack_arms([SPACE.arm(design) for design in designs])
     for name in (*FLOATS, "motion", "base_mass"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
-    for name in ("effort", "price"):
-        assert np.array_equal(getattr(one.actuation, name), getattr(other.actuation, name)), name
+    for field in fields(Actuation):
+        mine, theirs = (getattr(arms.actuation, field.name) for arms in (one, other))
+        assert np.array_equal(mine, theirs, equal_nan=True), field.name
     part = one[3:9]
-    assert np.array_equal(part.actuation.effort, one.actuation.effort[3:9])
+    assert np.array_equal(part.actuation.peak, one.actuation.peak[3:9])
 
 
 def test_actuator_masses_agree_with_pinocchio_and_mujoco() -> None:
@@ -93,7 +95,37 @@ def test_first_actuator_adds_mass_but_no_torque() -> None:
     assert np.diff(values[:, 2]).tolist() == [-150.0, -200.0]
 
 
-def test_torque_utilisation_is_the_worst_share_of_allowed_torque() -> None:
+def test_actuation_is_by_the_motion_of_the_joint() -> None:
+    """A slide of 0.02 m/rad turns torques into forces, speeds into m/s, and inertia into a mass of equal energy."""
+    motor = ActuatorRecord(name="x", mass=0.1, stall_torque=4.0, speed=5.0, voltage=12.0).actuator()
+    joints = (Joint("prismatic", "z", 0.0, 0.3, motor, travel=0.02), Joint("revolute", "y", -1.0, 1.0, motor))
+    arms = stack_arms([Arm((0.0, 0.0, 0.0), joints, (Link((0.1, 0.0, 0.0), 0.1, (0.05, 0.0, 0.0), 0.01),) * 2)])
+    actuation = arms.actuation
+    slide, hinge = (
+        {name: getattr(actuation, name)[0, j] for name in ("peak", "no_load_speed", "rotor_inertia", "viscous")}
+        for j in (0, 1)
+    )
+    assert (hinge["peak"], hinge["no_load_speed"]) == (4.0, 5.0)
+    assert slide["peak"] == pytest.approx(4.0 / 0.02)  # N
+    assert slide["no_load_speed"] == pytest.approx(5.0 * 0.02)  # m/s
+    for mass, speed in ((slide, 0.1), (hinge, 5.0)):
+        assert 0.5 * mass["rotor_inertia"] * speed**2 == pytest.approx(0.5 * motor.rotor_inertia * 25.0)
+        assert mass["viscous"] * speed**2 == pytest.approx(motor.viscous_friction * 25.0)  # W
+
+
+def test_voltages_counts_different_supplies() -> None:
+    space = DesignSpace.model_validate({"joints": 3, "actuators": ["XL330-M288", "XM430-W350", "XM540-W270"]})
+    problem = Problem(TASK.model_copy(update={"constraints": ("voltages <= 1",)}), space)
+    base = space.sample(1, 0)[0].params
+    rows = [("XL330-M288", "XM430-W350", "XM540-W270"), ("XM540-W270", "XM430-W350", "XM540-W270"), ("XL330-M288",) * 3]
+    designs = [space.design(base | {f"motor_{j}": m for j, m in enumerate(row, start=1)}) for row in rows]
+    assert problem.evaluate(designs).violations[:, 0].tolist() == [1.0, 0.0, 0.0]
+    unknown = DesignSpace.model_validate({"actuators": [MID]})
+    with pytest.raises(SettingsError, match="voltages needs the voltage of every actuator"):
+        Problem(problem.task, unknown).evaluate(unknown.sample(1, 0))
+
+
+def test_torque_utilisation_is_the_worst_share_of_peak_torque_with_the_safety_factor() -> None:
     problem = Problem(TASK, SPACE, objectives=named_objectives(["torque_utilisation"]))
     designs = SPACE.sample(30, 5)
     torques = np.abs(problem.physics(designs).joint_torques)
@@ -108,7 +140,7 @@ def test_single_actuator_is_not_a_parameter() -> None:
     assert len(single.parameters) == 11
     design = single.sample(1, 0)[0]
     assert [joint.actuator.name for joint in single.arm(design).joints] == ["mid"] * 4
-    assert stack_designs(single, single.matrix([design])).actuation.effort.tolist() == [[4.1] * 4]
+    assert stack_designs(single, single.matrix([design])).actuation.peak.tolist() == [[4.1] * 4]
 
 
 @pytest.mark.parametrize(
@@ -116,7 +148,6 @@ def test_single_actuator_is_not_a_parameter() -> None:
     [
         ({"actuators": ["XM430-W35"]}, 'unknown actuator "XM430-W35".*Did you mean'),
         ({"actuators": [BIG, dict(BIG)]}, "actuators has duplicates"),
-        ({"actuators": [MID], "actuator_torque": "rated"}, "mid has no rated torque, its stall torque is known"),
         ({"actuators": [{"name": "x", "mass": -1.0}]}, "mass"),
         ({"actuators": [{"name": "x", "mass": 1.0}]}, "actuator x states no torque; give stall_torque"),
         ({"actuators": [MID | {"kind": "hydraulic"}]}, "kind"),
@@ -142,10 +173,10 @@ def test_objectives_report_missing_actuators() -> None:
         Problem(TASK, unpriced, objectives=named_objectives(["price"])).evaluate(unpriced.sample(1, 0))
 
 
-@pytest.mark.parametrize("wrong", [{"mass": -0.1}, {"effort": 0.0}, {"price": -1.0}, {"speed": float("inf")}])
+@pytest.mark.parametrize("wrong", [{"mass": -0.1}, {"peak_torque": 0.0}, {"price": -1.0}, {"speed": float("inf")}])
 def test_invalid_actuator_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ArmError, match="an actuator needs"):
-        Actuator(**{"name": "x", "mass": 0.1, "effort": 1.0, **wrong})
+        Actuator(**{"name": "x", "mass": 0.1, "peak_torque": 1.0, **wrong})
 
 
 def test_catalogue_names_a_source_for_each_actuator() -> None:
@@ -230,12 +261,12 @@ def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
     assert proposed[0].motors == ("big", "big", "mid", "small")
     member = run.front[0]
     urdf = pinocchio.buildModelFromXML(to_urdf(member.arm))
-    assert urdf.effortLimit.tolist() == [joint.actuator.effort for joint in member.arm.joints]
+    assert urdf.effortLimit.tolist() == [joint.actuator.peak_torque for joint in member.arm.joints]
     simulated = mujoco.MjModel.from_xml_string(to_mjcf(member.arm))
-    assert simulated.actuator_ctrlrange[:, 1].tolist() == [joint.actuator.effort for joint in member.arm.joints]
+    assert simulated.actuator_ctrlrange[:, 1].tolist() == [joint.actuator.peak_torque for joint in member.arm.joints]
     runner = CliRunner()
     prompt = runner.invoke(app, ["prompt", "--after", str(tmp_path / "run")]).output
-    assert "- mid: 0.082 kg, 2.05 N m, 250 USD" in prompt
+    assert "- mid: 0.082 kg, 4.1 N m, 250 USD" in prompt
     assert f"MOTORS: ({', '.join(member.design.motors)})" in prompt or "MOTORS: (" in prompt
     sheet = runner.invoke(app, ["export", str(tmp_path / "run"), "--design", str(member.number), "--format", "sheet"])
     price = sum(joint.actuator.price for joint in member.arm.joints)
@@ -252,12 +283,11 @@ def test_actuators_reach_run_prompt_page_and_exports(tmp_path: Path) -> None:
 def test_actuator_record_round_trips() -> None:
     again = DesignSpace.model_validate(json.loads(SPACE.model_dump_json()))
     assert again == SPACE
-    assert ActuatorRecord.model_validate(BIG).actuator("rated", 2.0).effort == 2.0
 
 
 def open_manipulator_x() -> Arm:
     """ROBOTIS OpenMANIPULATOR-X from its maker's URDF; the links' masses hold their actuators."""
-    motor = catalogue()["XM430-W350"].actuator("stall", 1.0)
+    motor = catalogue()["XM430-W350"].actuator()
     limits = ((-0.9, 0.9), (-0.57, 0.5), (-0.3, 0.44), (-0.57, 0.65))
     bodies = [
         ((0.0, 0.0, 0.0595), 0.098406837, (-0.000301849, 0.000540437, 0.047433464)),

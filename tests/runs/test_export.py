@@ -77,7 +77,9 @@ def test_exported_sdf_matches_the_design(run: Path, history: History) -> None:
     assert plant.GetModelInstanceName(model) == f"{HOSTILE}-3"
     for number, joint in enumerate(history.member(3).arm.joints, start=1):
         assert joint.actuator is not None
-        assert plant.GetJointActuatorByName(f"joint_{number}").effort_limit() == pytest.approx(joint.actuator.effort)
+        assert plant.GetJointActuatorByName(f"joint_{number}").effort_limit() == pytest.approx(
+            joint.actuator.peak_torque
+        )
 
 
 def test_exported_srdf_matches_the_urdf(run: Path) -> None:

@@ -243,7 +243,7 @@ def test_torque_utilisation_includes_moves() -> None:
     designs = space.sample(40, 0)
     still = Problem(task(objectives=["torque_utilisation"]), space)
     moving = Problem(task(objectives=["torque_utilisation"], moves="in_order"), space)
-    effort = designs and space.arm(designs[0]).joints[0].actuator.effort  # type: ignore[union-attr]
+    effort = designs and space.arm(designs[0]).joints[0].actuator.peak_torque / 2.0  # type: ignore[union-attr]
     expected = np.abs(moving.physics(designs).paths.joint_torques).max(axis=(1, 2)) / effort
     assert moving.evaluate(designs).values[:, 0] == pytest.approx(
         np.maximum(still.evaluate(designs).values[:, 0], expected)

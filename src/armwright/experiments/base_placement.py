@@ -31,7 +31,7 @@ def with_travel(arm: Arm, travel: float) -> Arm:
         motor = joint.actuator
         if motor is not None:
             speed = None if motor.speed is None else motor.speed / travel
-            motor = replace(motor, effort=motor.effort * travel, speed=speed)
+            motor = replace(motor, peak_torque=motor.peak_torque * travel, speed=speed)
         return replace(joint, actuator=motor, travel=travel)
 
     return replace(arm, joints=tuple(map(geared, arm.joints)))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
+from armwright.kinematics.actuation import Actuation, actuation_of
 from armwright.kinematics.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
 from armwright.robot.arm import AXES, Arm, Joint, MountedTool
 
@@ -24,21 +25,6 @@ Ints = NDArray[np.int32]
 
 FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side")
 ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
-
-
-@dataclass(frozen=True)
-class Actuation(PerArm):
-    """Actuators of N arms of up to D joints.
-
-    Attributes:
-        effort: (N, D) largest torque of each actuator [N m]; infinite for fixed joints.
-        speed: (N, D) largest speed [rad/s]; NaN if unknown, infinite for fixed joints.
-        price: (N,) of all actuators of an arm [USD]; NaN if one has no price.
-    """
-
-    effort: Array
-    speed: Array
-    price: Array
 
 
 @dataclass(frozen=True)
@@ -161,7 +147,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         length=np.array([arm.length for arm in arms]),
         base_mass=np.array([arm.base_mass for arm in arms]),
         bodies=bodies,
-        actuation=_actuation(arms, dof),
+        actuation=actuation_of(arms, travel),
     )
 
 
@@ -209,19 +195,3 @@ def _motion(joint: Joint) -> int:
     if joint.kind == "fixed":
         return FIXED
     return AXES.index(joint.axis) + (PRISMATIC if joint.kind == "prismatic" else 0)
-
-
-def _actuation(arms: Sequence[Arm], dof: int) -> Actuation | None:
-    """Return None if a moving joint has no actuator."""
-    efforts, speeds = np.full((2, len(arms), dof), np.inf)
-    prices = np.zeros(len(arms))
-    for i, arm in enumerate(arms):
-        for j, joint in enumerate(arm.joints):
-            if joint.kind == "fixed":
-                continue
-            if joint.actuator is None:
-                return None
-            efforts[i, j] = joint.actuator.effort
-            speeds[i, j] = np.nan if joint.actuator.speed is None else joint.actuator.speed
-            prices[i] += np.nan if joint.actuator.price is None else joint.actuator.price
-    return Actuation(efforts, speeds, prices)

@@ -1,12 +1,12 @@
 """Objectives: functions of an evaluation, all minimised."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, did_you_mean
+from armwright.kinematics.actuation import Actuation
 from armwright.kinematics.arm_arrays import FIXED
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
@@ -22,30 +22,45 @@ def _torque_norm(evaluation: Evaluation) -> Array:
     return np.linalg.norm(evaluation.motor_torques, axis=-1)
 
 
-def _rated(evaluation: Evaluation, objective: str, rating: Literal["effort", "speed", "price"]) -> Array:
-    """Return a rating of the arms' actuators: efforts and speeds (N, 1, J), prices (N,)."""
+def _actuation(evaluation: Evaluation, quantity: str, *ratings: str) -> Actuation:
+    """Return the actuation of the arms, with these ratings known."""
     actuation = evaluation.arms.actuation
     if actuation is None:
-        raise SettingsError(f"objective {objective} needs actuators: name some in the space file (actuators: [...])")
-    values: Array = getattr(actuation, rating)
-    if np.isnan(values).any():
-        raise SettingsError(f"objective {objective} needs the {rating} of every actuator; the space names one without")
-    return values if rating == "price" else values[:, None]
+        raise SettingsError(f"objective {quantity} needs actuators: name some in the space file (actuators: [...])")
+    for rating in ratings:
+        if np.isnan(getattr(actuation, rating)).any():
+            key = {"no_load_speed": "speed"}.get(rating, rating)
+            raise SettingsError(f"objective {quantity} needs the {key} of every actuator; the space names one without")
+    return actuation
+
+
+def _motor_peak(evaluation: Evaluation, quantity: str) -> Array:
+    """Return (N, 1, J) peak torques of the motors [N m], divided by the safety factor."""
+    actuation = _actuation(evaluation, quantity, "peak")
+    return (actuation.peak * evaluation.arms.travel / actuation.safety_factor[:, None])[:, None]
 
 
 def _torque_utilisation(evaluation: Evaluation) -> Array:
-    effort = _rated(evaluation, "torque_utilisation", "effort")
-    return evaluation.worst_torques(lambda torques: np.abs(torques / effort).max(axis=-1))
+    peak = _motor_peak(evaluation, "torque_utilisation")
+    return evaluation.worst_torques(lambda torques: np.abs(torques / peak).max(axis=-1))
 
 
 def _dynamic_utilisation(evaluation: Evaluation) -> Array:
-    effort = _rated(evaluation, "dynamic_utilisation", "effort")
-    return evaluation.worst_drives(lambda torques, _: np.abs(torques / effort).max(axis=-1))
+    peak = _motor_peak(evaluation, "dynamic_utilisation")
+    return evaluation.worst_drives(lambda torques, _: np.abs(torques / peak).max(axis=-1))
 
 
 def _speed_utilisation(evaluation: Evaluation) -> Array:
-    speed = _rated(evaluation, "speed_utilisation", "speed")
-    return evaluation.worst_drives(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
+    speed = _actuation(evaluation, "speed_utilisation", "no_load_speed").no_load_speed
+    motor_speed = (speed / evaluation.arms.travel)[:, None]
+    return evaluation.worst_drives(lambda _, speeds: np.abs(speeds / motor_speed).max(axis=-1))
+
+
+def _voltages(evaluation: Evaluation) -> Array:
+    """Return the (N,) number of different voltages; fixed joints have 0 V."""
+    voltage = np.sort(_actuation(evaluation, "voltages", "voltage").voltage, axis=1)
+    first = np.diff(voltage, axis=1, prepend=0.0) > 0.0
+    return first.sum(axis=1).astype(np.float64)
 
 
 def _largest_on_moves(evaluation: Evaluation, values: Array) -> Array:
@@ -128,8 +143,8 @@ TORQUE_UTILISATION = Objective(
     name="torque_utilisation",
     unit="of allowed",
     symbol="E_util",
-    description="the largest share of its actuator's torque that any joint needs to hold the kept posture up against "
-    "gravity; above 1 the arm cannot hold it",
+    description="the largest share of its actuator's peak torque that any joint needs to hold the kept posture up "
+    "against gravity, times the safety factor; above 1 the arm does not hold it with this factor",
     each=_torque_utilisation,
     over="max",
 )
@@ -137,7 +152,7 @@ PRICE = Objective(
     name="price",
     unit="USD",
     description="the price of all actuators",
-    each=lambda e: _rated(e, "price", "price"),
+    each=lambda e: _actuation(e, "price", "price").price,
     over="arm",
 )
 JOINTS = Objective(
@@ -218,8 +233,8 @@ DYNAMIC_UTILISATION = Objective(
     name="dynamic_utilisation",
     unit="of allowed",
     symbol="E_dynutil",
-    description="the largest share of any actuator's torque along the timed moves that end at the target; above 1 it "
-    "cannot",
+    description="the largest share of any actuator's peak torque along the timed moves that end at the target, times "
+    "the safety factor; above 1 it cannot",
     each=_dynamic_utilisation,
     over="max",
 )
@@ -276,8 +291,15 @@ MANIPULABILITY = Objective(
     each=lambda e: e.manipulability,
     over="min",
 )
+VOLTAGES = Objective(
+    name="voltages",
+    unit="voltages",
+    description="the number of different supply voltages of the actuators",
+    each=_voltages,
+    over="arm",
+)
 # What constraints can bound. Of clearances and manipulability more is better, so they are no objectives.
-QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*CLEARANCES, MANIPULABILITY)}}
+QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*CLEARANCES, MANIPULABILITY, VOLTAGES)}}
 
 # Quantities by what they depend on.
 ORIENTATION_QUANTITIES = (ORIENTATION_ERROR, WORST_ANGLE)

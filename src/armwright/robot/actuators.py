@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any, Literal
+from typing import Any, cast
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -19,7 +19,6 @@ from armwright.robot.arm import Actuator
 
 CATALOGUE = "actuators.csv"
 SOURCES = "actuator_sources.csv"
-TorqueKind = Literal["stall", "rated", "peak"]
 ESTIMATE = "~"  # before the code of a source from which a value is estimated
 UNITS: Mapping[str, str] = {
     "voltage": "V", "mass": "kg", "stall_torque": "N m", "rated_torque": "N m", "peak_torque": "N m", "speed": "rad/s",
@@ -92,22 +91,26 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             values["peak_torque"] = rated
         return {name: value for name, value in values.items() if getattr(self, name) is None}
 
-    def torque(self, kind: TorqueKind) -> float | None:
-        """Return the stall, rated or peak torque [N m]."""
-        return {"stall": self.stall_torque, "rated": self.rated_torque, "peak": self.peak_torque}[kind]
-
-    def actuator(self, kind: TorqueKind, safety_factor: float) -> Actuator:
-        """Return the actuator of an arm, with this torque divided by the safety factor.
-
-        Raises:
-            SpaceError: If that torque is not stated.
-        """
-        torque = self.torque(kind)
-        if torque is None:
-            stated = [other for other in ("stall", "rated", "peak") if self.torque(other) is not None]
-            known = f"its {' and '.join(stated)} torque is known" if stated else "none is known"
-            raise SpaceError(f"actuator {self.name} has no {kind} torque, {known}; choose another by actuator_torque")
-        return Actuator(self.name, self.mass, torque / safety_factor, self.speed, self.price)
+    def actuator(self) -> Actuator:
+        """Return the actuator of an arm, with the values of `completed`."""
+        values = self.completed()
+        return Actuator(
+            name=self.name,
+            mass=self.mass,
+            peak_torque=cast("float", values.peak_torque),
+            speed=self.speed,
+            price=self.price,
+            continuous_torque=values.rated_torque,
+            corner_speed=values.corner_speed,
+            rotor_inertia=values.rotor_inertia,
+            coulomb_friction=values.coulomb_friction,
+            viscous_friction=values.viscous_friction,
+            backlash=values.backlash,
+            position_gain=values.position_gain,
+            damping_gain=values.damping_gain,
+            voltage=self.voltage,
+            current=values.current,
+        )
 
 
 def value_of(record: ActuatorRecord, name: str) -> float | None:

@@ -1,7 +1,7 @@
 """The physical arm: a base position, then alternating joints and links."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Literal, get_args
 
 from armwright.exceptions import ArmError
@@ -17,26 +17,46 @@ UNIT = 1e-6  # tolerance on the length of a unit vector
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """The actuator of a joint, carried by the link before it.
+    """The actuator of a joint, carried by the link before it. All values are at its output; None if unknown.
 
     Attributes:
         name: Its name in the catalogue or the space file.
         mass: Its mass [kg].
-        effort: Its allowed torque [N m].
-        speed: Its maximum speed [rad/s]; None if unknown.
-        price: Its price [USD]; None if unknown.
+        peak_torque: Its largest torque, at rest and up to the corner speed [N m].
+        speed: Its speed without load [rad/s].
+        price: Its price [USD].
+        continuous_torque: The torque that it can hold forever [N m].
+        corner_speed: The speed from which on the available torque falls linearly, to 0 at `speed` [rad/s].
+        rotor_inertia: Inertia of rotor and gear [kg m²].
+        coulomb_friction: Friction at any speed [N m].
+        viscous_friction: Friction that is proportional to the speed [N m s/rad].
+        backlash: Backlash of its gear [rad].
+        position_gain: Gain of its position control [N m/rad].
+        damping_gain: Damping of its position control [N m s/rad].
+        voltage: Its supply voltage [V].
+        current: Supply current at the peak torque [A].
     """
 
     name: str
     mass: float
-    effort: float
+    peak_torque: float
     speed: float | None = None
     price: float | None = None
+    continuous_torque: float | None = None
+    corner_speed: float | None = None
+    rotor_inertia: float | None = None
+    coulomb_friction: float | None = None
+    viscous_friction: float | None = None
+    backlash: float | None = None
+    position_gain: float | None = None
+    damping_gain: float | None = None
+    voltage: float | None = None
+    current: float | None = None
 
     def __post_init__(self) -> None:
-        stated = [self.mass, self.effort, self.speed or 1.0, self.price or 0.0]
-        if not all(math.isfinite(v) for v in stated) or min(self.mass, self.price or 0.0) < 0.0 or self.effort <= 0.0:
-            raise ArmError(f"an actuator needs mass >= 0 kg, effort > 0 and price >= 0, all finite: {self}")
+        numbers = [value for value in astuple(self)[1:] if value is not None]
+        if not all(0.0 <= value < math.inf for value in numbers) or self.peak_torque == 0.0 or self.speed == 0.0:
+            raise ArmError(f"an actuator needs peak_torque > 0, speed > 0, and no value below 0, all finite: {self}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +96,12 @@ class Joint:
 
     @property
     def effort(self) -> float | None:
-        """The limit of its actuator at the joint: a torque [N m], or a force [N] if prismatic; None if unknown."""
-        return None if self.actuator is None else self.actuator.effort / self.travel
+        """The peak of its actuator at the joint: a torque [N m], or a force [N] if prismatic; None if unknown."""
+        return None if self.actuator is None else self.actuator.peak_torque / self.travel
 
     @property
     def speed(self) -> float | None:
-        """The maximum speed of the joint [rad/s] or [m/s]; None if unknown."""
+        """The speed of the joint without load [rad/s] or [m/s]; None if unknown."""
         if self.actuator is None or self.actuator.speed is None:
             return None
         return self.actuator.speed * self.travel
@@ -184,6 +204,7 @@ class Arm:
         links: The links, one after each joint.
         tool: The tool on the end of the last link.
         base_mass: Mass that does not move, such as the first joint's actuator [kg].
+        safety_factor: Factor of the torque that its actuators have to deliver.
 
     Examples:
         >>> import armwright as aw
@@ -199,6 +220,7 @@ class Arm:
     links: tuple[Link, ...]
     tool: MountedTool = MountedTool()
     base_mass: float = 0.0
+    safety_factor: float = 1.0
 
     def __post_init__(self) -> None:
         if not self.joints or len(self.joints) != len(self.links):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.robot.arm import Arm
+from armwright.robot.arm import Actuator, Arm
 
 AXIS_NAMES = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
 
@@ -24,7 +24,7 @@ class SheetRow:
         torque: Largest absolute holding torque at any target [N m], or force of a prismatic joint [N].
         target: Number of that target, counted from 1.
         actuator: Name of the actuator; empty if not chosen.
-        utilisation: The torque as a fraction of the allowed one; None if that is unknown.
+        utilisation: The torque, times the safety factor, relative to the peak of the actuator; None if unknown.
         price: Price of the actuator [USD]; None if unknown.
     """
 
@@ -62,7 +62,7 @@ def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
                 torque=torque,
                 target=worst + 1,
                 actuator="" if actuator is None else actuator.name,
-                utilisation=None if joint.effort is None else torque / joint.effort,
+                utilisation=None if joint.effort is None else arm.safety_factor * torque / joint.effort,
                 price=None if actuator is None else actuator.price,
             )
         )
@@ -103,10 +103,28 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         lines += ["", f"The tool reaches ({shift}) mm from the end of the last link to the tip."]
     if arm.tool.mass > 0.0:
         lines += ["", f"The tool has {1e3 * arm.tool.mass:.4g} g."]
-    motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
-    if motors:
-        prices = [motor.price for motor in motors]
-        price = "" if None in prices else f", {sum(price or 0.0 for price in prices):,.0f} USD"
-        lines += ["", f"{len(motors)} actuators of {1e3 * sum(motor.mass for motor in motors):.4g} g{price}."]
+    lines += _actuator_lines(arm)
     lines += [f"\n{note}" for note in notes]
     return "\n".join(lines) + "\n"
+
+
+def _actuator_lines(arm: Arm) -> list[str]:
+    motors = [joint.actuator for joint in arm.joints if joint.actuator is not None]
+    if not motors:
+        return []
+    prices = [motor.price for motor in motors]
+    price = "" if None in prices else f", {sum(price or 0.0 for price in prices):,.0f} USD"
+    mass = 1e3 * sum(motor.mass for motor in motors)
+    text = f"Percentages are of their peak torques, with a safety factor of {arm.safety_factor:g}."
+    ratings = [f"- {_ratings(motor)}" for motor in dict.fromkeys(motors)]
+    return ["", f"{len(motors)} actuators of {mass:.4g} g{price}. {text}", "", *ratings]
+
+
+def _ratings(motor: Actuator) -> str:
+    stated = [
+        ("peak {:.4g} N m", motor.peak_torque),
+        ("continuous {:.4g} N m", motor.continuous_torque),
+        ("no-load speed {:.4g} rad/s", motor.speed),
+        ("{:g} V", motor.voltage),
+    ]
+    return f"{motor.name}: " + ", ".join(text.format(value) for text, value in stated if value is not None)

@@ -149,7 +149,7 @@ def _as_joint(joint: UrdfJoint, axis: int, sign: float, zero: float, notes: list
     """Return the joint about the positive world axis, with limits relative to its zero."""
     actuator = None
     if joint.effort:
-        actuator = Actuator(joint.name, 0.0, abs(joint.effort), joint.speed or None)
+        actuator = Actuator(joint.name, 0.0, peak_torque=abs(joint.effort), speed=joint.speed or None)
     if joint.kind == "continuous":
         return Joint("revolute", AXES[axis], -MAX_ANGLE, MAX_ANGLE, actuator)
     lower, upper = (joint.lower or 0.0) - zero, (joint.upper or 0.0) - zero

@@ -38,6 +38,7 @@ class ArmBuilder:
             links=tuple(link for i in every for link in self._links(i)),
             tool=mounted_tools(self._tool)[self._mount],
             base_mass=self._carried_mass(0),
+            safety_factor=self._space.safety_factor,
         )
 
     def _joint(self, i: int, slot: int) -> Joint:

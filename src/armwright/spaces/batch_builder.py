@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.kinematics.actuation import FIXED_RATINGS, actuation_at_joints, ratings_of
 from armwright.kinematics.arm_arrays import (
     FIXED,
     PRISMATIC,
-    Actuation,
     ArmArrays,
     Precision,
     add_tools,
@@ -63,7 +63,8 @@ def stack_designs(
     columns = _Columns(space, matrix)
     joints, present = _joints(space, columns)
     n_slots = joints.plan.shape[2]
-    carried, actuation = _carried(space, columns, joints)
+    motors = _motors(space, columns, joints) if space.actuators else None
+    carried = _carried(space, columns, joints, motors)
     bodies, com = _bodies(space, columns, joints, carried)
     per_joint = {
         "motion": joints.motion,
@@ -75,8 +76,8 @@ def stack_designs(
         "mass": _in_last_slot(bodies.total_mass, n_slots),
         "radius": _in_last_slot(np.where(columns.links > 0.0, space.link_radius, 0.0), n_slots),
     }
-    if actuation is not None:
-        per_joint |= {"effort": actuation.effort, "speed": actuation.speed}
+    if motors is not None:
+        per_joint["ratings"] = motors.ratings
     present = _flatten(present)
     flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
     n_joints = present.sum(axis=1).astype(np.int32)
@@ -99,7 +100,11 @@ def stack_designs(
         length=np.cumsum(columns.links, axis=1)[:, -1],
         base_mass=carried.mass[:, 0],
         bodies=_spread(bodies, present, n_slots),
-        actuation=None if actuation is None else Actuation(flat["effort"], flat["speed"], actuation.price),
+        actuation=None
+        if motors is None
+        else actuation_at_joints(
+            flat["ratings"], flat["travel"], motors.price, np.full(columns.n, space.safety_factor)
+        ),
     )
 
 
@@ -160,6 +165,15 @@ class _Joints:
 
 
 @dataclass(frozen=True)
+class _Motors:
+    """Actuators of the modules of N designs."""
+
+    mass: Array  # (N, M) of all actuators of a module [kg]
+    ratings: Array  # (N, M, K, 9) of each joint's
+    price: Array  # (N,) of an arm [USD]
+
+
+@dataclass(frozen=True)
 class _Carried:
     """Masses that modules add to the end of the link before, the first one to the base, (N, M) each [kg]."""
 
@@ -195,29 +209,35 @@ def _limits(space: DesignSpace, columns: _Columns, plan: Indices) -> tuple[Array
     return lower, upper
 
 
-def _carried(space: DesignSpace, columns: _Columns, joints: _Joints) -> tuple[_Carried, Actuation | None]:
-    """Return the masses of rails and actuators, and the (N, M, K) capabilities of the actuators."""
+def _motors(space: DesignSpace, columns: _Columns, joints: _Joints) -> _Motors:
+    moves = joints.plan < FIXED  # (N, M, K) joints that need an actuator
+    count = moves.sum(axis=2)
+    motor = columns.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
+    masses, prices, ratings = _catalogue(space)
+    ratings = np.repeat(ratings[motor][:, :, None], moves.shape[2], axis=2)
+    ratings[~moves] = FIXED_RATINGS
+    return _Motors(
+        mass=count * masses[motor],
+        ratings=ratings,
+        price=np.where(count > 0, count * prices[motor], 0.0).sum(axis=1),
+    )
+
+
+def _carried(space: DesignSpace, columns: _Columns, joints: _Joints, motors: _Motors | None) -> _Carried:
+    """Return the masses of rails and actuators."""
     stroke = columns.reals("stroke", space.min_stroke)
     rails = np.where(joints.prismatic[..., -1], space.mass.mass(stroke), 0.0)
-    if not space.actuators:
-        return _Carried(rails, rails), None
-    moving = (joints.plan < FIXED).sum(axis=2)  # (N, M) joints that need an actuator
-    motor = columns.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
-    efforts, speeds, masses, prices = _catalogue(space)
-    price = np.where(moving > 0, moving * prices[motor], 0.0).sum(axis=1)
-    effort, speed = (np.where(joints.plan < FIXED, each[motor][..., None], np.inf) for each in (efforts, speeds))
-    return _Carried(rails + moving * masses[motor], rails), Actuation(effort, speed, price)
+    return _Carried(rails if motors is None else rails + motors.mass, rails)
 
 
 @cache
-def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array, Array]:
-    """Return effort [N m], speed [rad/s], mass [kg] and price [USD] of each actuator of a space."""
+def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array]:
+    """Return mass [kg], price [USD] and (A, 9) ratings of the A actuators of a space."""
     actuators = space.arm_actuators
     return (
-        np.array([actuator.effort for actuator in actuators]),
-        np.array([np.nan if actuator.speed is None else actuator.speed for actuator in actuators]),
         np.array([actuator.mass for actuator in actuators]),
         np.array([np.nan if actuator.price is None else actuator.price for actuator in actuators]),
+        np.array([ratings_of(actuator) for actuator in actuators]),
     )
 
 

@@ -204,7 +204,7 @@ def _default_motors(space: SpaceSchema) -> dict[str, str]:
     """Return an actuator for each module, if there is a choice: from the strongest at the base to the weakest."""
     if len(space.actuators) < 2:
         return {}
-    ranked = sorted(space.arm_actuators, key=lambda actuator: -actuator.effort)
+    ranked = sorted(space.arm_actuators, key=lambda actuator: -actuator.peak_torque)
     return {f"motor_{j + 1}": ranked[len(ranked) * j // space.max_joints].name for j in range(space.max_joints)}
 
 

@@ -6,7 +6,7 @@ from typing import Any, Self, cast
 
 from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
 
-from armwright.robot.actuators import ActuatorRecord, TorqueKind, resolve_actuator
+from armwright.robot.actuators import ActuatorRecord, resolve_actuator
 from armwright.robot.arm import Actuator
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
 from armwright.spaces.link_mass import MassModel, MassPerMetre
@@ -57,10 +57,8 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     """Mass of the links."""
     actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MAX_ACTUATORS)
     """Names from the catalogue, or records; several add the parameters motor_j. Empty: joints without mass."""
-    actuator_torque: TorqueKind = "stall"
-    """The torque of the actuators that counts."""
-    safety_factor: float = Field(default=1.0, gt=0.0, le=100.0)
-    """Divisor of that torque."""
+    safety_factor: float = Field(default=1.5, gt=0.0, le=100.0)
+    """Factor of the torque that the actuators have to deliver."""
     restrict: tuple[tuple[str, Restriction], ...] = Field(default=(), max_length=100)
     """Single parameters, fixed (joint_1: Y) or narrowed (joint_2: [P, R], link_1: [0.1, 0.2])."""
     grid: tuple[tuple[str, float], ...] = Field(default=(), max_length=100)
@@ -102,8 +100,6 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         _check_ranges(self)
         _check_joint_ranges(self)
         _check_duplicates(self)
-        for record in self.actuators:
-            record.actuator(self.actuator_torque, self.safety_factor)
         return self
 
     @property
@@ -140,7 +136,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
 
 @lru_cache(maxsize=64)
 def _arm_actuators(space: SpaceSchema) -> tuple[Actuator, ...]:
-    return tuple(record.actuator(space.actuator_torque, space.safety_factor) for record in space.actuators)
+    return tuple(record.actuator() for record in space.actuators)
 
 
 def _check_modules(space: SpaceSchema) -> None:
