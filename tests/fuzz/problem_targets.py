@@ -18,11 +18,11 @@ MAX_POSTURES = 300  # of an arm that is evaluated here: more takes longer, and i
 RICH_TASK = b"""\
 name: rich
 targets:
-  - {position: [0.4, 0.0, 0.1], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}
+  - {name: corner, position: [0.4, 0.0, 0.1], axis: [0, 0, -1], tolerance: 0.002, angle_tolerance: 0.05, weight: 2}
   - {position: [0.4, 0.2, 0.1], orientation: [3.1416, 0, 1.5708]}
   - [0.1, 0.35, 0.5]
 tool: {tip: [0.02, 0.0, 0.1], rpy: [0.0, 0.3, 0.0], mass: 0.3, center: [0.0, 0.0, 0.05], inertia: [3.0e-4, 3e-4, 0]}
-payload: [0.5, 0.5, 0.0]
+payload: 0.5
 payload_factors: [0.0, 1.2]
 target_noise: 0.005
 restarts: 2
@@ -32,9 +32,12 @@ obstacles:
   - {kind: box, center: [0.4, 0.0, 0.3], size: [0.2, 0.6, 0.02], rpy: [0.1, 0.2, 0.3]}
   - {kind: sphere, center: [0.0, 0.4, 0.3], radius: 0.1}
   - {kind: cylinder, center: [0.2, 0.3, 0.5], radius: 0.03, height: 1.0, axis: [1, 0, 1]}
-moves: [[1, 2], [2, 3]]
-move_step: 0.05
-move_time: [1.5, 2]
+cycle:
+  time: 1.5
+  dwell: 0.1
+  approach: 0.02
+  tolerance: {path: 0.001, angle: 0.05}
+  steps: [{to: corner, do: pick}, {to: 2, do: place, time: 2}, {to: 3}]
 workspace: {low: [0.2, -0.3, 0.0], high: [0.6, 0.3, 0.4], points: 20}
 objectives: [worst_error, torque, collision, path_error, dynamic_torque]
 constraints: [mass <= 3, length >= 0.2, uncovered_fraction <= 0.9]
@@ -72,8 +75,8 @@ tie: {link_2: link_1}
 
 def n_postures(problem: Problem) -> int:
     task = problem.task
-    moves = sum(task.straight_moves.steps(task.target_positions)) + len(task.straight_moves)
-    parts = len(task.targets) * (1 + task.restarts) + moves + sum(region.points for region in task.workspace)
+    samples = len(task.plan(task.target_positions).sample().poses) if task.cycle else 0
+    parts = len(task.targets) * (1 + task.restarts) + samples + sum(region.points for region in task.workspace)
     return parts * len(problem.scenes)
 
 

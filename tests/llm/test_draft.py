@@ -144,7 +144,7 @@ def test_default_space_is_not_written(chat_server: ChatServer, tmp_path: Path, s
 
 def test_keys_with_default_values_are_omitted(chat_server: ChatServer, tmp_path: Path) -> None:
     """Servers in strict mode fill every key."""
-    filled = {**aw.Task.model_validate(TASK).model_dump(mode="json"), "workspace": [], "moves": []}
+    filled = {**aw.Task.model_validate(TASK).model_dump(mode="json"), "workspace": []}
     draft = drafted(chat_server, json.dumps({**FULL, "task": filled}), tmp_path)
     assert yaml.safe_load(draft.task_yaml) == TASK
 

@@ -37,6 +37,7 @@ from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.link_mass import MassPerLink
 from armwright.spaces.parameters import exact
 from armwright.tasks.catalogue import load_task
+from armwright.tasks.cycle import Cycle, Step
 from armwright.tasks.task import Task
 from tests.support.fixed_problem import (
     ONE_JOINT,
@@ -72,7 +73,7 @@ IN_THE_WAY = Task.model_validate(
 )
 ON_LINES = IN_THE_WAY.model_copy(
     update={
-        "moves": ((1, 2), (2, 1)),
+        "cycle": Cycle(steps=(Step(to=1, by="line"), Step(to=2, by="line"))),
         "objectives": ("position_error", "clearance_shortfall", "path_error"),
         "reference_point": None,
     }
@@ -118,7 +119,7 @@ GOLDENS: dict[str, Callable[[], str]] = {
     "analysis-in-three-steps": lambda: rendered(fixed_history(PAPER)),
     "memory-and-several-designs-as-text": lambda: rendered(own(1), "minus", memory="own", proposals=2, answer="text"),
     "everything-that-models-asked-for": lambda: rendered(in_study(own(5, FixedProblem(OPEN))), "full"),
-    "obstacles-and-moves": lambda: rendered(fixed_history(FixedProblem(ON_LINES)), "minus"),
+    "obstacles-and-cycle": lambda: rendered(fixed_history(FixedProblem(ON_LINES)), "minus"),
     "no-feasible-design": lambda: rendered(
         fixed_history(bounded("mass <= 0.001"), proposals=[proposal(DESIGNS[0], "light", (1.0, 2.0))]),
         "minus",
@@ -255,7 +256,7 @@ FACTS: dict[str, Facts] = {
             "In the way are 5 obstacles, which are solid; positions and lengths in [m]:",
             "The inverse kinematics steers around nothing: whether the kept posture is free follows from the design.",
         ),
-        ("do not matter", "moves along straight lines"),
+        ("do not matter", "drives a cycle"),
     ),
     "workspace": (
         lambda: rendered(fixed_history(FixedProblem(COVERING)), "minus"),

@@ -43,7 +43,7 @@ MANY = aw.Problem(
             "obstacles": [
                 {"kind": "cylinder", "name": "pole", "center": [0.2, 0.3, 0.5], "radius": 0.03, "height": 1.0}
             ],
-            "moves": "in_order",
+            "cycle": {"closed": False, "steps": [{"to": 1}, {"to": 2}]},
             "workspace": {"low": [0.3, -0.3, 0.1], "high": [0.6, 0.3, 0.5]},
             "objectives": QUANTITIES,
             "constraints": ["length <= 3.0", "self_clearance >= 0.0", "manipulability >= 0.0"],

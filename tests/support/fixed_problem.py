@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.paths import Paths
+from armwright.kinematics.cycle_path import CyclePaths
 from armwright.pareto import default_reference_point
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
@@ -16,7 +16,7 @@ from armwright.runs.history import History
 from armwright.runs.trial import FinishedTrial
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
-from armwright.tasks.moves import sample_moves
+from armwright.tasks.motions import CyclePlan
 from armwright.tasks.task import Task
 from armwright.tasks.workspace import sample_regions
 
@@ -53,25 +53,20 @@ class FixedProblem(Problem):
             angle_error=angle,
             joint_torques=torques,
         )
-        if evaluation.moves:
-            vars(evaluation)["paths"] = _fixed_paths(evaluation)
+        if evaluation.plan is not None:
+            evaluation = replace(evaluation, cycle_paths=_fixed_paths(evaluation, evaluation.plan))
         ways = np.linalg.norm(sample_regions(self.task.workspace) - base[:, None], axis=-1)
         vars(evaluation)["workspace_error"] = np.maximum(0.0, ways - reach[:, None])
         return evaluation
 
 
-def _fixed_paths(evaluation: Evaluation) -> Paths:
-    """Between two targets, all is between what it is at them, but for a bow of the tip."""
-    lines = sample_moves(evaluation.moves, evaluation.targets)
-    start, end = np.array(evaluation.moves.pairs)[lines.move].T
-    share = lines.share[:, None]
-    q, reached, torques = (
-        (1 - share) * at[:, start] + share * at[:, end]
-        for at in (evaluation.q, evaluation.reached, evaluation.joint_torques)
-    )
-    reached = reached + 0.1 * share * (1 - share)
-    error = np.linalg.norm(reached - lines.points, axis=-1)
-    return Paths(evaluation.moves, lines, np.zeros(len(lines)), q, reached, error, torques)
+def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:
+    """Along a motion to a target, all is as at that target, but for a bow of the tip."""
+    targets = [plan.targets[motion.step] for motion in plan.motions]
+    error = evaluation.position_error[:, targets] + 0.025
+    clearances = np.full((2, *error.shape), np.inf)
+    nothing = np.zeros(error.shape)
+    return CyclePaths(plan, (), error, nothing, *clearances, nothing, nothing > 0.0, np.zeros((*error.shape, 3)))
 
 
 LENGTH = Objective(

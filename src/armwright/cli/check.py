@@ -28,7 +28,7 @@ def check_problem(problem: Problem) -> dict[str, Any]:
     return {
         "task": problem.task.model_dump(mode="json"),
         "objectives": [record.model_dump() for record in record_objectives(problem.objectives)],
-        "constraints": list(problem.task.constraints),
+        "constraints": [constraint.description for constraint in problem.constraints],
         "reference_point": problem.reference_point,
         "space": {
             "name": space.name,

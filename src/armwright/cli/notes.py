@@ -1,6 +1,6 @@
 """Notes on what a task holds and what its objectives leave out."""
 
-from armwright.problem.objectives import CLEARANCE_QUANTITIES, MOVE_QUANTITIES, UNCOVERED_FRACTION
+from armwright.problem.objectives import CLEARANCE_QUANTITIES, UNCOVERED_FRACTION
 from armwright.problem.problem import Problem
 from armwright.tasks.task import Task
 
@@ -10,7 +10,6 @@ def unused_parts(problem: Problem) -> list[str]:
     task = problem.task
     parts = (
         ("obstacles", task.obstacles, CLEARANCE_QUANTITIES),
-        ("moves", task.straight_moves, MOVE_QUANTITIES),
         ("workspace", task.workspace, (UNCOVERED_FRACTION,)),
     )
     return [

@@ -87,10 +87,6 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
         console.print(f"  {line}")
     if task.restarts:
         console.print(f"  {task.restarts + 1} initial postures of the inverse kinematics per target")
-    moves = ", ".join(f"{start + 1} to {end + 1}" for start, end in task.straight_moves.pairs)
-    step = f"in steps of {1e3 * task.move_step:g} mm"
-    if task.move_time is not None:
-        step += f"; durations {', '.join(f'{time:g}' for time in np.atleast_1d(task.move_time))} s"
     payloads = ", ".join(f"{kg:g}" for kg in np.atleast_1d(task.payload))
     for name, value in (
         ("objectives", ", ".join(task.objectives or ())),
@@ -99,7 +95,8 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
         ("payload [kg]", payloads if task.payloads.any() else ""),
         ("evaluated by the worst case, also", task.cases_description),
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
-        ("straight moves between targets", moves and f"{moves}; {step}"),
+        ("cycle", task.cycle_description),
+        ("durations", task.cycle.describe_times() if task.cycle else ""),
         *(("workspace", region.describe()) for region in task.workspace),
         ("reference point", "chosen from the first random trials" if reference is None else format_point(reference)),
         ("provenance", task.provenance),

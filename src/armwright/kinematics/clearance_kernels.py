@@ -12,7 +12,8 @@ from typing import Any
 
 import warp as wp
 
-from armwright.kinematics.arm_arrays import FIXED, PRISMATIC, Precision
+from armwright.kinematics.arm_arrays import FIXED, Precision
+from armwright.kinematics.frame_math import frame_math
 from armwright.kinematics.ik_math import kernel
 from armwright.tasks.obstacles import SHAPES
 
@@ -35,35 +36,12 @@ class ClearanceKernels:
 @cache
 def clearance_kernels(precision: Precision) -> ClearanceKernels:
     """Return the kernels in this precision, for N arms with D links at T targets, and O obstacles."""
-    real, Vector3, Matrix3 = {
-        "float32": (wp.float32, wp.vec3f, wp.mat33f),
-        "float64": (wp.float64, wp.vec3d, wp.mat33d),
-    }[precision]
+    base = frame_math(precision)
+    real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
+    translate, rotate = base.translate, base.rotate
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     tiny = real(1e-30)
     parallel = real(1e-12)  # square of the sine of an angle that is 0 in float32
-
-    @wp.func
-    def translate(motion: int, p: Vector3, displacement: real, x: Vector3, y: Vector3, z: Vector3):
-        """Return the position of a joint: a prismatic joint is displaced along its axis."""
-        if motion == wp.static(PRISMATIC):
-            return p + displacement * x
-        if motion == wp.static(PRISMATIC + 1):
-            return p + displacement * y
-        if motion == wp.static(PRISMATIC + 2):
-            return p + displacement * z
-        return p
-
-    @wp.func
-    def rotate(motion: int, x: Vector3, y: Vector3, z: Vector3, s: real, c: real):
-        """Return the axes x, y, z of the frame after a joint whose angle has this sine and cosine."""
-        if motion == 0:
-            return x, c * y + s * z, c * z - s * y
-        if motion == 1:
-            return c * x - s * z, y, c * z + s * x
-        if motion == 2:
-            return c * x + s * y, c * y - s * x, z
-        return x, y, z
 
     @kernel
     def link_axes(

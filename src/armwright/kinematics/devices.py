@@ -55,6 +55,18 @@ def load_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
         return _warp(), _load_clearance(precision, device)
 
 
+def load_path(device: Device) -> tuple[Any, Any]:
+    """Return Warp and the kernels along lines."""
+    with _loading:
+        return _warp(), _load_path(device)
+
+
+def load_dynamics(device: Device) -> tuple[Any, Any]:
+    """Return Warp and the kernel of inverse dynamics."""
+    with _loading:
+        return _warp(), _load_dynamics(device)
+
+
 def _has_cuda() -> bool:
     with _loading:
         return bool(_warp().is_cuda_available())
@@ -89,6 +101,27 @@ def _load_clearance(precision: Precision, device: Device) -> Any:
         kernels = clearance_kernels(precision)
         for kernel in (kernels.link_axes, kernels.self_clearance, kernels.obstacle_clearance):
             kernel.module.load(device)
+    return kernels
+
+
+@cache
+def _load_path(device: Device) -> Any:
+    with _report_cache_errors():
+        from armwright.kinematics.path_kernels import path_kernels
+
+        kernels = path_kernels()
+        for kernel in (kernels.follow, kernels.tool_errors):
+            kernel.module.load(device)
+    return kernels
+
+
+@cache
+def _load_dynamics(device: Device) -> Any:
+    with _report_cache_errors():
+        from armwright.kinematics.dynamics_kernels import dynamics_kernels
+
+        kernels = dynamics_kernels()
+        kernels.torque_terms.module.load(device)
     return kernels
 
 

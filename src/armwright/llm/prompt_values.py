@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 
 from armwright.kinematics.ik import UPDATES
-from armwright.kinematics.paths import UPDATES_OF_STEP
 from armwright.llm.answer_format import module_lists
 from armwright.llm.feedback import MAX_PROPOSED, MIN_PROPOSED, Feedback, Record, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     CLEARANCE_QUANTITIES,
-    MOVE_QUANTITIES,
     ORIENTATION_ERROR,
     PATH_QUANTITIES,
     POSITION_ERROR,
@@ -29,7 +27,7 @@ from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.spaces.tolerance import length_columns
 from armwright.tasks.targets import REACHED, describe_targets
-from armwright.tasks.task import IN_ORDER, Task
+from armwright.tasks.task import Task
 from armwright.tasks.tool import Tool
 from armwright.text import one_line
 
@@ -90,11 +88,10 @@ VARIABLES = {
     "target_requirements": "requirements of targets besides their points, such as an axis of the tool, a line each",
     "oriented": "true if any target requires an axis or an orientation of the tool",
     "restarts": "additional starts of the inverse kinematics at each target",
-    "moves": "straight moves of the tip, as text; empty if they count in no objective",
-    "move_times": "durations of the moves, as text; empty if they count in no objective",
+    "cycle": "steps of the cycle, as text; empty if the task has none",
+    "cycle_times": "durations of the steps, as text; empty if they count in no objective",
     "workspace": "boxes that the tip should cover, each as text; none if they count in no objective",
-    "of_the_way": "objectives whose share of a target is the worst of it and of the moves that end there",
-    "updates_of_step": "updates of the inverse kinematics per sample of a move",
+    "of_the_way": "objectives whose share of a target is the worst of it and of the way to it",
     "n_targets": "number of targets of the task",
     "n_targets_shown": "number of targets that are listed",
     "target_low": "smallest x, y and z of all targets",
@@ -192,11 +189,10 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "collisions": problem.uses(*CLEARANCE_QUANTITIES),
         "oriented": task.target_arrays.oriented,
         "restarts": task.restarts,
-        "moves": _describe_moves(task) if problem.uses(*MOVE_QUANTITIES) else "",
-        "move_times": _describe_times(task) if problem.uses(*TIMED_QUANTITIES) else "",
+        "cycle": task.cycle_description,
+        "cycle_times": task.cycle.describe_times() if task.cycle and problem.uses(*TIMED_QUANTITIES) else "",
         "workspace": [region.describe() for region in task.workspace] if problem.uses(UNCOVERED_FRACTION) else [],
         "of_the_way": [quantity.symbol for quantity in PATH_QUANTITIES if problem.uses(quantity)],
-        "updates_of_step": UPDATES_OF_STEP,
         "n_targets": len(task.target_positions),
         "updates": UPDATES,
         "objectives": [_task_specific(objective, task) for objective in problem.objectives],
@@ -239,26 +235,6 @@ def _describe_payload(task: Task) -> str:
     listed, omission = _sample([f"{payload:g}" for payload in payloads])
     each = "some of" if omission else "each"
     return f"At the targets the tip carries payloads, point masses of [kg], for {each} TARGET in this order: {listed}."
-
-
-def _describe_moves(task: Task) -> str:
-    """Describe the straight moves by target numbers; empty if there are none."""
-    pairs = task.straight_moves.pairs
-    if task.moves == IN_ORDER:
-        return "from each target to the next, in the order of the list"
-    listed, omission = _sample([f"{start + 1} to {end + 1}" for start, end in pairs])
-    return f"between the targets of these numbers, counted from 1: {listed}{omission}" if pairs else ""
-
-
-def _describe_times(task: Task) -> str:
-    """Describe the durations of the moves; empty if the task states none."""
-    times = task.straight_moves.times
-    if not times:
-        return ""
-    if len(set(times)) == 1:
-        return f"{times[0]:g} s"
-    listed, omission = _sample([f"{time:g}" for time in times])
-    return f"{listed} s, in the order of the moves{omission}"
 
 
 def _sample(items: Sequence[str]) -> tuple[str, str]:

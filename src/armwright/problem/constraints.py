@@ -13,7 +13,8 @@ from armwright.arrays import Array
 from armwright.exceptions import TaskError, did_you_mean
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import QUANTITIES, RENAMED
+from armwright.problem.objectives import CLEARANCES, QUANTITIES, RENAMED
+from armwright.tasks.task import Task
 
 Relation = Literal["<=", ">="]
 
@@ -69,6 +70,29 @@ def read_constraints(texts: Sequence[str]) -> tuple[Constraint, ...]:
         if low is not None and high is not None and low.bound > high.bound:
             raise TaskError(f'constraints: no design satisfies both "{low.description}" and "{high.description}"')
     return constraints
+
+
+def cycle_constraints(task: Task, has_actuators: bool) -> tuple[str, ...]:
+    """Return the constraints that a cycle implies, except for quantities that the task bounds itself.
+
+    Args:
+        task: The task.
+        has_actuators: Whether the torques and speeds of the joints are limited.
+    """
+    if task.cycle is None:
+        return ()
+    tolerance = task.cycle.tolerance
+    implied = {
+        "unreached_targets": 0.0,
+        "path_error": tolerance.path,
+        **({"path_angle": tolerance.angle} if task.target_arrays.oriented else {}),
+        "jumps": 0.0,
+        "collision": 0.0,
+        **({"dynamic_utilisation": 1.0, "speed_utilisation": 1.0} if has_actuators else {}),
+    }
+    own = {constraint.quantity.name for constraint in read_constraints(task.constraints)}
+    own |= {"collision"} if own & {quantity.name for quantity in CLEARANCES} else set()
+    return tuple(f"{name} <= {bound:.12g}" for name, bound in implied.items() if name not in own)
 
 
 def _read(text: str) -> Constraint:

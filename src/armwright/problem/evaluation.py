@@ -11,13 +11,14 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
+from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads
+from armwright.kinematics.cycle_path import CyclePaths, find_paths
 from armwright.kinematics.devices import Device
-from armwright.kinematics.dynamics import Drives, drives_along
-from armwright.kinematics.ik import Postures, solve_postures
+from armwright.kinematics.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.jacobian import jacobians
-from armwright.kinematics.paths import Paths, follow
+from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
 from armwright.robot.arm import Arm
-from armwright.tasks.moves import NO_MOVES, Moves
+from armwright.tasks.motions import CyclePlan
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import TargetArrays, position_targets
 from armwright.tasks.workspace import Region, sample_regions
@@ -32,7 +33,7 @@ class Scene:
         payload: (T,) carried by the tip at each target [kg].
         target_arrays: how the targets are to be reached.
         obstacles: what clearances are measured from; the inverse kinematics ignores them.
-        moves: lines between targets that the tip follows.
+        plan: the motions of the task's cycle; None if it has none.
         workspace: boxes to cover.
     """
 
@@ -40,7 +41,7 @@ class Scene:
     payload: Array
     target_arrays: TargetArrays
     obstacles: tuple[Obstacle, ...] = ()
-    moves: Moves = NO_MOVES
+    plan: CyclePlan | None = None
     workspace: tuple[Region, ...] = ()
 
     def __post_init__(self) -> None:
@@ -57,7 +58,8 @@ class Scene:
 class Evaluation(Scene):
     """A scene in which N arms of up to J joints were evaluated; 0 for joints that an arm does not have.
 
-    Clearances, moves, the workspace and Jacobians are computed on first use.
+    Where the cycle stops at a target, the posture is the cycle's. Clearances, loads, the workspace and Jacobians are
+    computed on first use.
     """
 
     arms: ArmArrays
@@ -66,6 +68,7 @@ class Evaluation(Scene):
     position_error: Array  # (N, T) distance from the target [m]
     angle_error: Array  # (N, T) of the tool from the target's axis or orientation [rad]; 0 where it has none
     joint_torques: Array  # (N, T, J) that hold the posture against gravity [N m], or forces [N]; 0 for a fixed joint
+    cycle_paths: CyclePaths | None = None
     device: Device = "cpu"
 
     def __post_init__(self) -> None:
@@ -79,45 +82,61 @@ class Evaluation(Scene):
         """(N, T, J) at the actuators: of a sliding joint its force times its travel [N m]."""
         return self.joint_torques * self.arms.travel[:, None]
 
-    def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
-        """Return (N, T) a measure of motor torques, the largest of a target's posture and of the moves that end there.
+    @property
+    def paths(self) -> CyclePaths:
+        """The arms along the motions of the cycle; SettingsError if the task has none."""
+        if self.cycle_paths is None:
+            raise SettingsError(
+                "path_error, cycle_time and other quantities of motions need a cycle in the task; try cycle: in_order"
+            )
+        return self.cycle_paths
 
-        measure: from torques (N, K, J) [N m] to (N, K), of K postures.
+    @cached_property
+    def torque_terms(self) -> list[tuple[TorqueTerms, ...]]:
+        """Terms of the torques along the cycle, for each group of arms."""
+        return torque_terms(self.paths, float(self.payload.max()), self.device)
+
+    @cached_property
+    def loads(self) -> CycleLoads:
+        """Durations, torques and speeds along the cycle; SettingsError if a duration is not known."""
+        return cycle_loads(self.paths, self.torque_terms)
+
+    def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
+        """Return (N, T) a measure of holding torques, the largest of a target's posture and of the motions to it.
+
+        measure: from torques of motors (n, K, J) [N m] to (n, K), of K postures.
         """
         at_targets = measure(self.motor_torques)
-        if not self.moves:
+        if self.cycle_paths is None:
             return at_targets
-        along = measure(self.paths.joint_torques * self.arms.travel[:, None])
-        return self.paths.with_largest(at_targets, along)
+        along = np.empty((len(self), len(self.cycle_paths.plan.motions)))
+        for group, terms in zip(self.cycle_paths.groups, self.torque_terms, strict=True):
+            for i, part in enumerate(terms):
+                along[group.index, i] = measure(part.gravity * group.arms.travel[:, None]).max(axis=1)
+        return self.largest_on_motions(along, at_targets)
 
-    @cached_property
-    def paths(self) -> Paths:
-        """The arms along the moves; SettingsError if the task has none."""
-        if not self.moves:
-            raise SettingsError(
-                "path_error, max_joint_step and other quantities of moves need moves in the task; "
-                "try moves: in_order, or moves: [[1, 2], [2, 3]]"
-            )
-        return follow(self.arms, self.q, self.targets, self.payload, self.moves, self.device)
+    def worst_loads(self, measure: Callable[[Array, Array], Array]) -> Array:
+        """Return (N, T) a measure of torques and speeds, the largest along the motions of steps to a target, else 0.
 
-    @cached_property
-    def drives(self) -> Drives:
-        """Torques and speeds along timed moves; SettingsError if the moves have no duration."""
-        paths = self.paths
-        if not self.moves.times:
-            raise SettingsError(
-                "dynamic_torque, dynamic_utilisation and speed_utilisation need the duration of the task's moves [s]; "
-                "try move_time: 1.5, or one value per move"
-            )
-        return drives_along(self.arms, paths)
-
-    def worst_drives(self, measure: Callable[[Array, Array], Array]) -> Array:
-        """Return (N, T) a measure of torques and speeds, the largest along the moves that end at a target, else 0.
-
-        measure: from torques [N m] and speeds [rad/s], each (N, F, J), to (N, F), of F moments.
+        measure: from torques [N m] and speeds [rad/s] of motors, each (N, K, J), to (N, K), of K instants.
         """
-        drives, travel = self.drives, self.arms.travel[:, None]
-        return drives.largest(measure(drives.torques * travel, drives.speeds / travel), len(self.targets))
+        loads, travel = self.loads, self.arms.travel[:, None]
+        n, m, f, dof = loads.torques.shape
+        torques, speeds = loads.torques.reshape(n, m * f, dof) * travel, loads.speeds.reshape(n, m * f, dof) / travel
+        return self.largest_on_motions(measure(torques, speeds).reshape(n, m, f).max(axis=2))
+
+    def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:
+        """Return (N, T) the larger of a target's value and those of the motions of steps to it.
+
+        Args:
+            along: (N, M) values of the motions.
+            at_targets: (N, T) values at the targets.
+        """
+        worst = np.zeros(self.position_error.shape) + at_targets
+        for index, motion in enumerate(self.paths.plan.motions):
+            target = self.paths.plan.targets[motion.step]
+            worst[:, target] = np.maximum(worst[:, target], along[:, index])
+        return worst
 
     @property
     def manipulability(self) -> Array:
@@ -158,7 +177,7 @@ class Evaluation(Scene):
     def self_clearance(self) -> Array:
         """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none.
 
-        It and the other clearances are of a target's posture and of the moves that end there.
+        It and the other clearances are of a target's posture and of the motions of steps to it.
         """
         return self._clearances[0]
 
@@ -175,10 +194,9 @@ class Evaluation(Scene):
     @cached_property
     def _clearances(self) -> tuple[Array, Array]:
         own, clear = clearances(self.arms, self.q, self.obstacles, self.device)
-        if not self.moves:
-            return own, clear
-        along = clearances(self.arms, self.paths.q, self.obstacles, self.device)
-        own, clear = (-self.paths.with_largest(-at, -way) for at, way in zip((own, clear), along, strict=True))
+        if self.cycle_paths is not None:
+            own = -self.largest_on_motions(-self.cycle_paths.self_clearance, -own)
+            clear = -self.largest_on_motions(-self.cycle_paths.obstacle_clearance, -clear)
         return own, clear
 
 
@@ -189,7 +207,7 @@ def evaluate(
     payload: ArrayLike = 0.0,
     obstacles: Sequence[Obstacle] = (),
     target_arrays: TargetArrays | None = None,
-    moves: Moves = NO_MOVES,
+    plan: CyclePlan | None = None,
     workspace: Sequence[Region] = (),
 ) -> Evaluation:
     """Evaluate every arm at every target. An unreached target is a result, never an exception.
@@ -201,7 +219,7 @@ def evaluate(
         payload: (T,) mass carried by the tip at each target, or one for all [kg].
         obstacles: The solids that clearances are measured from; the inverse kinematics ignores them.
         target_arrays: How the targets are to be reached (`Task.target_arrays`); by default as points.
-        moves: Lines between targets that the tip follows.
+        plan: The motions of a cycle (`Task.plan`).
         workspace: Boxes to cover.
 
     Examples:
@@ -214,7 +232,7 @@ def evaluate(
     positions = np.asarray(targets, dtype=np.float64)
     if target_arrays is None:
         target_arrays = position_targets(len(np.atleast_1d(positions)))
-    scene = Scene(positions, np.asarray(payload), target_arrays, tuple(obstacles), moves, tuple(workspace))
+    scene = Scene(positions, np.asarray(payload), target_arrays, tuple(obstacles), plan, tuple(workspace))
     return evaluate_arrays(stack_arms(arms), scene, device)
 
 
@@ -232,10 +250,11 @@ def evaluate_arrays(
     """
     targets = scene.targets
 
-    def solve(initial: ArrayLike | None) -> Postures:
+    def solve(initial: ArrayLike | None, updates: int = UPDATES) -> Postures:
         return solve_postures(
             arrays,
             targets,
+            updates,
             initial_q=initial,
             payload=scene.payload,
             target_arrays=scene.target_arrays,
@@ -246,6 +265,11 @@ def evaluate_arrays(
     postures = solve(initial_q)
     for other in _restarts(arrays, scene.target_arrays.restarts):
         postures = _nearer(postures, solve(other), targets, scene.target_arrays)
+    paths = None
+    if scene.plan is not None:
+        paths = find_paths(arrays, scene.plan, scene.obstacles, device=device)
+        visited = paths.postures(len(targets))
+        postures = solve(np.where(np.isnan(visited), postures.q, visited), updates=0)
     reached = postures.reached.astype(np.float64)
     return Evaluation(
         **vars(scene),
@@ -255,6 +279,7 @@ def evaluate_arrays(
         position_error=np.linalg.norm(reached - targets, axis=-1),
         angle_error=postures.angle.astype(np.float64),
         joint_torques=postures.torque.astype(np.float64),
+        cycle_paths=paths,
         device=device,
     )
 

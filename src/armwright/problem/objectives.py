@@ -47,13 +47,13 @@ def _torque_utilisation(evaluation: Evaluation) -> Array:
 
 def _dynamic_utilisation(evaluation: Evaluation) -> Array:
     peak = _motor_peak(evaluation, "dynamic_utilisation")
-    return evaluation.worst_drives(lambda torques, _: np.abs(torques / peak).max(axis=-1))
+    return evaluation.worst_loads(lambda torques, _: np.abs(torques / peak).max(axis=-1))
 
 
 def _speed_utilisation(evaluation: Evaluation) -> Array:
     speed = _actuation(evaluation, "speed_utilisation", "no_load_speed").no_load_speed
     motor_speed = (speed / evaluation.arms.travel)[:, None]
-    return evaluation.worst_drives(lambda _, speeds: np.abs(speeds / motor_speed).max(axis=-1))
+    return evaluation.worst_loads(lambda _, speeds: np.abs(speeds / motor_speed).max(axis=-1))
 
 
 def _voltages(evaluation: Evaluation) -> Array:
@@ -61,11 +61,6 @@ def _voltages(evaluation: Evaluation) -> Array:
     voltage = np.sort(_actuation(evaluation, "voltages", "voltage").voltage, axis=1)
     first = np.diff(voltage, axis=1, prepend=0.0) > 0.0
     return first.sum(axis=1).astype(np.float64)
-
-
-def _largest_on_moves(evaluation: Evaluation, values: Array) -> Array:
-    """Return (N, T) the largest of values (N, S) of samples on the moves that end at a target, else 0."""
-    return evaluation.paths.with_largest(np.zeros(evaluation.position_error.shape), values)
 
 
 POSITION_ERROR = Objective(
@@ -189,20 +184,36 @@ PATH_ERROR = Objective(
     name="path_error",
     unit="m",
     symbol="E_path",
-    description="the largest distance between the tip and where it should be on the straight moves that end at the "
-    "target; 0 where none does",
-    each=lambda e: _largest_on_moves(e, e.paths.error),
+    description="the largest distance between the tip and where it should be on the lines of the steps to the target; "
+    "0 where there are none",
+    each=lambda e: e.largest_on_motions(e.paths.path_error),
     over="max",
 )
-MAX_JOINT_STEP = Objective(
-    name="max_joint_step",
-    label="Largest joint step",
+PATH_ANGLE = Objective(
+    name="path_angle",
+    label="Angle error on lines",
     unit="rad",
-    symbol="E_step",
-    description="the largest change of any joint [rad, of sliding ones m] from one step of the moves that end at the "
-    "target to the next, large where the arm flips into another posture on the way; 0 where no move ends there",
-    each=lambda e: _largest_on_moves(e, e.paths.jumps),
+    symbol="E_pathangle",
+    description="the largest angle between the tool and the direction that it should have on the lines of the steps "
+    "to the target; 0 where there are none",
+    each=lambda e: e.largest_on_motions(e.paths.path_angle),
     over="max",
+)
+JUMPS = Objective(
+    name="jumps",
+    unit="targets",
+    symbol="E_jumps",
+    description="1 where the joints cannot move continuously on the way to the target, such as where the arm would "
+    "have to flip into another posture, else 0",
+    each=lambda e: e.largest_on_motions(e.paths.jumps.astype(np.float64)),
+)
+CYCLE_TIME = Objective(
+    name="cycle_time",
+    unit="s",
+    symbol="E_time",
+    description="the duration of the cycle, dwells included",
+    each=lambda e: e.loads.cycle_time,
+    over="arm",
 )
 UNCOVERED_FRACTION = Objective(
     name="uncovered_fraction",
@@ -224,16 +235,15 @@ DYNAMIC_TORQUE = Objective(
     name="dynamic_torque",
     unit="N m",
     symbol="E_dynamic",
-    description="the largest absolute torque of any motor along the timed moves that end at the target, gravity and "
-    "inertia included",
-    each=lambda e: e.worst_drives(lambda torques, _: np.abs(torques).max(axis=-1)),
+    description="the largest absolute torque of any motor on the way to the target, gravity and inertia included",
+    each=lambda e: e.worst_loads(lambda torques, _: np.abs(torques).max(axis=-1)),
     over="max",
 )
 DYNAMIC_UTILISATION = Objective(
     name="dynamic_utilisation",
     unit="of allowed",
     symbol="E_dynutil",
-    description="the largest share of any actuator's peak torque along the timed moves that end at the target, times "
+    description="the largest share of any actuator's peak torque on the way to the target, times "
     "the safety factor; above 1 it cannot",
     each=_dynamic_utilisation,
     over="max",
@@ -242,16 +252,15 @@ SPEED_UTILISATION = Objective(
     name="speed_utilisation",
     unit="of allowed",
     symbol="E_speed",
-    description="the largest share of any actuator's no-load speed along the timed moves that end at the target; "
-    "above 1 it cannot",
+    description="the largest share of any actuator's no-load speed on the way to the target; above 1 it cannot",
     each=_speed_utilisation,
     over="max",
 )
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)
 _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, RMS_TORQUE, TORQUE_UTILISATION, MASS, LENGTH,
-    PRICE, JOINTS, ORIENTATION_ERROR, WORST_ANGLE, COLLISION, CLEARANCE_SHORTFALL, PATH_ERROR, MAX_JOINT_STEP,
-    DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, UNCOVERED_FRACTION, ANISOTROPY,
+    PRICE, JOINTS, ORIENTATION_ERROR, WORST_ANGLE, COLLISION, CLEARANCE_SHORTFALL, PATH_ERROR, PATH_ANGLE,
+    JUMPS, CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, UNCOVERED_FRACTION, ANISOTROPY,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 RENAMED = {
@@ -259,7 +268,8 @@ RENAMED = {
     "unreached": "uncovered_fraction",
     "clumsiness": "anisotropy",
     "closeness": "clearance_shortfall",
-    "joint_jump": "max_joint_step",
+    "joint_jump": "jumps",
+    "max_joint_step": "jumps",
     "torque_use": "torque_utilisation",
     "dynamic_use": "dynamic_utilisation",
     "speed_use": "speed_utilisation",
@@ -304,9 +314,9 @@ QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*CLE
 # Quantities by what they depend on.
 ORIENTATION_QUANTITIES = (ORIENTATION_ERROR, WORST_ANGLE)
 CLEARANCE_QUANTITIES = (COLLISION, CLEARANCE_SHORTFALL, *CLEARANCES)
-PATH_QUANTITIES = (*CLEARANCE_QUANTITIES, PEAK_TORQUE, TORQUE_UTILISATION)  # the worst of target and moves counts
-TIMED_QUANTITIES = (DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION)
-MOVE_QUANTITIES = (*PATH_QUANTITIES, PATH_ERROR, MAX_JOINT_STEP, *TIMED_QUANTITIES)
+PATH_QUANTITIES = (*CLEARANCE_QUANTITIES, PEAK_TORQUE, TORQUE_UTILISATION)  # the worst of targets and motions counts
+TIMED_QUANTITIES = (CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION)
+MOTION_QUANTITIES = (*PATH_QUANTITIES, PATH_ERROR, PATH_ANGLE, JUMPS, *TIMED_QUANTITIES)
 
 
 def named_objectives(names: Sequence[str], others: Sequence[Objective] = ()) -> tuple[Objective, ...]:

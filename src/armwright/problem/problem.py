@@ -11,7 +11,7 @@ from armwright.exceptions import EvaluatorError, SettingsError, TaskError
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
-from armwright.problem.constraints import Constraint, read_constraints
+from armwright.problem.constraints import Constraint, cycle_constraints, read_constraints
 from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.objective import Objective
@@ -94,7 +94,7 @@ class Problem:
         objectives: what is minimised; by default the task's, else the paper's, with the orientation error if a
             target states an orientation.
         evaluator: a custom function that measures objectives, such as a simulation.
-        constraints: the task's, parsed.
+        constraints: the task's and those that its cycle implies, parsed.
 
     Examples:
         >>> import armwright as aw
@@ -121,7 +121,8 @@ class Problem:
             TaskError: the reference point is for other objectives, or a constraint cannot be parsed.
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
-        object.__setattr__(self, "constraints", read_constraints(self.task.constraints))
+        texts = (*self.task.constraints, *cycle_constraints(self.task, self._has_speeds))
+        object.__setattr__(self, "constraints", read_constraints(texts))
         if not self.objectives:
             object.__setattr__(self, "objectives", self._default_objectives())
         if self.evaluator is not None and self.tolerance > 0.0:
@@ -135,6 +136,12 @@ class Problem:
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
         self._check_reference_point()
+
+    @property
+    def _has_speeds(self) -> bool:
+        """True if all joints have actuators whose speeds are known."""
+        actuators = self.space.arm_actuators
+        return bool(actuators) and all(actuator.speed is not None for actuator in actuators)
 
     def _default_objectives(self) -> tuple[Objective, ...]:
         if self.task.objectives is not None:
@@ -210,8 +217,11 @@ class Problem:
     def scenes(self) -> tuple[Scene, ...]:
         """Return the targets and surroundings of each case of the task."""
         task = self.task
-        shared = (task.target_arrays, task.obstacles, task.straight_moves, task.workspace)
-        return tuple(Scene(points, payloads, *shared) for points, payloads in task.cases)
+        plans = (task.plan(points) if task.cycle else None for points, _ in task.cases)
+        return tuple(
+            Scene(points, payloads, task.target_arrays, task.obstacles, plan, task.workspace)
+            for (points, payloads), plan in zip(task.cases, plans, strict=True)
+        )
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.
@@ -252,8 +262,8 @@ class Problem:
     @cached_property
     def _postures(self) -> int:
         """Return the largest number of postures of one arm."""
-        task = self.task
-        along = sum(task.straight_moves.steps(task.target_positions)) + len(task.straight_moves)
+        task, plan = self.task, self.scenes[0].plan
+        along = 0 if plan is None else 4 * (len(plan.sample().poses) + 33 * len(plan.motions))
         return len(task.target_positions) + along + sum(region.points for region in task.workspace)
 
     def _measure(self, designs: Sequence[Design]) -> tuple[Mapping[str, Array], Mapping[int, str]]:

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from armwright.kinematics.forward import joint_positions, link_lines, rails
+from armwright.kinematics.forward import forward_kinematics, joint_positions, link_lines, rails
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import TORQUE
 from armwright.report.drawing import legend_mark
@@ -84,7 +84,7 @@ def _draw_panel(
         for one, other in combinations(corners, 2):
             if (one != other).sum() == 1:
                 axes.plot(*np.array([one, other]).T, **EDGE)
-    _draw_moves(axes, evaluation, row, targets)
+    _draw_motions(axes, evaluation, row, targets)
     arm = member.arm
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
@@ -105,15 +105,16 @@ def _draw_panel(
     frame(axes, extent)
 
 
-def _draw_moves(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
-    """Draw the moves that end at these targets: the straight line, and the path of the tip."""
-    if not evaluation.moves:
+def _draw_motions(axes: Any, evaluation: Evaluation, row: int, targets: Sequence[int]) -> None:
+    """Draw the motions to these targets: lines of the cycle, and the path of the tip."""
+    if evaluation.plan is None:
         return
-    lines = evaluation.paths.samples
-    for (_, end), first, beyond in zip(evaluation.moves.pairs, lines.first, lines.first[1:], strict=False):
-        if end in targets:
-            axes.plot(*lines.points[first:beyond].T, **MOVE)
-            axes.plot(*evaluation.paths.reached[row, first:beyond].T, **TIP)
+    arms, paths = evaluation.paths.of_arm(row)
+    for path in paths:
+        if evaluation.plan.targets[path.motion.step] in targets:
+            if path.motion.by == "line":
+                axes.plot(*evaluation.plan.poses.position[[path.motion.start, path.motion.end]].T, **MOVE)
+            axes.plot(*forward_kinematics(arms, path.q).tip[0].T, **TIP)
 
 
 def _draw_orientation(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
@@ -172,8 +173,8 @@ def _add_legend(figure: Figure, evaluation: Evaluation, is_narrow: bool) -> None
     ]
     if evaluation.obstacles:
         handles.append(Patch(facecolor=OBSTACLE, alpha=0.3, label="obstacle"))
-    if evaluation.moves:
-        handles += [Line2D([], [], **MOVE, label="straight move"), Line2D([], [], **TIP, label="its tip")]
+    if evaluation.plan is not None:
+        handles += [Line2D([], [], **MOVE, label="line of the cycle"), Line2D([], [], **TIP, label="its tip")]
     if evaluation.workspace:
         handles.append(Line2D([], [], **EDGE, label="workspace"))
     figure.legend(handles=handles, loc="lower center", ncols=3 if is_narrow else len(handles))

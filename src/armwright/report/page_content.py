@@ -32,6 +32,7 @@ from armwright.runs.selection import bounded_numbers, numbers_of
 from armwright.runs.trials_file import TrialsReader
 from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
 from armwright.spaces.parameters import FloatParameter
+from armwright.tasks.task import Task
 
 KINDS = ("revolute", "prismatic", "fixed")
 NO_JOINT = Joint("fixed", "z")  # padding of shorter arms
@@ -225,7 +226,8 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "obstacles": [asdict(obstacle.solid) | {"description": obstacle.describe()} for obstacle in task.obstacles],
         "target_arrays": asdict(task.target_arrays) | {"oriented": task.target_arrays.oriented},
         "workspace": [{"low": r.low, "high": r.high, "description": r.describe()} for r in task.workspace],
-        "moves": task.straight_moves.pairs,
+        "cycle": task.cycle_description,
+        "lines": _lines(task),
         "reference_point": reference,
         "constraints": [
             {
@@ -263,6 +265,15 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         },
         "joint_labels": JOINT_LABEL,
     }
+
+
+def _lines(task: Task) -> list[list[list[float]]]:
+    """Return the ends [m] of the straight lines of the cycle."""
+    if task.cycle is None:
+        return []
+    plan = task.plan(task.target_positions)
+    ends = [(motion.start, motion.end) for motion in plan.motions if motion.by == "line"]
+    return [plan.poses.position[list(pair)].tolist() for pair in ends]
 
 
 def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -141,9 +142,9 @@ class RunConfig(BaseModel, frozen=True, extra="forbid"):
     versions: dict[str, str]
     earlier_versions: list[dict[str, str]] = []
 
-    @property
+    @cached_property
     def problem(self) -> Problem:
-        """The problem of the run, on the CPU if its GPU is missing.
+        """Return the problem of the run, on the CPU if its GPU is missing.
 
         Custom objectives have their names and recorded values; their formulas are not in the run folder.
         """

@@ -107,7 +107,7 @@ def parse_trial(line: bytes, number: int, config: RunConfig) -> FinishedTrial:
     trial = _LINE.validate_json(line)
     for name, found, expected in (
         ("values", trial.values, config.objectives),
-        ("violations", trial.violations, config.task.constraints),
+        ("violations", trial.violations, config.problem.constraints),
     ):
         if len(found) != len(expected):
             raise ValueError(f"expected {len(expected)} {name}, found {len(found)}")

@@ -41,6 +41,20 @@ class Solid:
     rotation: NDArray[np.float64]
     half: Point
 
+    def contains(self, points: NDArray[np.float64], depth: float = 0.0) -> NDArray[np.bool_]:
+        """Return (N,) True for the points (N, 3) [m] that are deeper than `depth` [m] below the surface."""
+        local = np.abs((points - self.centre) @ self.rotation)
+        match self.shape:
+            case "ground":
+                return points[:, 2] < self.centre[2] - depth
+            case "sphere":
+                return np.linalg.norm(local, axis=1) < self.half[0] - depth
+            case "cylinder":
+                across = np.hypot(local[:, 0], local[:, 1])
+                return (across < self.half[0] - depth) & (local[:, 2] < self.half[2] - depth)
+            case "box":
+                return np.all(local < np.array(self.half) - depth, axis=1)
+
 
 class Record(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """The fields that obstacles of all kinds have."""

@@ -64,6 +64,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A point that the tip should reach, and the tool's direction there.
 
     Attributes:
+        name: Its name in the steps of a cycle and in tables; empty for none.
         position: Position of the tip [m].
         axis: World direction of the tool's z axis, of any length; the tool may rotate about it.
         orientation: Instead of an axis, roll, pitch and yaw of the tool about the fixed x, then y, then z [rad].
@@ -72,6 +73,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         weight: Factor of its share of a sum of errors.
     """
 
+    name: str = Field(default="", pattern=r"^([A-Za-z][A-Za-z0-9 ._-]{0,39})?$")
     position: Point
     axis: Point | None = None
     orientation: Point | None = None
@@ -105,6 +107,11 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return handler(_without_serializer(core_schema))
 
     @property
+    def is_plain(self) -> bool:
+        """True if it is nothing but a position."""
+        return not (self.name or self.description)
+
+    @property
     def n_angular(self) -> int:
         """Number of angles that count: 0, AXIS or ORIENTATION."""
         return AXIS if self.axis is not None else ORIENTATION if self.orientation is not None else 0
@@ -131,7 +138,7 @@ def describe_targets(specs: Sequence[Point | Target]) -> list[str]:
     """Describe targets with more than a position, one line for equal ones; numbers count from 1."""
     numbers: dict[str, list[int]] = {}
     for number, target in enumerate(specs, start=1):
-        if isinstance(target, Target):
+        if isinstance(target, Target) and target.description:
             numbers.setdefault(target.description, []).append(number)
     return [
         f"target{'s' if len(group) > 1 else ''} {', '.join(map(str, group))}: {description}"

@@ -1,6 +1,7 @@
 """The task: points that the tip of the arm should reach, and which way it should point there."""
 
-from typing import Annotated, Any, Literal, Self, cast
+from collections.abc import Sequence
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
 from pydantic import (
@@ -10,13 +11,16 @@ from pydantic import (
     ModelWrapValidatorHandler,
     PrivateAttr,
     ValidationError,
+    ValidationInfo,
     field_serializer,
     field_validator,
     model_validator,
 )  # fmt: skip
 
+from armwright.arrays import Array
 from armwright.files import check_name
-from armwright.tasks.moves import MOVE_STEP, Moves, check_moves, check_times
+from armwright.tasks.cycle import IN_ORDER, Cycle, read_cycle, target_indices
+from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, read_obstacle
 from armwright.tasks.targets import (
     MAX_COORDINATE,
@@ -35,7 +39,7 @@ MAX_PAYLOAD_FACTOR = 100.0
 MAX_NOISE = 1.0  # [m]
 MAX_TARGETS = 10_000
 MAX_RESTARTS = 100
-IN_ORDER = "in_order"  # of moves: from each target to the next
+MAX_DEPTH = 1e-3  # [m] of a line in an obstacle
 
 
 def _listed(workspace: Any) -> list[Any]:
@@ -58,9 +62,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         target_noise: Distance by which all targets may be off along x, y or z [m]; likewise.
         restarts: Further starts of the inverse kinematics at each target, of which the best posture counts.
         obstacles: What the arm should keep away from; used by the objectives of clearance.
-        moves: Straight lines of the tip, as pairs of targets counted from 1, or from each target to the next.
-        move_step: Largest distance between two samples of such a line [m].
-        move_time: Duration of every move, or of each, from rest to rest [s].
+        cycle: Steps from target to target; `in_order` is a line to each target in turn.
         workspace: Boxes that the tip should cover. If targets are left out, they are the corners of the boxes.
         objectives: Names of the minimised objectives; by default the paper's two, and orientation_error if a
             target has a tool direction.
@@ -77,9 +79,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     target_noise: float = Field(default=0.0, ge=0.0, le=MAX_NOISE)
     obstacles: tuple[Obstacle, ...] = Field(default=(), max_length=MAX_OBSTACLES)
     restarts: int = Field(default=0, ge=0, le=MAX_RESTARTS)
-    moves: Literal["in_order"] | tuple[tuple[int, int], ...] = ()
-    move_step: Annotated[float, Field(gt=0.0, le=MAX_COORDINATE)] = MOVE_STEP
-    move_time: float | tuple[float, ...] | None = None
+    cycle: Cycle | None = None
     workspace: Annotated[tuple[Region, ...], BeforeValidator(_listed)] = Field(default=(), max_length=MAX_REGIONS)
     objectives: tuple[str, ...] | None = None
     constraints: tuple[str, ...] = ()
@@ -95,15 +95,25 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """Separate the points of all targets from the records of those that have one."""
         given = cast("dict[str, Any]", data).get("targets") if isinstance(data, dict) else None
         if not isinstance(given, (list, tuple)):
-            return handler(data)
+            return handler(data)._checked()
         entries = cast("list[Any]", given)
         records = tuple(_read_target(entry, number) for number, entry in enumerate(entries, start=1))
         points = [entry if record is None else record.position for entry, record in zip(entries, records, strict=True)]
         task = handler({**cast("dict[str, Any]", data), "targets": points})
-        kept = tuple(record if record is not None and record.description else None for record in records)
+        kept = tuple(record if record is not None and not record.is_plain else None for record in records)
         if any(kept):
             task._records = kept  # pyright: ignore[reportAttributeAccessIssue] - only the fields are frozen
-        return task
+        return task._checked()
+
+    def _checked(self) -> Self:
+        """Return the task; ValueError if its cycle does not fit the targets."""
+        names = [name for name in self._names if name]
+        repeated = next((name for name in names if names.count(name) > 1), None)
+        if repeated is not None:
+            raise ValueError(f'targets: two are named "{repeated}"; give each its own name')
+        if self.cycle is not None:
+            _check_obstacles(self.plan(self.target_positions), self.obstacles)
+        return self
 
     @field_validator("name")
     @classmethod
@@ -142,15 +152,12 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             return cast("Any", content)
         return {**cast("dict[str, Any]", content), "tool": read_tool(content["tool"])}
 
-    @field_validator("moves", mode="before")
+    @field_validator("cycle", mode="before")
     @classmethod
-    def _check_moves(cls, value: Any) -> Any:
-        pairs = cast("list[Any]", value) if isinstance(value, (list, tuple)) else [None]
-        if value != IN_ORDER and not all(_is_pair(pair) for pair in pairs):
-            raise ValueError(
-                f"moves: expected {IN_ORDER} or a list of pairs of targets, counted from 1: [[1, 2], [2, 3]]"
-            )
-        return cast("Any", value)
+    def _expand_in_order(cls, value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, str) and value != IN_ORDER:
+            raise ValueError(f"expected {IN_ORDER} or a record with steps, such as {{steps: [{{to: 1}}, {{to: 2}}]}}")
+        return read_cycle(value, len(info.data.get("targets", ())))
 
     @model_validator(mode="after")
     def _check_numbers(self) -> Self:
@@ -167,11 +174,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(f"payload: expected 1 or {len(self.targets)} values [kg], got {len(self.payload)}")
         if not all(0.0 <= kg <= MAX_PAYLOAD for kg in payloads):
             raise ValueError(f"payload: expected 0 to {MAX_PAYLOAD:g} kg, got {self.payload} kg")
-        if self.moves == IN_ORDER and len(self.targets) < 2:
-            raise ValueError(f"moves: {IN_ORDER} needs at least two targets")
-        check_moves([(start + 1, end + 1) for start, end in self.straight_moves.pairs], self.targets, self.move_step)
-        if self.move_time is not None:
-            check_times(self.move_time, len(self.straight_moves))
+        if self.cycle is not None and isinstance(self.payload, tuple):
+            raise ValueError("payload: expected one value, since the cycle picks and places it; got a list")
         if sum(region.points for region in self.workspace) > MAX_POINTS:
             raise ValueError(f"workspace: expected at most {MAX_POINTS} points in all boxes together")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
@@ -225,14 +229,55 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         return np.broadcast_to(np.array(self.payload, dtype=np.float64), (len(self.targets),)).copy()
 
     @property
-    def straight_moves(self) -> Moves:
-        """Straight moves, with targets counted from 0."""
-        if self.moves == IN_ORDER:
-            pairs = tuple((i, i + 1) for i in range(len(self.targets) - 1))
-        else:
-            pairs = tuple((start - 1, end - 1) for start, end in self.moves)
-        times = () if self.move_time is None else self.move_time
-        return Moves(pairs, self.move_step, times if isinstance(times, tuple) else (times,) * len(pairs))
+    def target_names(self) -> tuple[str, ...]:
+        """Name of each target; its number, counted from 1, if it has none."""
+        return tuple(name or str(number) for number, name in enumerate(self._names, start=1))
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        records = self._records or (None,) * len(self.targets)
+        return tuple("" if record is None else record.name for record in records)
+
+    @property
+    def _numbers(self) -> dict[str, int]:
+        """The index of each target that has a name."""
+        return {name: index for index, name in enumerate(self._names) if name}
+
+    @property
+    def cycle_description(self) -> str:
+        """The steps of the cycle on one line; empty without a cycle."""
+        if self.cycle is None:
+            return ""
+        steps = target_indices(self.cycle.steps, self._numbers, len(self.targets))
+        return self.cycle.describe([self.target_names[i] for i in steps])
+
+    def plan(self, positions: Array) -> CyclePlan:
+        """Return the motions of the cycle with the targets at these positions (T, 3) [m].
+
+        Raises:
+            ValueError: The task has no cycle, or one that no arm can follow.
+        """
+        if self.cycle is None:
+            raise ValueError(f"task {self.name} has no cycle; try cycle: {IN_ORDER}")
+        targets = target_indices(self.cycle.steps, self._numbers, len(positions))
+        return plan_cycle(self.cycle, targets, positions, self.target_arrays)
+
+
+def _check_obstacles(plan: CyclePlan, obstacles: Sequence[Obstacle]) -> None:
+    """Raise ValueError if a line of the tip goes through an obstacle."""
+    share = np.linspace(0.0, 1.0, 201)
+    for motion in plan.motions:
+        if motion.by == "joint":
+            continue
+        points = along_line(plan.poses, motion.start, motion.end, share).position
+        for number, obstacle in enumerate(obstacles, start=1):
+            inside = obstacle.solid.contains(points, MAX_DEPTH)
+            if inside.any():
+                name = f'"{obstacle.name}"' if obstacle.name else str(number)
+                raise ValueError(
+                    f"step {motion.step + 1}: the line goes through obstacle {name} at "
+                    f"{[round(float(c), 3) for c in points[np.argmax(inside)]]} m; add a target on the way around it"
+                )
 
 
 def _read_target(entry: Any, number: int) -> Target | None:
@@ -240,10 +285,3 @@ def _read_target(entry: Any, number: int) -> Target | None:
     if isinstance(entry, dict):
         return check_document(cast("dict[Any, Any]", entry), Target, ValueError, f"target {number}")
     return entry if isinstance(entry, Target) else None
-
-
-def _is_pair(value: Any) -> bool:
-    if not isinstance(value, (list, tuple)):
-        return False
-    pair = cast("list[Any]", value)
-    return len(pair) == 2 and all(isinstance(target, int) and not isinstance(target, bool) for target in pair)

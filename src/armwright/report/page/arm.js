@@ -92,7 +92,7 @@ function begin() {
   const sun = new THREE.DirectionalLight(0xffffff, 1.6);
   sun.position.set(3, -5, 8);
   scene.add(sun);
-  for (const name of ["floor", "obstacles", "moves", "workspace", "targets", "goals", "ghost", "compared", "arm"]) {
+  for (const name of ["floor", "obstacles", "lines", "workspace", "targets", "goals", "ghost", "compared", "arm"]) {
     groups[name] = new THREE.Group();
     scene.add(groups[name]);
   }
@@ -126,7 +126,7 @@ function legend() {
   const parts = [...["x", "y", "z"].map((axis) => [joint[axis], labels[axis]]),
     [NOW, "current target"], [HIT, "reached"], [content.head.colours.target, "missed; compared design"]];
   if (content.obstacles.length) parts.push([content.head.colours.obstacle, "obstacle"]);
-  if (content.head.moves.length) parts.push([content.head.colours.target, "straight move (line)"]);
+  if (content.head.lines.length) parts.push([content.head.colours.target, "line of the cycle"]);
   if (content.head.workspace.length) parts.push([colour("soft"), "workspace (edges)"]);
   $("arm-legend").replaceChildren(...parts.map(([paint_, text]) => {
     const dot = element("span", { class: "dot" });
@@ -185,7 +185,7 @@ function reframe() {
   frame = { centre, low, high, radius };
   drawFloor();
   drawObstacles();
-  drawMoves();
+  drawLines();
   drawWorkspace();
   drawTargets();
   look();
@@ -251,11 +251,11 @@ function drawObstacles() {
   for (const solid of content.obstacles) groups.obstacles.add(...solidParts(solid, frame, materials.obstacle));
 }
 
-// Draws the straight moves.
-function drawMoves() {
-  empty(groups.moves);
-  const points = content.head.moves.flatMap(([start, end]) => [...content.targets[start], ...content.targets[end]]);
-  if (points.length) groups.moves.add(segments(points, new THREE.LineBasicMaterial({ color: content.head.colours.target })));
+// Draws the lines of the cycle.
+function drawLines() {
+  empty(groups.lines);
+  const points = content.head.lines.flat(2);
+  if (points.length) groups.lines.add(segments(points, new THREE.LineBasicMaterial({ color: content.head.colours.target })));
 }
 
 // Draws the edges of the boxes to cover.

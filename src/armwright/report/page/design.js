@@ -90,7 +90,7 @@ export function drawDesign() {
   const loads = head.payloads.some((kg) => kg > 0) ? ` Payload at the targets: ${[...new Set(head.payloads)].join(", ")} kg.` : "";
   const solids = head.obstacles.length ? ` Obstacles: ${head.obstacles.map((solid) => solid.description).join("; ")}.` : "";
   const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.description).join("; ")}.` : "";
-  const lines = head.moves.length ? ` Straight moves between targets: ${head.moves.map(([a, b]) => `${a + 1} to ${b + 1}`).join(", ")}.` : "";
+  const lines = head.cycle ? ` Cycle: ${head.cycle}.` : "";
   const cases = head.cases ? ` Objectives are the worst of the nominal task and ${head.cases}; everything else is of the nominal task.` : "";
   $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${solids}${lines}${boxes}`;
 }

@@ -1,0 +1,49 @@
+"""The joint path of arms along one motion: a cubic spline through samples of a line, a straight line in joint space."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from armwright.arrays import Array
+from armwright.tasks.motions import Motion
+
+
+@dataclass(frozen=True)
+class MotionPath:
+    """N arms along a motion.
+
+    Attributes:
+        motion: The motion.
+        q: (N, R + 1, D) joint values at equal shares s of the motion from 0 to 1 [rad] or [m].
+    """
+
+    motion: Motion
+    q: Array
+
+    @property
+    def share(self) -> Array:
+        """(R + 1,) the shares of the samples."""
+        return np.linspace(0.0, 1.0, self.q.shape[1])
+
+    def at(self, share: Array, order: int = 0) -> Array:
+        """Return (N, F, D) joint values at shares (F,), or their first or second derivatives by the share."""
+        if self.motion.by == "joint":
+            change = self.q[:, -1:] - self.q[:, :1]
+            weight = (share, np.ones(len(share)), np.zeros(len(share)))[order]
+            return (self.q[:, :1] if order == 0 else 0.0) + weight[:, None] * change
+        weights = _spline_weights(self.q.shape[1], tuple(share.tolist()), order)
+        return np.matmul(weights, self.q)
+
+    @property
+    def largest_steps(self) -> Array:
+        """(N, D) largest change of each joint from one sample to the next [rad] or [m]."""
+        return np.abs(np.diff(self.q, axis=1)).max(axis=1)
+
+
+@lru_cache(maxsize=256)
+def _spline_weights(samples: int, share: tuple[float, ...], order: int) -> Array:
+    """Return (F, R) weights of equally spaced samples in the values of their spline, or its derivatives."""
+    spline = CubicSpline(np.linspace(0.0, 1.0, samples), np.eye(samples))
+    return np.ascontiguousarray(spline(np.array(share), order))

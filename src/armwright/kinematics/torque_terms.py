@@ -1,0 +1,91 @@
+"""Terms of the joint torques along the motions of a cycle, independent of their durations."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.arm_arrays import ArmArrays
+from armwright.kinematics.chunks import in_chunks
+from armwright.kinematics.cycle_path import CyclePaths
+from armwright.kinematics.devices import Device, load_dynamics
+from armwright.kinematics.motion_path import MotionPath
+
+CHUNK = 2**12  # samples that a thread takes at a time
+
+
+@dataclass(frozen=True)
+class TorqueTerms:
+    """Terms of N arms at the R samples of a motion, with s the share of the motion.
+
+    The torque is gravity + drag s'² + push s'' [N m], or a force [N].
+
+    Attributes:
+        gravity: (N, R, D).
+        drag: (N, R, D).
+        push: (N, R, D).
+        q_s: (N, R, D) derivative of the joint values by s [rad] or [m].
+        q_ss: (N, R, D) second derivative.
+    """
+
+    gravity: Array
+    drag: Array
+    push: Array
+    q_s: Array
+    q_ss: Array
+
+
+def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[TorqueTerms, ...]]:
+    """Return, for each group of arms, the terms along each motion; payload: mass at the tip when carried [kg]."""
+    found: list[tuple[TorqueTerms, ...]] = []
+    for group in paths.groups:
+        q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
+        counts = [path.q.shape[1] for path in group.paths]
+        carried = np.repeat([float(path.motion.carries) for path in group.paths], counts)
+        terms = _terms(group.arms, q, q_s, q_ss, carried, payload, device)  # (3, n, S, D)
+        spans = np.cumsum([0, *counts])
+        found.append(
+            tuple(
+                TorqueTerms(terms[0, :, a:b], terms[1, :, a:b], terms[2, :, a:b], q_s[:, a:b], q_ss[:, a:b])
+                for a, b in pairwise(spans)
+            )
+        )
+    return found
+
+
+def _values(path: MotionPath, order: int) -> Array:
+    """Return (n, R, D) joint values at the samples, or their derivatives."""
+    if order == 0:
+        return path.q
+    return np.broadcast_to(path.at(path.share, order), path.q.shape)
+
+
+def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, payload: float, device: Device) -> Array:
+    """Return (3, N, S, D) gravity, drag and push of N arms at S samples."""
+    wp, kernels = load_dynamics(device)
+    terms = np.empty((3, *q.shape))
+
+    def solve(chunk: slice) -> None:
+        part = arms[chunk]
+        bodies = kernels.Bodies()
+        bodies.dof, bodies.payload_mass = arms.dof, wp.float64(payload)
+        values: dict[str, Any] = {name: getattr(part, name).astype(np.float64) for name in ("base", "offset")}
+        values |= {"motion": part.motion, "mass": part.bodies.total_mass, "com": part.bodies.total_com}
+        values |= {"inertia": part.bodies.inertia}
+        values |= {"payload_com": np.zeros((len(part), 3)), "payload_inertia": np.zeros((len(part), 3, 3))}
+
+        def on_device(array: Array, dtype: Any) -> Any:
+            return wp.array(np.ascontiguousarray(array), dtype=dtype, device=device, copy=False)
+
+        for name, array in values.items():
+            setattr(bodies, name, on_device(array, kernels.Bodies.vars[name].type.dtype))
+        inputs = [on_device(array[chunk], kernels.real) for array in (q, q_s, q_ss)]
+        found = wp.empty((3, *q[chunk].shape), dtype=kernels.real, device=device)
+        inputs = [bodies, *inputs, on_device(carried, kernels.real), found]
+        wp.launch(kernels.torque_terms, q[chunk].shape[:2], inputs=inputs, device=device)
+        terms[:, chunk] = found.numpy()
+
+    in_chunks(solve, len(arms), max(1, CHUNK // q.shape[1]), device)
+    return terms

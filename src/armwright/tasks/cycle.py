@@ -1,0 +1,159 @@
+"""The cycle of a task: which targets the tool visits, in which order, how and in what time."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self, cast
+
+from pydantic import BaseModel, Field, field_validator, model_validator
+
+from armwright.exceptions import did_you_mean
+
+By = Literal["line", "joint"]
+Action = Literal["pick", "place"]
+Duration = Literal["fastest"] | Annotated[float, Field(gt=0.0, le=1e4)]  # [s]
+
+IN_ORDER = "in_order"  # a line to each target in turn
+FASTEST = "fastest"
+MAX_STEPS = 1000
+_BY: Mapping[By, str] = {"line": "a line", "joint": "a joint motion"}
+
+
+class Strict(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """A record of a task file."""
+
+
+class Step(Strict, frozen=True):
+    """A motion to a target, and what happens there.
+
+    Attributes:
+        to: Name or number of the target; numbers count from 1.
+        by: A straight line of the tool, or a straight line in joint space.
+        do: Pick or place the payload on arrival.
+        time: Duration from the previous target to this one [s], or fastest; by default the cycle's.
+    """
+
+    to: str | Annotated[int, Field(strict=True)]
+    by: By = "joint"
+    do: Action | None = None
+    time: Duration | None = None
+
+
+class PathTolerance(Strict, frozen=True):
+    """Largest deviations of the tool along lines.
+
+    Attributes:
+        path: Distance of the tip from the line [m].
+        angle: Angle of the tool from its direction or orientation [rad].
+    """
+
+    path: float = Field(default=0.002, gt=0.0, le=1000.0)
+    angle: float = Field(default=0.02, gt=0.0, le=3.2)
+
+
+class Cycle(Strict, frozen=True):
+    """Steps from target to target, each from rest to rest.
+
+    The cycle starts at rest at the target of its first step. If it is closed, the `by` and `time` of that step describe
+    the way back to it, and its `do` happens on arrival.
+
+    Attributes:
+        steps: The steps.
+        closed: Return to the first target at the end.
+        time: Duration of each step that does not state its own [s], or fastest.
+        dwell: Time at rest after each pick and place [s].
+        approach: Length of the lines before and after each pick and place, along the tool's z axis [m].
+        tolerance: Largest deviations along lines.
+    """
+
+    steps: tuple[Step, ...] = Field(max_length=MAX_STEPS)
+    closed: bool = True
+    time: Duration = FASTEST
+    dwell: float = Field(default=0.0, ge=0.0, le=1e4)
+    approach: float | None = Field(default=None, gt=0.0, le=1000.0)
+    tolerance: PathTolerance = PathTolerance()
+
+    @field_validator("steps")
+    @classmethod
+    def _check_steps(cls, steps: tuple[Step, ...]) -> tuple[Step, ...]:
+        if len(steps) < 2:
+            raise ValueError(f"a cycle needs at least two steps, got {len(steps)}")
+        return steps
+
+    @model_validator(mode="after")
+    def _check_actions(self) -> Self:
+        done = [(number, step.do) for number, step in enumerate(self.steps, start=1) if step.do]
+        before = [done[-1], *done] if self.closed and done else done
+        if done and not self.closed and done[0][1] == "place":
+            raise ValueError(f"step {done[0][0]}: place without a pick before it")
+        for (_, last), (number, action) in pairwise(before):
+            if last == action:
+                other = "pick" if action == "place" else "place"
+                raise ValueError(f"step {number}: {action} without a {other} before it")
+        return self
+
+    def durations(self) -> tuple[float | None, ...]:
+        """Return the duration of each step [s]; None for fastest."""
+        times = [step.time or self.time for step in self.steps]
+        return tuple(None if time == FASTEST else float(cast("float", time)) for time in times)
+
+    def describe(self, names: Sequence[str]) -> str:
+        """Return a description on one line; names: of each step's target."""
+
+        def stop(index: int) -> str:
+            action = self.steps[index].do
+            return f"{names[index]} ({action})" if action else names[index]
+
+        route = [stop(0), *(f"by {_BY[self.steps[i].by]} to {stop(i)}" for i in range(1, len(self.steps)))]
+        route += [f"by {_BY[self.steps[0].by]} back to {names[0]}"] if self.closed else []
+        approach = (
+            "" if self.approach is None else f"; lines of {1e3 * self.approach:g} mm before and after pick and place"
+        )
+        return f"{', '.join(route)}{approach}"
+
+    def describe_times(self) -> str:
+        """Return a description of the durations."""
+        times = self.durations()
+        order = [*range(1, len(times)), *([0] if self.closed else [])]
+        each = ["as fast as possible" if times[i] is None else f"{times[i]:g} s" for i in order]
+        dwell = f"; {self.dwell:g} s at rest after each pick and place" if self.dwell else ""
+        return (
+            each[0] + (" for each step" if len(each) > 1 else "") if len(set(each)) == 1 else ", ".join(each)
+        ) + dwell
+
+    def carried(self) -> tuple[bool, ...]:
+        """Return, for each step, whether the payload is carried on the way to its target."""
+        if not any(step.do for step in self.steps):
+            return (True,) * len(self.steps)
+        holds = self.closed and [step.do for step in self.steps if step.do][-1] == "pick"
+        loaded: list[bool] = []
+        for step in self.steps:
+            loaded.append(holds)
+            holds = holds if step.do is None else step.do == "pick"
+        return tuple(loaded)
+
+
+def read_cycle(value: Any, n_targets: int) -> Any:
+    """Return the steps that `in_order` stands for, and anything else unchanged, for pydantic to validate."""
+    if value != IN_ORDER:
+        return value
+    return {"closed": False, "steps": [{"to": number, "by": "line"} for number in range(1, n_targets + 1)]}
+
+
+def target_indices(steps: Sequence[Step], names: Mapping[str, int], n_targets: int) -> tuple[int, ...]:
+    """Return the index of each step's target, counted from 0.
+
+    Raises:
+        ValueError: A step names a target that does not exist, or the target where it already is.
+    """
+    return tuple(_index(number, step.to, names, n_targets) for number, step in enumerate(steps, start=1))
+
+
+def _index(number: int, to: str | int, names: Mapping[str, int], n_targets: int) -> int:
+    if isinstance(to, int):
+        if not 1 <= to <= n_targets:
+            raise ValueError(f"step {number}: there is no target {to}; targets are counted from 1 to {n_targets}")
+        return to - 1
+    if to not in names:
+        known = f"Names: {', '.join(names)}" if names else "The targets have no names; use their numbers, from 1"
+        raise ValueError(f'step {number}: unknown target "{to}".{did_you_mean(to, names)} {known}')
+    return names[to]

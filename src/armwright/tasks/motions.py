@@ -1,0 +1,315 @@
+"""The motions of a cycle: poses of the tool, lines and joint motions between them, and samples along lines.
+
+A step of the task has one motion, or up to three with an approach: the line out of the target before, a joint motion,
+and the line into its own target. Motions are from rest to rest. A block is a pose that a joint motion ends at, and the
+lines that follow: its first posture decides all others.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.tasks.cycle import Action, By, Cycle
+from armwright.tasks.targets import ORIENTATION, TargetArrays
+
+LINE_STEP = 0.02  # [m] largest distance of two samples of a line
+ANGLE_STEP = 0.1  # [rad] likewise of the tool's angle
+MIN_STEPS = 4  # of a line, for its spline
+MAX_SAMPLES = 20_000  # of all lines of a cycle
+OPPOSITE = 1e-3  # [rad] from half a turn; the shortest rotation is not unique there
+
+
+@dataclass(frozen=True)
+class Poses:
+    """P poses of the tool.
+
+    Attributes:
+        position: (P, 3) [m].
+        rotation: (P, 3, 3) the tool's own x, y and z in the world as columns; unused axes are arbitrary.
+        n_angular: (P,) number of angles that count: 0, AXIS or ORIENTATION.
+        tolerance: (P,) allowed distance of the tip [m].
+        angle_tolerance: (P,) allowed angle of the tool [rad].
+    """
+
+    position: Array
+    rotation: Array
+    n_angular: NDArray[np.intp]
+    tolerance: Array
+    angle_tolerance: Array
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def __getitem__(self, index: NDArray[np.intp] | list[int]) -> "Poses":
+        return Poses(*(getattr(self, field.name)[index] for field in fields(Poses)))
+
+    @property
+    def arrays(self) -> TargetArrays:
+        """The directions and tolerances as the inverse kinematics takes them."""
+        return TargetArrays(self.n_angular, self.rotation, self.tolerance, self.angle_tolerance, np.ones(len(self)))
+
+
+def stack_poses(parts: Sequence[Poses]) -> Poses:
+    """Return the poses of several parts, one after the other."""
+    return Poses(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Poses)))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion from rest to rest.
+
+    Attributes:
+        step: Index of its step in the task.
+        by: Line or joint motion.
+        start: Index of its first pose.
+        end: Index of its last pose.
+        carries: Whether the payload is carried.
+        arrives: Whether it ends at the target of its step.
+    """
+
+    step: int
+    by: By
+    start: int
+    end: int
+    carries: bool
+    arrives: bool
+
+
+@dataclass(frozen=True)
+class Block:
+    """A pose that a joint motion ends at, or an open cycle starts at, and the lines after it.
+
+    Attributes:
+        entry: Index of the pose.
+        lines: Indices of the motions.
+    """
+
+    entry: int
+    lines: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class LineSamples:
+    """S samples of the tool's pose, block after block; consecutive lines share a sample.
+
+    Attributes:
+        poses: The S poses.
+        first: (B + 1,) index of each block's first sample, and S.
+        of_motion: Indices of the first and the last sample of each motion; equal for joint motions.
+    """
+
+    poses: Poses
+    first: NDArray[np.intp]
+    of_motion: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class CyclePlan:
+    """Where the tool goes, independent of any arm.
+
+    Attributes:
+        cycle: The cycle as the task states it.
+        poses: The T targets of the task, then points of approach.
+        motions: The motions in their order, from rest at the target of the first step.
+        targets: Index of each step's target.
+        times: Duration of each step [s]; None for the fastest.
+    """
+
+    cycle: Cycle
+    poses: Poses
+    motions: tuple[Motion, ...]
+    targets: tuple[int, ...]
+    times: tuple[float | None, ...]
+
+    @property
+    def first_motion(self) -> int:
+        """Index of the motion that the blocks begin with: any after a joint motion serves in a closed cycle."""
+        if not self.cycle.closed:
+            return 0
+        joint = [index for index, motion in enumerate(self.motions) if motion.by == "joint"]
+        return (joint[0] + 1) % len(self.motions) if joint else 0
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The blocks in their order, beginning at `first_motion`; joint motions join them."""
+        n, blocks = len(self.motions), list[Block]()
+        entry, lines = self.motions[self.first_motion].start, list[int]()
+        for index in ((self.first_motion + i) % n for i in range(n)):
+            motion = self.motions[index]
+            if motion.by == "line":
+                lines.append(index)
+                continue
+            blocks.append(Block(entry, tuple(lines)))
+            entry, lines = motion.end, []
+        if lines or not self.cycle.closed:
+            blocks.append(Block(entry, tuple(lines)))
+        return tuple(blocks)
+
+    @cached_property
+    def joint_motions(self) -> tuple[int, ...]:
+        """Indices of the joint motions, each after the block of the same index."""
+        n = len(self.motions)
+        order = ((self.first_motion + i) % n for i in range(n))
+        return tuple(index for index in order if self.motions[index].by == "joint")
+
+    @property
+    def is_loop(self) -> bool:
+        """True for a closed cycle of lines alone, which has to end in the posture where it began."""
+        return self.cycle.closed and not self.joint_motions
+
+    def line(self, motion: Motion, share: Array) -> Poses:
+        """Return the poses at shares (S,) of a line, with the tolerance of the path and, at its end, of the pose."""
+        poses, allowed = along_line(self.poses, motion.start, motion.end, share), self.cycle.tolerance
+        at_end = share >= 1.0
+        return replace(
+            poses,
+            tolerance=np.where(at_end, np.minimum(allowed.path, self.poses.tolerance[motion.end]), allowed.path),
+            angle_tolerance=np.where(
+                at_end, np.minimum(allowed.angle, self.poses.angle_tolerance[motion.end]), allowed.angle
+            ),
+        )
+
+    def sample(self, refinement: int = 1) -> LineSamples:
+        """Return samples of all lines, `refinement` times as many as at least."""
+        parts: list[Poses] = []
+        first, spans = [0], [(0, 0)] * len(self.motions)
+        at = 0
+        for block in self.blocks:
+            parts.append(self.poses[[block.entry]])
+            for index in block.lines:
+                motion = self.motions[index]
+                steps = refinement * line_steps(self.poses, motion.start, motion.end)
+                parts.append(self.line(motion, np.arange(1, steps + 1) / steps))
+                spans[index] = (at, at + steps)
+                at += steps
+            at += 1
+            first.append(at)
+        return LineSamples(stack_poses(parts), np.array(first), tuple(spans))
+
+
+def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: TargetArrays) -> CyclePlan:
+    """Return the motions of a cycle.
+
+    Args:
+        cycle: The cycle.
+        targets: Index of each step's target.
+        positions: (T, 3) of the targets [m].
+        arrays: How the targets are to be reached.
+    """
+    poses = Poses(positions, arrays.rotation, arrays.n_angular, arrays.tolerance, arrays.angle_tolerance)
+    approached = sorted({t for t, step in zip(targets, cycle.steps, strict=True) if step.do and cycle.approach})
+    before = poses[approached]
+    if approached:
+        shift = (cycle.approach or 0.0) * before.rotation[:, :, 2]
+        allowed = cycle.tolerance
+        before = replace(
+            before,
+            position=before.position - shift,
+            tolerance=np.full(len(before), allowed.path),
+            angle_tolerance=np.full(len(before), allowed.angle),
+        )
+        poses = stack_poses([poses, before])
+    points = {target: len(positions) + i for i, target in enumerate(approached)}
+    plan = CyclePlan(cycle, poses, _motions(cycle, targets, points), tuple(targets), cycle.durations())
+    _check_lines(plan)
+    return plan
+
+
+def _motions(cycle: Cycle, targets: Sequence[int], points: dict[int, int]) -> tuple[Motion, ...]:
+    """Return the motions; points: index of the pose of approach by target."""
+    n, carried = len(targets), cycle.carried()
+    order = [*range(1, n), *([0] if cycle.closed else [])]
+    motions: list[Motion] = []
+    for step in order:
+        carries, do = carried[step], cycle.steps[step].do
+        here, there = targets[step - 1], targets[step]
+        out, into = _approached(cycle.steps[step - 1].do, points), _approached(do, points)
+        if out:
+            motions.append(Motion(step, "line", here, points[here], carries, arrives=False))
+            here = points[here]
+        if into:
+            motions.append(Motion(step, "joint", here, points[there], carries, arrives=False))
+            motions.append(Motion(step, "line", points[there], there, carries, arrives=True))
+        else:
+            motions.append(Motion(step, cycle.steps[step].by, here, there, carries, arrives=True))
+    return tuple(motions)
+
+
+def _approached(do: Action | None, points: dict[int, int]) -> bool:
+    return do is not None and bool(points)
+
+
+def line_steps(poses: Poses, start: int, end: int) -> int:
+    """Return the least number of steps of a line."""
+    length = float(np.linalg.norm(poses.position[end] - poses.position[start]))
+    angle = abs(_turn(poses, start, end)[1])
+    return max(MIN_STEPS, math.ceil(length / LINE_STEP - 1e-9), math.ceil(angle / ANGLE_STEP - 1e-9))
+
+
+def along_line(poses: Poses, start: int, end: int, share: Array) -> Poses:
+    """Return the poses at the given shares (S,) of a line: an orientation by slerp, an axis by the shortest arc."""
+    n = len(share)
+    a, b = poses.position[start], poses.position[end]
+    axis, angle = _turn(poses, start, end)
+    rotation = rotation_about(axis, share * angle) @ poses.rotation[start]
+    return Poses(
+        position=(1.0 - share)[:, None] * a + share[:, None] * b,
+        rotation=rotation,
+        n_angular=np.full(n, poses.n_angular[start]),
+        tolerance=np.full(n, poses.tolerance[end]),
+        angle_tolerance=np.full(n, poses.angle_tolerance[end]),
+    )
+
+
+def rotation_about(axis: Array, angle: Array) -> Array:
+    """Return the (S, 3, 3) rotations by angles (S,) [rad] about a unit vector (3,), by Rodrigues' formula."""
+    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
+
+
+def _turn(poses: Poses, start: int, end: int) -> tuple[Array, float]:
+    """Return the unit axis (3,) and the angle [rad] of the shortest rotation between two poses."""
+    first, last = poses.rotation[start], poses.rotation[end]
+    kind = min(poses.n_angular[start], poses.n_angular[end])
+    if kind == 0:
+        return np.array([0.0, 0.0, 1.0]), 0.0
+    if kind == ORIENTATION:
+        change = last @ first.T
+        vector = 0.5 * np.array([change[2, 1] - change[1, 2], change[0, 2] - change[2, 0], change[1, 0] - change[0, 1]])
+        cosine = 0.5 * (float(np.trace(change)) - 1.0)
+    else:
+        vector, cosine = np.cross(first[:, 2], last[:, 2]), float(first[:, 2] @ last[:, 2])
+    sine = float(np.linalg.norm(vector))
+    return (vector / sine if sine > 0.0 else np.array([0.0, 0.0, 1.0])), math.atan2(sine, cosine)
+
+
+def _check_lines(plan: CyclePlan) -> None:
+    """Raise ValueError for a line that has no length, or no unique or no constant kind of direction."""
+    poses, n_samples = plan.poses, 0
+    for motion in plan.motions:
+        number, start, end = motion.step + 1, motion.start, motion.end
+        shift = float(np.linalg.norm(poses.position[end] - poses.position[start]))
+        turn = _turn(poses, start, end)[1]
+        if shift == 0.0 and turn == 0.0:
+            raise ValueError(f"step {number}: the tool is already there; leave the step out")
+        if motion.by == "joint":
+            continue
+        if poses.n_angular[start] != poses.n_angular[end]:
+            raise ValueError(
+                f"step {number}: a line needs the same kind of direction at both ends (none, axis or orientation); "
+                "try by: joint"
+            )
+        if turn > math.pi - OPPOSITE:
+            raise ValueError(
+                f"step {number}: the tool points the opposite way at the end of the line, so that the rotation is "
+                "not unique; add a target in between, or try by: joint"
+            )
+        n_samples += line_steps(poses, start, end)
+    if n_samples > MAX_SAMPLES:
+        raise ValueError(f"cycle: the lines have {n_samples} samples of {LINE_STEP:g} m; at most {MAX_SAMPLES} count")
