@@ -420,7 +420,7 @@ def test_draft_prompt_covers_all_file_keys() -> None:
         assert set(schema["$defs"][model.__name__]["properties"]) == set(model.model_fields)
     for objective in OBJECTIVES.values():
         assert f"- {objective.name} [{objective.unit}]: " in prompt
-    names = schema["$defs"]["DesignSpace"]["properties"]["actuators"]["items"]["anyOf"][0]["enum"]
+    names = schema["$defs"]["DesignSpace"]["properties"]["actuators"]["items"]["enum"]
     assert names == list(catalogue())
     assert all(f"- {name} (" in prompt for name in names)
     assert "prefixItems" not in json.dumps(schema["$defs"]["Task"])

@@ -28,7 +28,7 @@ def choose_candidates(blocks: Array, edges: Array, closed: bool) -> IndexArray:
     if closed:
         total = total + edges[:, b - 1].swapaxes(1, 2)  # from candidate j of the last block to s
     start, end = np.divmod(total.reshape(n, -1).argmin(axis=1), k)
-    arm: IndexArray = np.arange(n)
+    arm = np.arange(n, dtype=np.intp)
     choice = np.empty((n, b), dtype=np.intp)
     choice[:, -1] = end
     for block in range(b - 1, 0, -1):

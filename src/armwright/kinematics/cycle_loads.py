@@ -53,6 +53,15 @@ class CycleLoads:
         return np.sqrt((moving + resting) / self.cycle_time[:, None])
 
 
+def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> Array:
+    """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
+    torques = np.empty((len(paths.jumps), len(paths.plan.motions), INSTANTS, paths.groups[0].arms.dof))
+    for group, of_motions in zip(paths.groups, terms, strict=True):
+        for i, part in enumerate(of_motions):
+            torques[group.index, i] = _instants(part.gravity.shape[1])[0] @ part.gravity
+    return torques
+
+
 def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> CycleLoads:
     """Return the loads of arms along a cycle.
 

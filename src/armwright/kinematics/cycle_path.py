@@ -259,7 +259,7 @@ def _avoid_collisions(
         colliding = (in_blocks > 0.0).any(axis=1) | (in_edges > 0.0).any(axis=1)
         if not colliding.any():
             break
-        edge: IndexArray = np.arange(n_edges)
+        edge = np.arange(n_edges, dtype=np.intp)
         blocks[index[:, None], np.arange(n_blocks), choice[index]] += _cost_of(in_blocks / DEPTH)
         following = choice[index][:, (edge + 1) % n_blocks]
         edges[index[:, None], edge, choice[index][:, :n_edges], following] += _cost_of(in_edges / DEPTH)

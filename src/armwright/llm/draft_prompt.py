@@ -62,10 +62,11 @@ def draft_prompt(description: str) -> str:
 
 
 def draft_schema() -> dict[str, Any]:
-    """Return the JSON schema of the answer; actuators are named, or described as records."""
+    """Return the JSON schema of the answer, in which actuators are names of the catalogue."""
     schema = _plain(DraftAnswer.model_json_schema(mode="serialization"))
     actuators = schema["$defs"]["DesignSpace"]["properties"]["actuators"]
-    actuators["items"] = {"anyOf": [{"type": "string", "enum": list(catalogue())}, actuators["items"]]}
+    actuators["items"] = {"type": "string", "enum": list(catalogue())}
+    del schema["$defs"]["ActuatorRecord"]
     return schema
 
 

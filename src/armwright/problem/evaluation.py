@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, stack_arms
 from armwright.kinematics.clearance import clearances
-from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads
+from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads, holding_torques
 from armwright.kinematics.cycle_path import CyclePaths, find_paths
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik import UPDATES, Postures, solve_postures
@@ -104,16 +104,15 @@ class Evaluation(Scene):
     def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
         """Return (N, T) a measure of holding torques, the largest of a target's posture and of the motions to it.
 
-        measure: from torques of motors (n, K, J) [N m] to (n, K), of K postures.
+        measure: from torques of motors (N, K, J) [N m] to (N, K), of K postures.
         """
         at_targets = measure(self.motor_torques)
         if self.cycle_paths is None:
             return at_targets
-        along = np.empty((len(self), len(self.cycle_paths.plan.motions)))
-        for group, terms in zip(self.cycle_paths.groups, self.torque_terms, strict=True):
-            for i, part in enumerate(terms):
-                along[group.index, i] = measure(part.gravity * group.arms.travel[:, None]).max(axis=1)
-        return self.largest_on_motions(along, at_targets)
+        torques = holding_torques(self.cycle_paths, self.torque_terms)
+        n, m, f, dof = torques.shape
+        along = measure(torques.reshape(n, m * f, dof) * self.arms.travel[:, None])
+        return self.largest_on_motions(along.reshape(n, m, f).max(axis=2), at_targets)
 
     def worst_loads(self, measure: Callable[[Array, Array], Array]) -> Array:
         """Return (N, T) a measure of torques and speeds, the largest along the motions of steps to a target, else 0.
