@@ -1,0 +1,252 @@
+"""What drives can deliver, and the least time of a motion, against brute force and TOPP-RA."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import toppra
+from toppra import algorithm, constraint
+
+from armwright.arrays import Array
+from armwright.kinematics.actuation import Actuation, actuation_at_joints
+from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
+from armwright.kinematics.drive_limits import (
+    MotionLoad,
+    available_torque,
+    least_time,
+    motion_load,
+    torque_speed_utilisation,
+)
+from armwright.kinematics.dynamics import inverse_dynamics
+from armwright.robot.actuators import catalogue
+from armwright.spaces.design_space import DesignSpace
+
+N, S, D = 400, 9, 3
+TIMES = np.geomspace(1e-2, 1e3, 3001)  # [s]
+
+
+def drives(n: int, d: int, rng: np.random.Generator) -> Actuation:
+    """Random drives: servos with a corner speed of 0, drives with one, and some without a falling line."""
+    no_load = rng.uniform(0.5, 10.0, (n, d))
+    corner = no_load * rng.choice([0.0, 0.3, 0.9, 1.0], (n, d))
+    columns = (rng.uniform(0.5, 5.0, (n, d)), np.ones((n, d)), corner, no_load, rng.uniform(0.0, 0.2, (n, d)))
+    friction = (rng.uniform(0.0, 0.4, (n, d)), rng.uniform(0.0, 0.3, (n, d)) * rng.choice([1, 20], (n, d)))
+    ratings = np.stack([*columns, *friction, np.ones((n, d)), np.ones((n, d))], axis=-1)
+    return actuation_at_joints(ratings, np.ones((n, d)), np.zeros(n), rng.uniform(1.0, 2.0, n))
+
+
+def loads(motors: Actuation, rng: np.random.Generator, samples: int = S) -> MotionLoad:
+    """Random samples, which no mechanism need have: torques and velocities of any sign, each of any size."""
+    shape = (len(motors.peak), samples, motors.peak.shape[1])
+    gravity, inertial, velocity, acceleration = rng.normal(size=(4, *shape)) * 10.0 ** rng.uniform(-2, 0.2, (4, *shape))
+    velocity[:, 0] = 0.0
+    return motion_load(gravity, inertial, velocity, acceleration, motors)
+
+
+def can_follow(load: MotionLoad, motors: Actuation, time: Array, slack: float = 0.0) -> Array:
+    """Whether torque and speed are within the limits at every sample, by the definition of the issue: (N,)."""
+    torque, speed = load.torque(time), load.velocity / time[:, None, None]
+    peak, corner, no_load = (each[:, None] for each in (motors.peak, motors.corner_speed, motors.no_load_speed))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        line = np.where(
+            np.abs(speed) <= corner * (1.0 + slack), peak, peak * (no_load - np.abs(speed)) / (no_load - corner)
+        )
+    limit = np.where(torque * speed > 0.0, np.minimum(peak, line), peak)
+    required = motors.safety_factor[:, None, None] * np.abs(torque)
+    within = (required <= limit + slack * peak) & (np.abs(speed) <= no_load * (1.0 + slack))
+    return within.all(axis=(1, 2))
+
+
+def random_motions(seed: int, samples: int = S, joints: int = D) -> tuple[MotionLoad, Actuation]:
+    rng = np.random.default_rng(seed)
+    motors = drives(N, joints, rng)
+    return loads(motors, rng, samples), motors
+
+
+@pytest.mark.parametrize(("samples", "joints"), [(S, D), (3, 2), (2, 1)])
+def test_least_time_is_the_least_of_all_times(samples: int, joints: int) -> None:
+    load, motors = random_motions(samples, samples, joints)
+    time = least_time(load, motors)
+    holds = (motors.safety_factor[:, None, None] * np.abs(load.gravity) <= motors.peak[:, None]).all(axis=(1, 2))
+    assert 0.1 < np.isfinite(time).mean() < 0.95
+    assert np.isinf(time[~holds]).all()
+    finite = np.where(np.isfinite(time), time, 1.0)
+    assert can_follow(load, motors, finite, slack=1e-9)[np.isfinite(time)].all()
+    possible = np.array([can_follow(load, motors, np.full(N, each)) & holds for each in TIMES])
+    assert not (possible & (TIMES[:, None] < time * (1.0 - 1e-9))).any()
+    begins = (np.diff(possible.astype(int), axis=0) == 1).sum(axis=0)
+    assert joints > 2 or begins.max() > 1  # some of few joints are possible again after a gap between times
+
+
+def test_least_time_may_be_impossible_at_lower_speeds() -> None:
+    """Friction adds to gravity, inertia helps: the least time is possible, and 1.5 times as much, but 1 s is not."""
+    shape = (1, 1, 1)
+    ratings = np.array([[[2.0, 1.0, 0.0, 100.0, 0.0, 0.5, 0.0, 1.0, 1.0]]])
+    motors = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
+    load = motion_load(np.full(shape, 1.9), np.full(shape, -0.03), np.ones(shape), np.zeros(shape), motors)
+    (time,) = least_time(load, motors)
+    times = (0.999 * time, time, 1.5 * time, 1.0)
+    assert [can_follow(load, motors, np.array([each]), 1e-9)[0] for each in times] == [False, True, True, False]
+
+
+def test_least_time_is_found_between_times_that_are_excluded() -> None:
+    """The first joint alone could do it in 1 s; the second excludes all times from 0.14 to 21.8 s."""
+    ratings = np.tile([2.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0], (1, 2, 1)).astype(float)
+    motors = actuation_at_joints(ratings, np.ones((1, 2)), np.zeros(1), np.ones(1))
+    gravity, inertial = np.array([[[0.0, -1.9]]]), np.array([[[0.0, 0.0]]])
+    load = motion_load(gravity, inertial, np.array([[[1.0, 0.0]]]), np.zeros((1, 1, 2)), motors)
+    assert least_time(load, motors) == pytest.approx([1.0])  # by the speed of the first
+    excluded = replace(load, viscous=np.array([[[0.0, -2.2]]]), inertial=np.array([[[0.0, 0.3]]]))
+    (time,) = least_time(excluded, motors)
+    assert time == pytest.approx(2.0 * 0.3 / (2.2 - np.sqrt(2.2**2 - 4.0 * 0.3 * 0.1)))  # 0.3 / T² - 2.2 / T + 0.1 = 0
+    assert can_follow(excluded, motors, np.array([time]), slack=1e-9)[0]
+
+
+def test_arms_that_cannot_hold_themselves_have_no_least_time() -> None:
+    load, motors = random_motions(7)
+    heavy = replace(load, gravity=np.where(np.arange(S)[:, None] == 4, 3.0 * motors.peak[:, None], load.gravity))
+    assert np.isinf(least_time(heavy, motors)).all()
+
+
+def test_stronger_motors_are_not_slower() -> None:
+    load, motors = random_motions(11)
+    time = least_time(load, motors)
+    assert (least_time(load, replace(motors, peak=2.0 * motors.peak)) <= time).all()
+    assert (least_time(load, replace(motors, safety_factor=2.0 * motors.safety_factor)) >= time).all()
+
+
+def test_least_time_of_a_slide_is_that_of_its_motor() -> None:
+    """Torque, speed and inertia at the joint instead of at the motor: the same motion takes the same time."""
+    load, motors = random_motions(13)
+    travel = 0.02
+    joint = actuation_at_joints(
+        np.stack([motors.peak, motors.continuous, motors.corner_speed, motors.no_load_speed, motors.rotor_inertia,
+                  motors.coulomb, motors.viscous, motors.voltage, motors.current], axis=-1),
+        np.full((N, D), travel), motors.price, motors.safety_factor,
+    )  # fmt: skip
+    force = (load.gravity / travel, load.coulomb / travel, load.viscous / travel, load.inertial / travel)
+    assert least_time(MotionLoad(*force, load.velocity * travel), joint) == pytest.approx(least_time(load, motors))
+
+
+def test_fixed_joints_do_not_limit_a_motion() -> None:
+    load, motors = random_motions(17)
+    names = ("peak", "continuous", "corner_speed", "no_load_speed")
+    fixed = replace(motors, **{name: np.where(np.arange(D) == 1, np.inf, getattr(motors, name)) for name in names})
+    still = MotionLoad(*(np.where(np.arange(D) == 1, 0.0, each) for each in vars(load).values()))
+    without = replace(motors, **{name: getattr(motors, name)[:, [0, 2]] for name in names})
+    two = MotionLoad(*(each[:, :, [0, 2]] for each in vars(load).values()))
+    assert np.array_equal(least_time(still, fixed), least_time(two, without))
+    rest = MotionLoad(*(np.zeros_like(each) for each in vars(load).values()))
+    assert not least_time(rest, fixed).any()
+
+
+@pytest.mark.parametrize("name", ["peak", "corner_speed", "no_load_speed", "coulomb", "viscous", "rotor_inertia"])
+def test_unknown_ratings_give_no_number(name: str) -> None:
+    rng = np.random.default_rng(0)
+    motors = drives(3, D, rng)
+    unknown = replace(motors, **{name: np.where(np.arange(D) == 1, np.nan, getattr(motors, name))})
+    assert np.isnan(least_time(loads(unknown, rng), unknown)).all()
+
+
+def test_available_torque_of_servos_and_drives() -> None:
+    """A servo of 4 N m and 5 rad/s, a drive with the corner speed 3 rad/s, and one with a constant torque."""
+    ratings = np.array([[[4.0, 1.0, corner, 5.0, 0.0, 0.0, 0.0, 1.0, 1.0] for corner in (0.0, 3.0, 5.0)]])
+    motors = actuation_at_joints(ratings, np.ones((1, 3)), np.zeros(1), np.array([2.0]))
+    speeds = np.array([0.0, 1.0, 3.0, 4.0, 5.0, 6.0])
+    velocity = np.tile(speeds[None, :, None], (1, 1, 3))
+    pushes = available_torque(np.ones_like(velocity), velocity, motors)[0].T
+    assert pushes[0] == pytest.approx([4.0, 3.2, 1.6, 0.8, 0.0, 0.0])
+    assert pushes[1] == pytest.approx([4.0, 4.0, 4.0, 2.0, 0.0, 0.0])
+    assert pushes[2] == pytest.approx([4.0, 4.0, 4.0, 4.0, 4.0, 0.0])
+    assert (available_torque(-np.ones_like(velocity), velocity, motors) == 4.0).all()
+    assert np.array_equal(available_torque(-np.ones_like(velocity), -velocity, motors)[0].T, pushes)
+
+
+def test_utilisation_is_at_most_1_where_the_torque_is_available() -> None:
+    rng = np.random.default_rng(5)
+    motors = drives(N, D, rng)
+    torque, velocity = rng.normal(size=(2, N, S, D)) * [[[[2.0]]], [[[4.0]]]]
+    available = available_torque(torque, velocity, motors)
+    use = torque_speed_utilisation(torque, velocity, motors)
+    required = motors.safety_factor[:, None, None] * np.abs(torque)
+    assert np.array_equal(use <= 1.0, required <= available)
+    at_rest = torque_speed_utilisation(torque, np.zeros_like(velocity), motors)
+    assert np.array_equal(at_rest, required / motors.peak[:, None])
+
+
+def test_a_limit_is_reached_in_the_least_time() -> None:
+    load, motors = random_motions(19)
+    time = least_time(load, motors)
+    finite = np.flatnonzero(np.isfinite(time))
+    part = [MotionLoad(*(each[i : i + 1] for each in vars(load).values())) for i in finite]
+    for i, one in zip(finite, part, strict=True):
+        velocity = one.velocity / time[i]
+        use = torque_speed_utilisation(one.torque(time[i : i + 1]), velocity, motors[i : i + 1])
+        speed = np.abs(velocity) / motors.no_load_speed[i]
+        assert max(use.max(), speed.max()) == pytest.approx(1.0)
+
+
+# TOPP-RA
+
+
+def quintic(n: int) -> tuple[Array, Array, Array]:
+    """Fraction of the way, its rate and its change at n moments of a motion of one second."""
+    t = np.linspace(0.0, 1.0, n)
+    return (
+        t**3 * (10.0 - 15.0 * t + 6.0 * t**2),
+        30.0 * t**2 * (1.0 - t) ** 2,
+        60.0 * t * (1.0 - t) * (1.0 - 2.0 * t),
+    )
+
+
+def with_constant_limits(arms: ArmArrays) -> Actuation:
+    """The peak torque up to the no-load speed, and no viscous friction, which TOPP-RA does not know."""
+    drives = arms.actuation
+    assert drives is not None
+    return replace(drives, corner_speed=drives.no_load_speed, viscous=np.zeros_like(drives.viscous))
+
+
+def fastest_by_toppra(arms: ArmArrays, motors: Actuation, start: Array, end: Array) -> float:
+    """Time-optimal parametrisation of a straight line in joint space (Pham and Pham 2018)."""
+
+    def inverse(q: Array, velocity: Array, acceleration: Array) -> Array:
+        state = (each[None, None] for each in (q, velocity, acceleration))
+        return inverse_dynamics(arms, *state, np.zeros(1))[0, 0] + motors.rotor_inertia[0] * acceleration
+
+    limit, speed = motors.peak[0] / motors.safety_factor[0], motors.no_load_speed[0]
+    path = toppra.SplineInterpolator([0.0, 1.0], np.stack([start, end]))
+    limits: list[Any] = [
+        constraint.JointVelocityConstraint(np.stack([-speed, speed], axis=1)),
+        constraint.JointTorqueConstraint(inverse, np.stack([-limit, limit], axis=1), motors.coulomb[0]),
+    ]
+    solver = algorithm.TOPPRA(limits, path, gridpoints=np.linspace(0.0, 1.0, 101), solver_wrapper="seidel")
+    trajectory = solver.compute_trajectory(0, 0)
+    assert trajectory is not None
+    return float(trajectory.duration)
+
+
+def test_time_optimal_motion_is_a_lower_bound() -> None:
+    """With constant limits, no profile of time is faster than TOPP-RA's along the same path; the quintic is not far."""
+    space = DesignSpace.model_validate(
+        {"joints": 3, "joint_types": ["P", "Y"], "mass": {"kind": "per_metre", "kg": 0.5}, "link": [0.05, 0.15],
+         "actuators": [catalogue()["XM430-W350"].model_dump(), catalogue()["XM540-W270"].model_dump()]}
+    )  # fmt: skip
+    rng = np.random.default_rng(3)
+    share, rate, change = quintic(201)
+    ratios: list[float] = []
+    for design in space.sample(4, 4):
+        arms = stack_arms([space.arm(design)])
+        motors = with_constant_limits(arms)
+        start, end = rng.uniform(-2.0, 2.0, (2, 3))
+        line = end - start
+        q, velocity, acceleration = (start + share[:, None] * line)[None], rate[:, None] * line, change[:, None] * line
+        none = np.zeros(len(share))
+        gravity = inverse_dynamics(arms, q, np.zeros_like(q), np.zeros_like(q), none)
+        inertial = inverse_dynamics(arms, q, velocity[None], acceleration[None], none, gravity=0.0)
+        load = motion_load(gravity, inertial, velocity[None], acceleration[None], motors)
+        (time,) = least_time(load, motors)
+        bound = fastest_by_toppra(arms, motors, start, end)
+        ratios.append(time / bound)
+    assert min(ratios) >= 1.0
+    assert max(ratios) <= 2.0  # 1.88 if only the speed limits both, 1.2 if only the acceleration does
