@@ -47,6 +47,16 @@ provenance: Measured.
 """
 
 
+BODY_TASK = b"""\
+name: body
+targets: [[0.4, 0.0, 0.1], [0.4, 0.2, 0.1]]
+tool: {tip: [0, 0, 0.1], mass: 0.35, center: [0, 0, 0.05], inertia: [3.0e-4, 3.0e-4, 1.0e-4]}
+payload: {mass: 0.5, center: [0, 0.01, 0.03], size: [0.06, 0.04, 0.06]}
+payload_factors: [0.0, 1.2]
+objectives: [worst_error, peak_torque]
+"""
+
+
 RICH_SPACE = b"""\
 name: rich
 joints: [2, 5]

@@ -3,6 +3,7 @@
 from tests.fuzz.answer_targets import answer_seeds, draft_seeds, run_answer, run_draft
 from tests.fuzz.argument_targets import argument_seeds, run_arguments
 from tests.fuzz.problem_targets import (
+    BODY_TASK,
     RICH_SPACE,
     RICH_TASK,
     actuator_seeds,
@@ -17,8 +18,13 @@ from tests.fuzz.run_targets import a_run, of_run, replay_seeds, run_replay, run_
 from tests.fuzz.target import Target, of_examples, shipped
 from tests.fuzz.text_targets import point_seeds, run_points, run_urdf, run_words, urdf_seeds, word_seeds
 
+
+def task_seeds() -> list[bytes]:
+    return [RICH_TASK, BODY_TASK, *shipped("tasks"), *of_examples("task")]
+
+
 TARGETS: dict[str, Target] = {
-    "task": Target("yaml", lambda: [RICH_TASK, *shipped("tasks"), *of_examples("task")], run_task, heavy=True),
+    "task": Target("yaml", task_seeds, run_task, heavy=True),
     "space": Target("yaml", lambda: [RICH_SPACE, *shipped("spaces"), *of_examples("space")], run_space, heavy=True),
     "actuators": Target("yaml", actuator_seeds, run_space, heavy=True),
     "experiment": Target("yaml", lambda: [*shipped("experiments"), *of_examples("rules")], run_experiment, heavy=True),

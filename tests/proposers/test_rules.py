@@ -200,18 +200,22 @@ def test_shoulder_position_is_locally_optimal() -> None:
     assert np.linalg.norm(targets - median(targets), axis=1).max() == pytest.approx(needed_length(targets))
 
 
+TOOL = {"tip": [0.0, 0.0, 0.1], "mass": 0.005, "center": [0.0, 0.0, 0.05]}
+BODY = {"mass": 0.01, "center": [0.0, 0.0, 0.03]}
+
+
 def stretched(problem: Problem, joints: str, links: list[float]) -> Design:
     return problem.space.clipped((0.0, 0.0, 0.0), joints, links)
 
 
 @pytest.mark.parametrize("joints", ["PRYY", "RPYY", "YPYY", "YRYY"])
-@pytest.mark.parametrize("payload", [0.0, 0.01])
+@pytest.mark.parametrize("carried", [{}, {"payload": 0.01}, {"tool": TOOL, "payload": BODY}], ids=["", "point", "body"])
 @pytest.mark.parametrize("mass", [MassPerMetre(), MassPerLink(kind="per_link", kg=0.002)])
-def test_forecast_of_a_straight_arm_is_its_evaluation(joints: str, payload: float, mass: MassModel) -> None:
+def test_forecast_of_a_straight_arm_is_its_evaluation(joints: str, carried: dict[str, Any], mass: MassModel) -> None:
     """Beyond its reach a pointer is stretched; only the shoulder's first link, of 1 mm, is beside the line."""
     targets = [(0.9, 0.2, 0.3), (0.5, -0.9, 0.5), (-0.6, -0.5, 0.7), (0.4, 0.8, -0.2)]
     space = DesignSpace(link=(0.001, 0.3), mass=mass)
-    problem = Problem(Task(name="test", targets=targets, payload=payload), space)
+    problem = Problem(Task.model_validate({"name": "test", "targets": targets, **carried}), space)
     design = stretched(problem, joints, [0.001, 0.2, 0.1, 0.2])
     found, values = forecast(problem, [design]), problem.evaluate([design]).values[0]
     np.testing.assert_allclose([found.error[0], found.torque[0]], values, rtol=0.03)

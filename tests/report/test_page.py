@@ -150,6 +150,23 @@ def test_page_kinematics_match_the_kernels(run: Path, tab: Tab, history: History
         assert torques == pytest.approx(evaluation.joint_torques[0], abs=1e-5 * np.abs(torques).max())
 
 
+def test_page_kinematics_count_tool_and_payload(tmp_path: Path, tab: Tab) -> None:
+    tool = {"tip": [0.02, -0.03, 0.1], "rpy": [0.4, -0.3, 2.0], "mass": 0.7, "center": [0.03, 0.0, 0.1]}
+    content = {"name": "handling", "targets": [[0.3, 0.1, 0.2], {"position": [0.1, 0.3, 0.3], "axis": [0, 0, -1]}]}
+    content |= {"tool": tool, "payload": {"mass": 0.5, "center": [0.05, 0.0, 0.03], "size": [0.06, 0.04, 0.06]}}
+    problem = aw.Problem(aw.Task.model_validate(content), aw.DesignSpace(mount=("floor", "ceiling", "wall+y")))
+    aw.optimize(problem, proposer="none", n_init=4, n_total=4, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    _, history = aw.read_run(tmp_path / "run")
+    assert tab.faults == []
+    for number in range(len(history)):
+        told, evaluation = tab.ask(f"armwright.postures({number})"), history.evaluation([number])
+        assert [one["error"] for one in told] == pytest.approx(evaluation.position_error[0], abs=1e-5)
+        assert told[1]["angle"] == pytest.approx(evaluation.angle_error[0, 1], abs=1e-4)
+        torques = np.array([one["torques"] for one in told])
+        assert torques == pytest.approx(evaluation.joint_torques[0], abs=1e-5 * np.abs(torques).max())
+
+
 def test_stepper_visits_all_targets(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html", "#design=12&target=9")
     assert tab.text("#target-note").startswith("Target 9 of 9")

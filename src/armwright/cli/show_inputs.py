@@ -12,6 +12,7 @@ from armwright.cli.streams import format_point, plain_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.llm.draft import Draft
 from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
+from armwright.tasks.payload import Payload
 from armwright.tasks.targets import describe_targets
 from armwright.tasks.task import Task as DesignTask
 
@@ -87,12 +88,11 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
         console.print(f"  {line}")
     if task.restarts:
         console.print(f"  {task.restarts + 1} initial postures of the inverse kinematics per target")
-    payloads = ", ".join(f"{kg:g}" for kg in np.atleast_1d(task.payload))
     for name, value in (
         ("objectives", ", ".join(task.objectives or ())),
         ("constraints", ", ".join(task.constraints)),
         ("tool", task.tool.describe()),
-        ("payload [kg]", payloads if task.payloads.any() else ""),
+        ("payload", _describe_payload(task)),
         ("evaluated by the worst case, also", task.cases_description),
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
         ("cycle", task.cycle_description),
@@ -109,6 +109,13 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
             f"  {baseline.method}, {baseline.runs} runs of 200 counted trials: E_hv {baseline.e_hv:.2f} (σ_hv "
             f"{baseline.sigma_hv:.2f}), final {baseline.final:.2f}, {baseline.share:.1%} of the best known"
         )
+
+
+def _describe_payload(task: DesignTask) -> str:
+    """Return the payload on one line; empty if there is none."""
+    if isinstance(task.payload, Payload):
+        return task.payload.describe()
+    return ", ".join(f"{kg:g}" for kg in np.atleast_1d(task.payload)) + " kg" if task.payloads.any() else ""
 
 
 def show_draft(console: Console, draft: Draft) -> None:

@@ -201,9 +201,14 @@ def _history(run: Path, task: Task, space: DesignSpace | None) -> History:
     own = history.problem.task
     if not len(history):
         raise RunFolderError(f"{run} has no finished trial yet, so there is nothing to compare with")
-    if (task.targets, task.tool) != (own.targets, own.tool) or not np.array_equal(task.payloads, own.payloads):
+    if _carried(task) != _carried(own):
         raise TaskError(f"{run} is a run of the task {own.name}, with other targets, another tool or other payloads")
     return history
+
+
+def _carried(task: Task) -> tuple[object, ...]:
+    """Return the targets of a task, and what an arm carries there."""
+    return task.targets, task.tool, task.payloads.tolist(), task.load_shape
 
 
 def _names(arms: Sequence[str | Path | UrdfArm], described: Sequence[UrdfArm]) -> list[str]:

@@ -1,7 +1,7 @@
 """Arms stacked into arrays, the input of the kernels."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
@@ -12,6 +12,7 @@ from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.kinematics.actuation import Actuation, actuation_of
 from armwright.kinematics.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
 from armwright.robot.arm import AXES, Arm, Joint, MountedTool
+from armwright.tasks.payload import POINT_LOAD, LoadShape
 
 MAX_JOINTS = 16
 MAX_ANGLE = 2 * np.pi  # [rad], for which the kernels' sine is made
@@ -23,7 +24,7 @@ TargetKind = Literal["position", "pose"]  # points alone, or some with an axis o
 Floats = NDArray[np.float32] | NDArray[np.float64]  # of an array's precision
 Ints = NDArray[np.int32]
 
-FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side")
+FLOATS = ("base", "lower", "upper", "offset", "com", "mass", "tool_axis", "tool_side", "payload_center")
 ARRAYS = ("motion", *FLOATS)  # fields of `ArmArrays` that the kernels of inverse kinematics read
 
 
@@ -45,6 +46,8 @@ class ArmArrays(PerArm):
     tool: Tools  # included in the last link's `offset`, `com` and `mass`
     tool_axis: Floats  # (N, 3) the tool's own z in the world with all joints at 0, and so in the last local frame
     tool_side: Floats  # (N, 3) likewise the tool's own x
+    payload_center: Floats  # (N, 3) of a payload's mass, from the tip in the last local frame [m]
+    payload_gyration: Array  # (N, 3, 3) inertia of a payload about that centre, per mass, in the same frame [m²]
     n_joints: Ints  # (N,) number of an arm's joints, at most D
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
     length: Array  # (N,) of all links [m]
@@ -142,6 +145,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         tool=tool,
         tool_axis=tool.axis.astype(precision),
         tool_side=tool.side.astype(precision),
+        payload_center=np.zeros((n, 3), dtype=precision),
+        payload_gyration=np.zeros((n, 3, 3)),
         n_joints=n_joints,
         travel=travel,
         length=np.array([arm.length for arm in arms]),
@@ -170,6 +175,17 @@ def add_tools(tools: Tools, last: NDArray[np.integer], offset: Array, com: Array
     if tools.mass.any():
         mass[own], com[own] = joined(mass[own], com[own], tools.mass, offset[own] + tools.com)
     offset[own] += tools.tip
+
+
+def carrying(arms: ArmArrays, shape: LoadShape) -> ArmArrays:
+    """Return arms whose payloads have this shape in their tip frames."""
+    if shape == POINT_LOAD:
+        return arms
+    x, z = arms.tool.side, arms.tool.axis
+    frame = np.stack([x, np.cross(z, x), z], axis=-1)  # (N, 3, 3) of the tip
+    center = (frame @ np.array(shape.center)).astype(arms.precision)
+    gyration = frame @ np.diag(shape.gyration) @ frame.swapaxes(-1, -2)
+    return replace(arms, payload_center=center, payload_gyration=gyration)
 
 
 def round_down(limits: Array, precision: Precision) -> Any:

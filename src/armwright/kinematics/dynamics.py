@@ -18,7 +18,7 @@ def inverse_dynamics(
         q: (N, K, D) joint angles [rad] or displacements [m].
         velocity: (N, K, D) joint velocities [rad/s] or [m/s].
         acceleration: (N, K, D) joint accelerations [rad/s²] or [m/s²].
-        payload: (K,) point mass at the tip [kg].
+        payload: (K,) mass of the payload [kg].
         gravity: Acceleration along -z [m/s²].
 
     Returns:
@@ -51,13 +51,17 @@ def _newton_euler(
         rotation = frames.rotation[:, :, j]
         lever[:, :, j] = _product(rotation, com[:, None, j])
         force[:, :, j] = mass[:, None, j] * (a + _relative(omega, alpha, lever[:, :, j]))
-        local_omega, local_alpha = (_product(rotation.swapaxes(-1, -2), vector) for vector in (omega, alpha))
-        tensor = inertia[:, j]  # symmetric
-        moment[:, :, j] = _product(rotation, local_alpha @ tensor + _cross(local_omega, local_omega @ tensor))
+        moment[:, :, j] = _rotation_moment(rotation, inertia[:, j], omega, alpha)
         before = frames.position[:, :, j]
     after = frames.tip
     total_force = payload[:, None] * (a + _relative(omega, alpha, after - before))  # (N, K, 3)
     total_moment = np.zeros((n, k, 3))  # about the next joint
+    if arms.payload_center.any() or arms.payload_gyration.any():
+        rotation = frames.rotation[:, :, -1]
+        center = _product(rotation, arms.payload_center[:, None].astype(np.float64))  # from the tip [m]
+        total_force = payload[:, None] * (a + _relative(omega, alpha, after - before + center))
+        turning = _rotation_moment(rotation, arms.payload_gyration, omega, alpha)
+        total_moment = _cross(center, total_force) + payload[:, None] * turning
     torques = np.empty((n, k, dof))
     for j in reversed(range(dof)):
         position = frames.position[:, :, j]
@@ -77,6 +81,19 @@ def _newton_euler(
 def _relative(omega: Array, alpha: Array, lever: Array) -> Array:
     """Return the acceleration of a point relative to another one of the same body [m/s²]."""
     return _cross(alpha, lever) + _cross(omega, _cross(omega, lever))
+
+
+def _rotation_moment(rotation: Array, tensor: Array, omega: Array, alpha: Array) -> Array:
+    """Return the (N, K, 3) moments in the world that give bodies their angular acceleration [N m].
+
+    Args:
+        rotation: (N, K, 3, 3) of the bodies.
+        tensor: (N, 3, 3) their inertia in their own frames, symmetric [kg m²].
+        omega: (N, K, 3) angular velocity [rad/s].
+        alpha: (N, K, 3) angular acceleration [rad/s²].
+    """
+    local_omega, local_alpha = (_product(rotation.swapaxes(-1, -2), vector) for vector in (omega, alpha))
+    return _product(rotation, local_alpha @ tensor + _cross(local_omega, local_omega @ tensor))
 
 
 def _product(matrix: Array, vector: Array) -> Array:

@@ -71,7 +71,7 @@ def solve_postures(
         updates: The number of updates.
         initial_q: Joint angles [rad] or displacements [m] that broadcast to (N, T, D), moved into the joint limits;
             None for 0. Fixed joints stay at 0.
-        payload: (T,) point masses at the tip [kg]; None for no payload.
+        payload: (T,) masses of payloads [kg]; None for no payload.
         target_arrays: The axes and orientations of the T targets; None for points alone.
         precision: The precision of the results. Arms in float32 can be solved in float64, not the reverse.
         device: The device to solve on.

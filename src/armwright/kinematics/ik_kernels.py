@@ -374,8 +374,9 @@ def ik_kernels(precision: Precision, lanes: int, motions: Motions, kind: TargetK
         reached[arm, group, 2] = pz
 
         mass_beyond = targets[group, 3]
-        beyond_x = wp.cw_mul(mass_beyond, px)  # its mass times position
-        beyond_y = wp.cw_mul(mass_beyond, py)
+        center = arms.payload_center[arm]
+        beyond_x = wp.cw_mul(mass_beyond, px + (center[0] * xx + center[1] * yx + center[2] * zx))  # mass x position
+        beyond_y = wp.cw_mul(mass_beyond, py + (center[0] * xy + center[1] * yy + center[2] * zy))
         for step in range(arms.dof):
             j = arms.dof - 1 - step
             mass_beyond += Lane(arms.mass[arm, j])

@@ -78,6 +78,7 @@ def ik_math(precision: Precision, lanes: int, motions: Motions) -> IkMath:
         mass: wp.array2d(dtype=real)  # (N, D)
         tool_axis: wp.array(dtype=Vector3)  # (N,)
         tool_side: wp.array(dtype=Vector3)  # (N,)
+        payload_center: wp.array(dtype=Vector3)  # (N,)
 
     @wp.func
     def roots(x: Lane):

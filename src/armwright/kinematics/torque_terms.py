@@ -38,7 +38,7 @@ class TorqueTerms:
 
 
 def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> list[tuple[TorqueTerms, ...]]:
-    """Return, for each group of arms, the terms along each motion; payload: mass at the tip when carried [kg]."""
+    """Return, for each group of arms, the terms along each motion; payload: its mass when carried [kg]."""
     found: list[tuple[TorqueTerms, ...]] = []
     for group in paths.groups:
         q, q_s, q_ss = (np.concatenate([_values(path, order) for path in group.paths], axis=1) for order in range(3))
@@ -72,9 +72,9 @@ def _terms(arms: ArmArrays, q: Array, q_s: Array, q_ss: Array, carried: Array, p
         bodies = kernels.Bodies()
         bodies.dof, bodies.payload_mass = arms.dof, wp.float64(payload)
         values: dict[str, Any] = {name: getattr(part, name).astype(np.float64) for name in ("base", "offset")}
-        values |= {"motion": part.motion, "mass": part.bodies.total_mass, "com": part.bodies.total_com}
-        values |= {"inertia": part.bodies.inertia}
-        values |= {"payload_com": np.zeros((len(part), 3)), "payload_inertia": np.zeros((len(part), 3, 3))}
+        values |= {"motion": part.motion} | vars(part.rigid_bodies)
+        values |= {"payload_com": part.payload_center.astype(np.float64)}
+        values |= {"payload_inertia": payload * part.payload_gyration}
 
         def on_device(array: Array, dtype: Any) -> Any:
             return wp.array(np.ascontiguousarray(array), dtype=dtype, device=device, copy=False)

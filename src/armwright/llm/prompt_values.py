@@ -26,6 +26,8 @@ from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS, MODULES, MOUNT_DESCRIPTIONS
 from armwright.spaces.tolerance import length_columns
+from armwright.tasks.moments import describe_vector
+from armwright.tasks.payload import POINT_LOAD, Payload
 from armwright.tasks.targets import REACHED, describe_targets
 from armwright.tasks.task import Task
 from armwright.tasks.tool import Tool
@@ -83,6 +85,7 @@ VARIABLES = {
     "restricted": "parameters that are fixed or narrower than the space's ranges: name with low and high, or choices",
     "tool": "mass of the tool, as text",
     "payload": "payload of the tip at the targets, as text; empty if there is none",
+    "point_masses": "parts that count as point masses, as text",
     "obstacles": "obstacles, each as text",
     "collisions": "true if contact counts in an objective",
     "target_requirements": "requirements of targets besides their points, such as an axis of the tool, a line each",
@@ -185,6 +188,7 @@ def _task_values(problem: Problem) -> dict[str, Any]:
         "description": one_line(task.description, MAX_DESCRIPTION_LENGTH),
         "tool": _describe_tool(task.tool),
         "payload": _describe_payload(task),
+        "point_masses": "actuators and payload" if task.load_shape == POINT_LOAD else "actuators",
         "obstacles": [obstacle.describe() for obstacle in task.obstacles],
         "collisions": problem.uses(*CLEARANCE_QUANTITIES),
         "oriented": task.target_arrays.oriented,
@@ -217,11 +221,10 @@ def _describe_tool(tool: Tool) -> str:
     """Describe the mass of the tool."""
     if tool.mass == 0.0:
         return "the tip has no mass of its own"
-    centre = ", ".join(f"{value:g}" for value in tool.center)
-    inertia = f" and moments of inertia of ({', '.join(f'{value:g}' for value in tool.inertia)}) kg m² around it"
+    inertia = f" and moments of inertia of {describe_vector(tool.inertia)} kg m² around it"
     return (
-        f"the tool has {tool.mass:g} kg, with its centre of mass at ({centre}) m from the end of the last link in that "
-        f"link's own frame{inertia if any(tool.inertia) else ''}"
+        f"the tool has {tool.mass:g} kg, with its centre of mass at {describe_vector(tool.center)} m from the end of "
+        f"the last link in that link's own frame{inertia if any(tool.inertia) else ''}"
     )
 
 
@@ -230,6 +233,8 @@ def _describe_payload(task: Task) -> str:
     payloads = task.payloads
     if not payloads.any():
         return ""
+    if isinstance(task.payload, Payload):
+        return f"At every target the tip carries a rigid payload: {task.payload.describe()}."
     if np.ptp(payloads) == 0.0:
         return f"At every target the tip carries a payload of {payloads[0]:g} kg, a point mass."
     listed, omission = _sample([f"{payload:g}" for payload in payloads])

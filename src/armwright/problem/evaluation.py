@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
-from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, stack_arms
+from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, carrying, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads, holding_torques
 from armwright.kinematics.cycle_path import CyclePaths, find_paths
@@ -20,6 +20,7 @@ from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
 from armwright.robot.arm import Arm
 from armwright.tasks.motions import CyclePlan
 from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.payload import POINT_LOAD, LoadShape
 from armwright.tasks.targets import TargetArrays, position_targets
 from armwright.tasks.workspace import Region, sample_regions
 
@@ -30,11 +31,12 @@ class Scene:
 
     Attributes:
         targets: (T, 3) positions [m].
-        payload: (T,) carried by the tip at each target [kg].
+        payload: (T,) mass carried by the tip at each target [kg].
         target_arrays: how the targets are to be reached.
         obstacles: what clearances are measured from; the inverse kinematics ignores them.
         plan: the motions of the task's cycle; None if it has none.
         workspace: boxes to cover.
+        load_shape: how the mass of the payload is distributed.
     """
 
     targets: Array
@@ -43,6 +45,7 @@ class Scene:
     obstacles: tuple[Obstacle, ...] = ()
     plan: CyclePlan | None = None
     workspace: tuple[Region, ...] = ()
+    load_shape: LoadShape = POINT_LOAD
 
     def __post_init__(self) -> None:
         """Check that the arrays are finite and belong to the same targets."""
@@ -247,7 +250,7 @@ def evaluate_arrays(
         initial_q: initial joint values [rad] or [m] that broadcast to (N, T, D); None for the straight posture. The
             restarts of the targets begin elsewhere.
     """
-    targets = scene.targets
+    targets, arrays = scene.targets, carrying(arrays, scene.load_shape)
 
     def solve(initial: ArrayLike | None, updates: int = UPDATES) -> Postures:
         return solve_postures(

@@ -219,7 +219,7 @@ class Problem:
         task = self.task
         plans = (task.plan(points) if task.cycle else None for points, _ in task.cases)
         return tuple(
-            Scene(points, payloads, task.target_arrays, task.obstacles, plan, task.workspace)
+            Scene(points, payloads, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
             for (points, payloads), plan in zip(task.cases, plans, strict=True)
         )
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.arm_arrays import PRISMATIC
+from armwright.kinematics.arm_arrays import PRISMATIC, carrying
 from armwright.problem.objectives import TORQUE_SCALE
 from armwright.problem.problem import Problem
 from armwright.robot.arm import GRAVITY
@@ -41,12 +41,12 @@ class Forecast:
 def forecast(problem: Problem, designs: Sequence[Design]) -> Forecast:
     """Forecast position error and torque of designs in the first case of a problem."""
     scene = problem.scenes[0]
-    axis, pivot, length, moment = _stretched(problem, designs)
+    axis, pivot, length, moment, payload_lever = _stretched(problem, designs)
     to_target = scene.targets - pivot[:, None]  # (N, T, 3)
     distance = np.maximum(np.linalg.norm(to_target, axis=-1), SMALL)  # (N, T)
     stretch = np.minimum(distance / np.maximum(length, SMALL)[:, None], 1.0)  # (N, T)
     share = gravity_share(axis[:, None], to_target / distance[..., None])
-    moment = moment[:, None] + scene.payload * length[:, None]  # (N, T) of the stretched, level arm
+    moment = moment[:, None] + scene.payload * payload_lever[:, None]  # (N, T) of the stretched, level arm
     lever = np.sqrt((share * stretch) ** 2 + BULGE * (1.0 - stretch**2))
     error = np.maximum(distance - length[:, None], 0.0) + LEFT
     return Forecast(error.sum(axis=1), TORQUE_SCALE * GRAVITY * (moment * lever).sum(axis=1), length)
@@ -68,8 +68,11 @@ def gravity_share(axis: Array, direction: Array) -> Array:
     return np.hypot((moment * axis).sum(axis=-1), (moment * second).sum(axis=-1))
 
 
-def _stretched(problem: Problem, designs: Sequence[Design]) -> tuple[Array, Array, Array, Array]:
-    """Return first axis (N, 3), pivot (N, 3) [m], length from there (N,) [m] and first moment of mass (N,) [kg m]."""
+def _stretched(problem: Problem, designs: Sequence[Design]) -> tuple[Array, Array, Array, Array, Array]:
+    """Return first axis and pivot (N, 3), and (N,) length from there, first moment of mass and lever of the payload.
+
+    All but the axis are in metres, kilograms and their products.
+    """
     arms = problem.arms(problem.space.matrix(designs))
     rows = np.arange(len(arms))
     ends = arms.base[:, None] + np.cumsum(arms.offset, axis=1)  # (N, D, 3)
@@ -84,7 +87,9 @@ def _stretched(problem: Problem, designs: Sequence[Design]) -> tuple[Array, Arra
     carried = np.where(np.arange(arms.dof) >= first[:, None], arms.mass, 0.0)  # (N, D)
     lever = np.einsum("njk,nk->nj", places[:, :-1] + arms.com - pivot[:, None], up)
     length = np.linalg.norm(places[:, -1] - pivot, axis=1)
-    return axes[rows, turns.argmax(axis=1)], pivot, length, (carried * lever).sum(axis=1)
+    moment = (carried * lever).sum(axis=1)
+    payload_lever = length + np.einsum("nk,nk->n", carrying(arms, problem.task.load_shape).payload_center, up)
+    return axes[rows, turns.argmax(axis=1)], pivot, length, moment, payload_lever
 
 
 def gains(front: Array, values: Array, reference_point: Sequence[float]) -> Array:

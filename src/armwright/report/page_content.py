@@ -179,6 +179,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         ),
         "com": evaluation.arms.com,
         "mass": evaluation.arms.mass,
+        "payload_center": evaluation.arms.payload_center,
         **_arm_arrays(arms, evaluation.arms.dof),
     }
 

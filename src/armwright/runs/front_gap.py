@@ -21,6 +21,7 @@ from armwright.spaces.design_space import paper_space
 from armwright.spaces.parameters import Design, FloatParameter
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
+from armwright.tasks.tool import NO_TOOL
 
 MIN_GAIN = 5e-4  # of the best known hypervolume; any other front fills the gaps of a finite one by less
 
@@ -58,6 +59,7 @@ def known_front(problem: Problem) -> KnownFront | None:
         and not problem.tolerance
         and problem.objectives == PAPER_OBJECTIVES
         and not problem.task.payloads.any()
+        and problem.task.tool == NO_TOOL
         and not problem.constraints
         and problem.task.is_plain
     )

@@ -95,6 +95,8 @@ def stack_designs(
         tool=tools,
         tool_axis=tools.axis.astype(precision),
         tool_side=tools.side.astype(precision),
+        payload_center=np.zeros((columns.n, 3), dtype=precision),
+        payload_gyration=np.zeros((columns.n, 3, 3)),
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(columns.links, axis=1)[:, -1],

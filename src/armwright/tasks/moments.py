@@ -1,4 +1,4 @@
-"""Masses and principal moments of inertia of rigid bodies in task files."""
+"""Masses and moments of inertia of rigid bodies in task files."""
 
 from typing import Annotated
 
@@ -18,3 +18,8 @@ def check_moments(moments: Moments) -> None:
         raise ValueError(
             f"inertia = {list(moments)} kg m²: no body has these moments; each is at most the sum of the other two"
         )
+
+
+def describe_vector(values: tuple[float, float, float]) -> str:
+    """Return three numbers in brackets."""
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

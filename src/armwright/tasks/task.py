@@ -20,8 +20,10 @@ from pydantic import (
 from armwright.arrays import Array
 from armwright.files import check_name
 from armwright.tasks.cycle import IN_ORDER, Cycle, read_cycle, target_indices
+from armwright.tasks.moments import MAX_MASS
 from armwright.tasks.motions import CyclePlan, along_line, plan_cycle
 from armwright.tasks.obstacles import MAX_OBSTACLES, Obstacle, read_obstacle
+from armwright.tasks.payload import POINT_LOAD, LoadShape, Payload, read_payload
 from armwright.tasks.targets import (
     MAX_COORDINATE,
     Point,
@@ -34,7 +36,6 @@ from armwright.tasks.tool import NO_TOOL, Tool, read_tool
 from armwright.tasks.workspace import MAX_POINTS, MAX_REGIONS, Region
 from armwright.yaml_documents import check_document
 
-MAX_PAYLOAD = 1e4  # [kg]
 MAX_PAYLOAD_FACTOR = 100.0
 MAX_NOISE = 1.0  # [m]
 MAX_TARGETS = 10_000
@@ -57,7 +58,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     Attributes:
         targets: Points [m]. Tool directions, tolerances and weights of targets are in `target_arrays`.
         tool: The tool at the end of the last link.
-        payload: Mass that the tip carries, at all targets or at each [kg].
+        payload: Mass that the tip carries, a point at all targets or at each [kg]; or a rigid body.
         payload_factors: Factors by which the payload may be heavier; each objective takes its worst case.
         target_noise: Distance by which all targets may be off along x, y or z [m]; likewise.
         restarts: Further starts of the inverse kinematics at each target, of which the best posture counts.
@@ -72,7 +73,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # also names run folders
     targets: tuple[Point, ...] = Field(max_length=MAX_TARGETS)
     tool: Tool = NO_TOOL
-    payload: float | tuple[float, ...] = 0.0
+    payload: float | tuple[float, ...] | Payload = 0.0
     payload_factors: tuple[Annotated[float, Field(ge=0.0, le=MAX_PAYLOAD_FACTOR)], ...] = Field(
         default=(), max_length=10
     )
@@ -147,10 +148,12 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_tool(cls, content: Any) -> Any:
-        if not isinstance(content, dict) or isinstance(cast("Any", content).get("tool", NO_TOOL), Tool):
-            return cast("Any", content)
-        return {**cast("dict[str, Any]", content), "tool": read_tool(content["tool"])}
+    def _read_bodies(cls, content: Any) -> Any:
+        if not isinstance(content, dict):
+            return content
+        given = cast("dict[str, Any]", content)
+        readers = {"tool": read_tool, "payload": read_payload}
+        return {**given, **{key: read(given[key]) for key, read in readers.items() if key in given}}
 
     @field_validator("cycle", mode="before")
     @classmethod
@@ -169,11 +172,10 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
                     f"target {number} = {list(point)} m is more than {MAX_COORDINATE:g} m away; "
                     "coordinates are in metres (armwright init --from FILE --unit mm converts)"
                 )
-        payloads = self.payload if isinstance(self.payload, tuple) else (self.payload,)
         if isinstance(self.payload, tuple) and len(self.payload) != len(self.targets):
             raise ValueError(f"payload: expected 1 or {len(self.targets)} values [kg], got {len(self.payload)}")
-        if not all(0.0 <= kg <= MAX_PAYLOAD for kg in payloads):
-            raise ValueError(f"payload: expected 0 to {MAX_PAYLOAD:g} kg, got {self.payload} kg")
+        if not np.all((self.payloads >= 0.0) & (self.payloads <= MAX_MASS)):
+            raise ValueError(f"payload: expected 0 to {MAX_MASS:g} kg, got {self.payload} kg")
         if self.cycle is not None and isinstance(self.payload, tuple):
             raise ValueError("payload: expected one value, since the cycle picks and places it; got a list")
         if sum(region.points for region in self.workspace) > MAX_POINTS:
@@ -226,7 +228,13 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @property
     def payloads(self) -> np.ndarray:
         """Mass that the tip carries at each target, (T,) [kg]."""
-        return np.broadcast_to(np.array(self.payload, dtype=np.float64), (len(self.targets),)).copy()
+        masses = self.payload.mass if isinstance(self.payload, Payload) else self.payload
+        return np.broadcast_to(np.array(masses, dtype=np.float64), (len(self.targets),)).copy()
+
+    @property
+    def load_shape(self) -> LoadShape:
+        """How the mass of the payload is distributed."""
+        return self.payload.shape if isinstance(self.payload, Payload) else POINT_LOAD
 
     @property
     def target_names(self) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Self, cast
 
 from pydantic import BaseModel, Field, model_validator
 
-from armwright.tasks.moments import MAX_MASS, Moments, check_moments
+from armwright.tasks.moments import MAX_MASS, Moments, check_moments, describe_vector
 from armwright.tasks.targets import Position
 from armwright.yaml_documents import check_document
 
@@ -44,10 +44,10 @@ class Tool(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     def describe(self) -> str:
         """Return the tool on one line; empty without a tool."""
-        parts = [f"tip at {_vector(self.tip)} m"] if any(self.tip) else []
-        parts += [f"rpy {_vector(self.rpy)} rad"] if any(self.rpy) else []
-        parts += [f"{self.mass:g} kg at {_vector(self.center)} m"] if self.mass else []
-        parts += [f"inertia {_vector(self.inertia)} kg m²"] if any(self.inertia) else []
+        parts = [f"tip at {describe_vector(self.tip)} m"] if any(self.tip) else []
+        parts += [f"rpy {describe_vector(self.rpy)} rad"] if any(self.rpy) else []
+        parts += [f"{self.mass:g} kg at {describe_vector(self.center)} m"] if self.mass else []
+        parts += [f"inertia {describe_vector(self.inertia)} kg m²"] if any(self.inertia) else []
         return ", ".join(parts)
 
 
@@ -55,11 +55,9 @@ NO_TOOL = Tool()
 
 
 def read_tool(value: Any) -> Tool:
-    """Return the tool of a record in a task file; raise ValueError if it is not one."""
+    """Return the tool of a record in a task file; raise ValueError for anything else."""
+    if isinstance(value, Tool):
+        return value
     if not isinstance(value, dict):
         raise ValueError(f"tool: expected a record such as {{tip: [0, 0, 0.1], mass: 0.35}}, got {value!r:.80}")
     return check_document(cast("dict[Any, Any]", value), Tool, ValueError, "tool")
-
-
-def _vector(values: tuple[float, float, float]) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

@@ -107,7 +107,7 @@ export class Content {
 
   arm(i) {
     const arm = {}, n = this._part("joints", i)[0];
-    for (const name of ["base", "up", "tip", "tool_axis", "tool_side"]) arm[name] = this._part(name, i);
+    for (const name of ["base", "up", "tip", "tool_axis", "tool_side", "payload_center"]) arm[name] = this._part(name, i);
     for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
     for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
     return arm;

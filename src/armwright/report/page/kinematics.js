@@ -23,7 +23,7 @@ function rotated(m, k, angle) {
 }
 
 // joints: positions of the joints and, last, of the tip [m]; ends: of the links; axes: of the joints, in the world;
-// centres: of mass; tool: its own x, y and z in the world.
+// centres: of mass; payload: its centre of mass; tool: its own x, y and z in the world.
 export function chain(arm, q) {
   let frame = [1, 0, 0, 0, 1, 0, 0, 0, 1], place = Array.from(arm.base);
   const joints = [], ends = [], axes = [], centres = [];
@@ -38,13 +38,14 @@ export function chain(arm, q) {
     ends.push(place);
   }
   const [x, z] = [turned(frame, arm.tool_side), turned(frame, arm.tool_axis)];
-  return { joints: [...joints, add(place, turned(frame, arm.tip))], ends, axes, centres, tool: [x, cross(z, x), z] };
+  const tip = add(place, turned(frame, arm.tip)), payload = add(tip, turned(frame, arm.payload_center));
+  return { joints: [...joints, tip], ends, axes, centres, payload, tool: [x, cross(z, x), z] };
 }
 
 // Returns the joint torques [N m] that hold the arm and its payload [kg] against gravity.
 export function holding(arm, posed, payload) {
-  const { joints, axes } = posed, tip = joints.at(-1);
-  const loads = [...posed.centres.map((place, k) => [arm.mass[k], place]), [payload, tip]];
+  const { joints, axes } = posed;
+  const loads = [...posed.centres.map((place, k) => [arm.mass[k], place]), [payload, posed.payload]];
   return axes.map((a, i) => {
     if (arm.kind[i] > PRISMATIC) return 0;
     let sum = 0;
