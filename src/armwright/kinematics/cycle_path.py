@@ -200,7 +200,10 @@ def _choose(
     arm, block = np.arange(len(arms))[:, None], np.arange(len(plan.blocks))
     steps = np.abs(np.diff(chosen, axis=1)) / np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
     steps[:, samples.first[1:-1] - 1] = 0.0  # from one block to the next
-    ratio = steps.max(axis=(1, 2), initial=0.0)
+    joint_motion = np.arange(len(plan.joint_motions))
+    turn = change[arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)]]
+    turn = turn / JOINT_STEPS / np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
+    ratio = np.maximum(steps.max(axis=(1, 2), initial=0.0), turn.max(axis=(1, 2), initial=0.0))
     hopeless = blocks[arm, block, choice].max(axis=1) > HOPELESS * BLOCKED
     return starts[arm, block, choice], ratio, hopeless
 
