@@ -4,22 +4,50 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, cast
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
 
 from armwright.exceptions import did_you_mean
 
 By = Literal["line", "joint"]
 Action = Literal["pick", "place"]
-Duration = Literal["fastest"] | Annotated[float, Field(gt=0.0, le=1e4)]  # [s]
 
 IN_ORDER = "in_order"  # a line to each target in turn
 FASTEST = "fastest"
 MAX_STEPS = 1000
+MAX_DURATION = 1e4  # [s]
 _BY: Mapping[By, str] = {"line": "a line", "joint": "a joint motion"}
+
+
+def _check_duration(value: Any) -> Any:
+    is_time = isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 < value <= MAX_DURATION
+    if value != FASTEST and not is_time:
+        raise ValueError(f"expected seconds above 0, or {FASTEST}, got {value!r:.80}")
+    return value
+
+
+def _check_reference(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (int, str)):
+        raise ValueError(f"expected the name of a target or its number, from 1, got {value!r:.80}")
+    return value
+
+
+Duration = Annotated[
+    Literal["fastest"] | Annotated[float, Field(gt=0.0, le=MAX_DURATION)], BeforeValidator(_check_duration)
+]  # [s]
+Reference = Annotated[str | int, BeforeValidator(_check_reference)]
 
 
 class Strict(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """A record of a task file."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_keys(cls, content: Any) -> Any:
+        for key in cast("dict[Any, Any]", content) if isinstance(content, dict) else ():
+            if key not in cls.model_fields:
+                allowed = ", ".join(cls.model_fields)
+                raise ValueError(f'unknown key "{key}". Allowed: {allowed}.{did_you_mean(str(key), cls.model_fields)}')
+        return content
 
 
 class Step(Strict, frozen=True):
@@ -32,7 +60,7 @@ class Step(Strict, frozen=True):
         time: Duration from the previous target to this one [s], or fastest; by default the cycle's.
     """
 
-    to: str | Annotated[int, Field(strict=True)]
+    to: Reference
     by: By = "joint"
     do: Action | None = None
     time: Duration | None = None
@@ -68,7 +96,7 @@ class Cycle(Strict, frozen=True):
     steps: tuple[Step, ...] = Field(max_length=MAX_STEPS)
     closed: bool = True
     time: Duration = FASTEST
-    dwell: float = Field(default=0.0, ge=0.0, le=1e4)
+    dwell: float = Field(default=0.0, ge=0.0, le=MAX_DURATION)
     approach: float | None = Field(default=None, gt=0.0, le=1000.0)
     tolerance: PathTolerance = PathTolerance()
 

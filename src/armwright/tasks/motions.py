@@ -202,6 +202,9 @@ def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: T
         arrays: How the targets are to be reached.
     """
     poses = Poses(positions, arrays.rotation, arrays.n_angular, arrays.tolerance, arrays.angle_tolerance)
+    for number, (target, step) in enumerate(zip(targets, cycle.steps, strict=True), start=1):
+        if step.do and cycle.approach and arrays.n_angular[target] == 0:
+            raise ValueError(f"step {number}: approach needs a target with an axis or an orientation")
     approached = sorted({t for t, step in zip(targets, cycle.steps, strict=True) if step.do and cycle.approach})
     before = poses[approached]
     if approached:
@@ -296,7 +299,7 @@ def _check_lines(plan: CyclePlan) -> None:
         number, start, end = motion.step + 1, motion.start, motion.end
         shift = float(np.linalg.norm(poses.position[end] - poses.position[start]))
         turn = _turn(poses, start, end)[1]
-        if shift == 0.0 and turn == 0.0:
+        if shift == 0.0 and turn == 0.0 and poses.n_angular[end] <= poses.n_angular[start]:
             raise ValueError(f"step {number}: the tool is already there; leave the step out")
         if motion.by == "joint":
             continue

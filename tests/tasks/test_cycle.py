@@ -1,0 +1,378 @@
+"""Cycles of tasks: their syntax, their errors, and the motions that they stand for."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation, Slerp
+
+from armwright.exceptions import TaskError
+from armwright.rotations import rotation_from_rpy
+from armwright.tasks.cycle import PathTolerance
+from armwright.tasks.motions import Block, CyclePlan, Motion, along_line
+from armwright.tasks.targets import AXIS, ORIENTATION
+from armwright.tasks.task import Task
+from armwright.yaml_documents import check_document, dump_document, parse_document
+
+# The example of issue 19, which scripts rely on.
+EXAMPLE = """
+name: desk
+targets:                                   # names are optional; targets are referred to by name, or by number from 1
+  - {name: bin,  position: [0.15, 0.0, 0.02], axis: [0, 0, -1]}
+  - {name: tray, position: [0.20, 0.25, 0.10], axis: [0, 0, -1], tolerance: 0.002}
+tool:    {tip: [0, 0, 0.10], mass: 0.35, center: [0, 0, 0.05], inertia: [3e-4, 3e-4, 1e-4]}   # rpy optional
+cycle:
+  closed: true                             # default: the last step returns to the first entry
+  time: fastest                            # or seconds; default of every step
+  dwell: 0.2                               # s at rest after each pick and place
+  approach: 0.08                           # optional: every pick and place becomes joint motion to 0.08 m before it
+  tolerance: {path: 0.002, angle: 0.02}    # m, rad, along lines
+  steps: [{to: bin, by: joint, do: pick}, {to: tray, by: joint, do: place, time: 1.2}]        # by: line | joint
+"""
+DOWN = [0, 0, -1]
+POINTS = [[0.3, 0.0, 0.1], [0.3, 0.2, 0.1], [0.1, 0.3, 0.3]]
+NAMED = [
+    {"name": "bin", "position": POINTS[0], "axis": DOWN},
+    {"name": "tray", "position": POINTS[1], "axis": DOWN},
+    {"position": POINTS[2], "axis": [1, 0, 0]},
+]
+
+
+def task(cycle: Any, targets: Sequence[Any] = NAMED, **more: Any) -> Task:
+    return check_document({"name": "cell", "targets": list(targets), "cycle": cycle, **more}, Task, TaskError, "cell")
+
+
+def plan(cycle: Any, targets: Sequence[Any] = NAMED, **more: Any) -> CyclePlan:
+    read = task(cycle, targets, **more)
+    return read.plan(read.target_positions)
+
+
+def steps(*entries: Any, **more: Any) -> dict[str, Any]:
+    """A cycle through these targets, or steps."""
+    return {**more, "steps": [entry if isinstance(entry, dict) else {"to": entry} for entry in entries]}
+
+
+# Syntax
+
+
+def test_example_of_the_issue_is_read_to_the_letter() -> None:
+    read = parse_document(EXAMPLE, Task, TaskError, "desk.yaml")
+    cycle = read.cycle
+    assert cycle is not None
+    assert (cycle.closed, cycle.time, cycle.dwell, cycle.approach) == (True, "fastest", 0.2, 0.08)
+    assert cycle.tolerance == PathTolerance(path=0.002, angle=0.02)
+    assert [(step.to, step.by, step.do, step.time) for step in cycle.steps] == [
+        ("bin", "joint", "pick", None),
+        ("tray", "joint", "place", 1.2),
+    ]
+    assert cycle.durations() == (None, 1.2)
+    assert read.target_names == ("bin", "tray")
+    assert read.target_arrays.tolerance.tolist() == [0.001, 0.002]
+
+
+def test_defaults_of_a_cycle() -> None:
+    cycle = task(steps(1, 2)).cycle
+    assert cycle is not None
+    assert (cycle.closed, cycle.time, cycle.dwell, cycle.approach) == (True, "fastest", 0.0, None)
+    assert cycle.tolerance == PathTolerance(path=0.002, angle=0.02)
+    assert {(step.by, step.do, step.time) for step in cycle.steps} == {("joint", None, None)}
+    assert task(None).cycle is None
+    assert task(None).cycle_description == ""
+
+
+def test_in_order_is_an_open_cycle_of_lines_to_each_target() -> None:
+    short = task("in_order", POINTS)
+    assert short.cycle == task(steps(*({"to": n, "by": "line"} for n in (1, 2, 3)), closed=False), POINTS).cycle
+    motions = short.plan(short.target_positions).motions
+    assert [(m.by, m.start, m.end, m.carries) for m in motions] == [("line", 0, 1, True), ("line", 1, 2, True)]
+
+
+def test_targets_are_named_or_numbered_from_one() -> None:
+    assert plan(steps("tray", 3, "bin")).targets == plan(steps(2, 3, 1)).targets == (1, 2, 0)
+    with_points = plan(steps("tray", 1), [POINTS[0], {"name": "tray", "position": POINTS[1]}])
+    assert with_points.targets == (1, 0)
+
+
+@pytest.mark.parametrize("target", [NAMED[0], {"name": "gate", "position": POINTS[0]}])
+def test_cycle_round_trips_through_values_and_yaml(target: Any) -> None:
+    last = {"to": 3, "by": "line"}
+    entries = ({"to": target["name"], "do": "pick"}, {"to": 2, "do": "place", "time": 1.5}, last)
+    more = {"dwell": 0.3, "time": 2.0, "tolerance": {"path": 0.001}}
+    read = task(steps(*entries, **more), [target, *NAMED[1:]])
+    assert Task.model_validate(read.model_dump()) == read
+    assert Task.model_validate_json(read.model_dump_json()) == read
+    again = parse_document(dump_document(read.model_dump(mode="json")), Task, TaskError, "again.yaml")
+    assert again == read
+    assert again.plan(again.target_positions).motions == read.plan(read.target_positions).motions
+    assert again.target_names == read.target_names
+
+
+def test_durations_of_steps_come_first() -> None:
+    cycle = task(steps(1, {"to": 2, "time": 0.5}, {"to": 3, "time": "fastest"}, time=2.0)).cycle
+    assert cycle is not None
+    assert cycle.durations() == (2.0, 0.5, None)
+    assert cycle.describe_times() == "0.5 s, as fast as possible, 2 s"
+
+
+def test_cycle_is_described_on_one_line() -> None:
+    cycle = steps({"to": "bin", "do": "pick"}, {"to": "tray", "do": "place", "by": "line"}, 3, approach=0.05)
+    assert task(cycle).cycle_description == (
+        "bin (pick), by a line to tray (place), by a joint motion to 3, by a joint motion back to bin; "
+        "lines of 50 mm before and after pick and place"
+    )
+
+
+# Payload
+
+
+@pytest.mark.parametrize(
+    ("actions", "closed", "carried"),
+    [
+        (("pick", "place", None), True, (False, True, False)),
+        (("place", None, "pick"), True, (True, False, False)),
+        (("pick", None, "place"), False, (False, True, True)),
+        ((None, "pick", None), False, (False, False, True)),
+        ((None, None, None), True, (True, True, True)),
+        ((None, None, None), False, (True, True, True)),
+    ],
+)
+def test_payload_is_carried_between_pick_and_place(actions: Any, closed: bool, carried: Any) -> None:
+    cycle = task(steps(*({"to": n, "do": do} for n, do in enumerate(actions, start=1)), closed=closed)).cycle
+    assert cycle is not None
+    assert cycle.carried() == carried
+
+
+# Errors
+
+
+@pytest.mark.parametrize(
+    ("cycle", "message"),
+    [
+        (steps(1, {"to": 2, "do": "place"}, closed=False), "cycle: step 2: place without a pick before it"),
+        (steps({"to": 1, "do": "place"}, 2), "cycle: step 1: place without a pick before it"),
+        (
+            steps({"to": 1, "do": "pick"}, {"to": 2, "do": "place"}, {"to": 3, "do": "place"}),
+            "cycle: step 3: place without a pick before it",
+        ),
+        (
+            steps({"to": 1, "do": "pick"}, {"to": 2, "do": "pick"}, closed=False),
+            "cycle: step 2: pick without a place before it",
+        ),
+        (steps("bin", "tary"), 'step 2: unknown target "tary". Did you mean "tray"? Names: bin, tray'),
+        (steps(1, 4), "step 2: there is no target 4; targets are counted from 1 to 3"),
+        (steps(0, 1), "step 1: there is no target 0; targets are counted from 1 to 3"),
+        (steps(1, 2, 2), "step 3: the tool is already there; leave the step out"),
+        (steps(1, 2, 1), "step 1: the tool is already there; leave the step out"),
+        (steps(1), "cycle.steps: a cycle needs at least two steps, got 1"),
+        (steps(), "cycle.steps: a cycle needs at least two steps, got 0"),
+        ("in-order", "cycle: expected in_order or a record with steps"),
+        (steps(1, 2, approch=0.1), 'cycle: unknown key "approch". Allowed: steps, closed, time, dwell, approach, '),
+        (steps({"to": 1, "doo": "pick"}, 2), 'unknown key "doo". Allowed: to, by, do, time. Did you mean "do"?'),
+        (steps(1, 2, tolerance={"angel": 1}), 'unknown key "angel". Allowed: path, angle. Did you mean "angle"?'),
+        (steps(1, 2, time="quick"), "cycle.time: expected seconds above 0, or fastest"),
+        (steps(1, {"to": 2, "time": 0}), "cycle.steps[1].time: expected seconds above 0, or fastest"),
+        (steps(1, {"to": 2.0}), "cycle.steps[1].to: expected the name of a target or its number, from 1"),
+        (steps(1, {"to": True}), "cycle.steps[1].to: expected the name of a target or its number, from 1"),
+        (steps(1, {"to": 2, "by": "arc"}), "cycle.steps[1].by: Input should be 'line' or 'joint' (got arc)"),
+        (steps(1, 2, approach=0), "cycle.approach: Input should be greater than 0"),
+        (steps(1, 2, dwell=-1), "cycle.dwell: Input should be greater than or equal to 0"),
+    ],
+)
+def test_mistaken_cycles_get_one_clear_line(cycle: Any, message: str) -> None:
+    with pytest.raises(TaskError) as error:
+        task(cycle)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+TWO = steps(1, {"to": 2, "by": "line"}, closed=False)
+
+
+@pytest.mark.parametrize(
+    ("targets", "cycle", "more", "message"),
+    [
+        (
+            [{"position": POINTS[0], "axis": DOWN}, {"position": POINTS[1], "axis": [0, 0, 1]}],
+            TWO,
+            {},
+            "step 2: the tool points the opposite way at the end of the line",
+        ),
+        (
+            [{"position": POINTS[0], "orientation": [0, 0, 0]}, {"position": POINTS[1], "orientation": [np.pi, 0, 0]}],
+            TWO,
+            {},
+            "step 2: the tool points the opposite way at the end of the line",
+        ),
+        (
+            [{"position": POINTS[0], "axis": DOWN}, POINTS[1]],
+            TWO,
+            {},
+            "step 2: a line needs the same kind of direction at both ends (none, axis or orientation); try by: joint",
+        ),
+        (
+            [{"position": POINTS[0], "axis": DOWN}, {"position": POINTS[1], "orientation": [0, 0, 0]}],
+            TWO,
+            {},
+            "step 2: a line needs the same kind of direction",
+        ),
+        (
+            POINTS,
+            TWO,
+            {"obstacles": [{"kind": "box", "name": "post", "center": [0.3, 0.1, 0.1], "size": [0.05, 0.05, 0.4]}]},
+            'step 2: the line goes through obstacle "post" at [0.3, 0.076, 0.1] m; add a target on the way around it',
+        ),
+        (
+            POINTS,
+            TWO,
+            {"obstacles": [{"kind": "ground"}, {"kind": "sphere", "center": [0.3, 0.1, 0.1], "radius": 0.02}]},
+            "step 2: the line goes through obstacle 2 at ",
+        ),
+        (
+            [{"name": "bin", "position": POINTS[0]}, {"name": "bin", "position": POINTS[1]}],
+            TWO,
+            {},
+            'targets: two are named "bin"; give each its own name',
+        ),
+        (POINTS[:2], TWO, {"payload": [0.1, 0.2]}, "payload: expected one value, since the cycle picks and places it"),
+        (POINTS, steps("bin", 2), {}, 'step 1: unknown target "bin". The targets have no names; use their numbers'),
+        (
+            POINTS,
+            steps({"to": 1, "do": "pick"}, {"to": 2, "do": "place"}, approach=0.05),
+            {},
+            "step 1: approach needs a target with an axis or an orientation",
+        ),
+    ],
+)
+def test_cycles_that_no_arm_can_follow_are_refused(targets: Any, cycle: Any, more: Any, message: str) -> None:
+    with pytest.raises(TaskError) as error:
+        task(cycle, targets, **more)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_joint_motions_may_turn_the_tool_around_and_pass_over_obstacles() -> None:
+    targets = [{"position": POINTS[0], "axis": DOWN}, {"position": POINTS[1], "axis": [0, 0, 1]}, POINTS[2]]
+    post = {"kind": "box", "center": [0.3, 0.1, 0.1], "size": [0.05, 0.05, 0.4]}
+    assert [motion.by for motion in plan(steps(1, 2, 3), targets, obstacles=[post]).motions] == ["joint"] * 3
+
+
+def test_a_direction_may_be_added_at_the_same_place() -> None:
+    targets = [POINTS[0], {"position": POINTS[0], "axis": DOWN}]
+    assert len(plan(steps(1, 2, closed=False), targets).motions) == 1
+    with pytest.raises(TaskError, match="step 1: the tool is already there"):
+        plan(steps(1, 2), targets)
+
+
+# Motions
+
+
+def test_motions_of_a_cycle_with_approach() -> None:
+    """By hand: out of the bin, over to the tray, in; out of the tray, back over the bin, in."""
+    found = plan(steps({"to": "bin", "do": "pick"}, {"to": "tray", "do": "place"}, approach=0.08))
+    bin_, tray, over_bin, over_tray = 0, 1, 3, 4
+    assert found.motions == (
+        Motion(1, "line", bin_, over_bin, carries=True, arrives=False),
+        Motion(1, "joint", over_bin, over_tray, carries=True, arrives=False),
+        Motion(1, "line", over_tray, tray, carries=True, arrives=True),
+        Motion(0, "line", tray, over_tray, carries=False, arrives=False),
+        Motion(0, "joint", over_tray, over_bin, carries=False, arrives=False),
+        Motion(0, "line", over_bin, bin_, carries=False, arrives=True),
+    )
+    assert found.blocks == (Block(over_tray, (2, 3)), Block(over_bin, (5, 0)))
+    assert found.joint_motions == (4, 1)
+    above = np.array([POINTS[0], POINTS[1]]) + np.array([0.0, 0.0, 0.08])
+    assert found.poses.position[[over_bin, over_tray]] == pytest.approx(above)
+    samples = found.sample()
+    assert samples.first.tolist() == [0, 9, 18]
+    assert samples.of_motion == ((13, 17), (0, 0), (0, 4), (4, 8), (0, 0), (9, 13))
+    # The tool goes in within the tolerance of the path, and has to be within the target's own at its end.
+    assert samples.poses.tolerance[:5].tolist() == [0.002, 0.002, 0.002, 0.002, 0.001]
+
+
+def test_motions_of_an_open_cycle() -> None:
+    """By hand: a line, a joint motion, a line; only the step that picks has an approach."""
+    found = plan(steps(1, {"to": 2, "by": "line"}, {"to": 3, "do": "pick"}, 1, closed=False, approach=0.1))
+    assert found.motions == (
+        Motion(1, "line", 0, 1, carries=False, arrives=True),
+        Motion(2, "joint", 1, 3, carries=False, arrives=False),
+        Motion(2, "line", 3, 2, carries=False, arrives=True),
+        Motion(3, "line", 2, 3, carries=True, arrives=False),
+        Motion(3, "joint", 3, 0, carries=True, arrives=True),
+    )
+    assert found.blocks == (Block(0, (0,)), Block(3, (2, 3)), Block(0, ()))
+    assert found.joint_motions == (1, 4)
+    assert not found.is_loop
+    assert found.poses.position[3] == pytest.approx([0.0, 0.3, 0.3])  # 0.1 m before it along [1, 0, 0]
+
+
+def test_closed_cycle_of_lines_is_a_loop() -> None:
+    lines = [{"to": n, "by": "line"} for n in (1, 2, 3)]
+    loop = plan(steps(*lines), POINTS)
+    assert loop.is_loop
+    assert loop.blocks == (Block(0, (0, 1, 2)),)
+    assert not plan(steps(*lines, closed=False), POINTS).is_loop
+
+
+@pytest.mark.parametrize("cycle", [steps(1, 2, 3), steps(1, {"to": 2, "by": "line"}, 3), "in_order"])
+def test_blocks_hold_each_line_once_and_start_where_joint_motions_end(cycle: Any) -> None:
+    found = plan(cycle, POINTS)
+    lines = [index for block in found.blocks for index in block.lines]
+    assert sorted([*lines, *found.joint_motions]) == list(range(len(found.motions)))
+    for block, joint in zip(found.blocks, found.joint_motions, strict=False):
+        end = found.motions[block.lines[-1]].end if block.lines else block.entry
+        assert found.motions[joint].start == end
+    for number, joint in enumerate(found.joint_motions, start=1):
+        assert found.motions[joint].end == found.blocks[number % len(found.blocks)].entry
+
+
+def rotations(n: int, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (n, 3))
+
+
+def test_orientation_along_a_line_equals_slerp_of_scipy() -> None:
+    share = np.linspace(0.0, 1.0, 21)
+    for first, last in rotations(40, 1).reshape(20, 2, 3):
+        targets = [
+            {"position": p, "orientation": rpy.tolist()} for p, rpy in zip(POINTS[:2], (first, last), strict=True)
+        ]
+        found = plan("in_order", targets)
+        poses = along_line(found.poses, 0, 1, share)
+        ends = Rotation.from_matrix([rotation_from_rpy(*first), rotation_from_rpy(*last)])
+        assert poses.rotation == pytest.approx(Slerp([0.0, 1.0], ends)(share).as_matrix(), abs=1e-9)
+        assert poses.position == pytest.approx(np.array(POINTS[0]) + share[:, None] * [0.0, 0.2, 0.0], abs=1e-12)
+        assert (poses.n_angular == ORIENTATION).all()
+
+
+def test_axis_along_a_line_takes_the_shortest_arc() -> None:
+    share = np.linspace(0.0, 1.0, 21)
+    axes = np.random.default_rng(2).normal(size=(40, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    for a, b in axes.reshape(20, 2, 3):
+        found = plan("in_order", [{"position": p, "axis": x.tolist()} for p, x in zip(POINTS, (a, b), strict=False)])
+        poses = along_line(found.poses, 0, 1, share)
+        angle = np.arccos(a @ b)
+        expected = (np.sin((1.0 - share) * angle)[:, None] * a + np.sin(share * angle)[:, None] * b) / np.sin(angle)
+        assert poses.rotation[:, :, 2] == pytest.approx(expected, abs=1e-9)
+        assert poses.rotation.swapaxes(1, 2) @ poses.rotation == pytest.approx(
+            np.broadcast_to(np.eye(3), (21, 3, 3)), abs=1e-12
+        )
+        assert (poses.n_angular == AXIS).all()
+
+
+def test_consecutive_lines_share_a_sample_and_finer_samples_keep_the_coarse_ones() -> None:
+    found = plan(steps(*({"to": n, "by": "line"} for n in (1, 2, 3)), closed=False))
+    coarse, fine = found.sample(), found.sample(4)
+    assert coarse.of_motion[0][1] == coarse.of_motion[1][0]
+    step = np.linalg.norm(np.diff(coarse.poses.position, axis=0), axis=1)
+    assert step.max() <= 0.02 + 1e-12
+    z = coarse.poses.rotation[:, :, 2]
+    assert np.arccos(np.clip((z[1:] * z[:-1]).sum(axis=1), -1.0, 1.0)).max() <= 0.1 + 1e-9
+    assert fine.poses.position[::4] == pytest.approx(coarse.poses.position, abs=1e-12)
+    assert fine.poses.rotation[::4, :, 2] == pytest.approx(z, abs=1e-12)
+
+
+def test_cycles_with_too_many_samples_are_refused() -> None:
+    far = [[0.0, 0.0, 0.0], [900.0, 0.0, 0.0]]
+    with pytest.raises(TaskError, match=r"cycle: the lines have 90000 samples of 0.02 m; at most 20000"):
+        task(steps(*({"to": n, "by": "line"} for n in (1, 2))), far)
