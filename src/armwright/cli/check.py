@@ -12,7 +12,7 @@ from armwright.cli.streams import format_point
 from armwright.problem.problem import Problem
 from armwright.runs.config import record_objectives
 from armwright.spaces.design_space import DesignSpace
-from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter
+from armwright.spaces.parameters import CategoricalParameter, Parameter
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import Point
 
@@ -80,7 +80,7 @@ def geometry_warnings(problem: Problem) -> list[str]:
     reach = problem.max_reach
     warnings: list[str] = []
     for number, target in enumerate(problem.task.targets, start=1):
-        distance = _distance_to_bases(problem.space, target)
+        distance = problem.distance_to_bases(target)
         if distance > reach:
             warnings.append(
                 f"target {number} {format_point(target)} m is {distance:.3g} m from the nearest allowed base, and the "
@@ -108,13 +108,6 @@ def contains(obstacle: Obstacle, point: Point) -> bool:
             return math.hypot(*local[:2]) < radius and abs(local[2]) < half_height
         case "ground":
             return bool(local[2] < 0.0)
-
-
-def _distance_to_bases(space: DesignSpace, point: Point) -> float:
-    """Return the distance of a point from the box of allowed bases [m]."""
-    ranges = {p.name: (p.low, p.high) for p in space.parameters if isinstance(p, FloatParameter)}
-    low, high = np.array([ranges[f"origin_{axis}"] for axis in "xyz"]).T
-    return math.dist(point, np.clip(point, low, high))
 
 
 def _is_fixed(parameter: Parameter) -> bool:

@@ -73,7 +73,7 @@ def known_front(problem: Problem) -> KnownFront | None:
 
 def best_known_hypervolume(task: Task) -> float | None:
     """Return the best known hypervolume of a task in the paper's design space; None if no front is known."""
-    known = known_front(Problem(task))
+    known = None if task.cycle else known_front(Problem(task))
     if known is None or task.reference_point is None:
         return None
     return hypervolume(known.values, task.reference_point)
