@@ -135,9 +135,10 @@ def find_paths(
     device: Device = "cpu",
 ) -> CyclePaths:
     """Find the joint paths of N arms through a cycle. A path that is off is a result, never an exception."""
-    entry, ratio, hopeless = _choose(arms, plan, obstacles, candidates, device)
+    entry, ratios, hopeless = _choose(arms, plan, obstacles, candidates, device)
     n = len(arms)
-    refinement, before = _refined(np.ones(n, dtype=np.intp), ratio), ratio
+    is_line = np.array([motion.by == "line" for motion in plan.motions])
+    refinement, before = _refined(np.ones(n, dtype=np.intp), ratios.max(axis=1)), ratios[:, 0]
     jumps = np.zeros((n, len(plan.motions)), dtype=bool)
     groups: list[CycleGroup] = []
     unfinished = np.arange(n)
@@ -148,14 +149,14 @@ def find_paths(
             part = arms[index]
             paths = _follow(part, plan, entry[index], int(factor), device)
             steps = np.stack([_step_ratio(part, path) for path in paths], axis=1)  # (n, M)
-            ratio = steps.max(axis=1)
-            is_jump = (ratio > 1.0) & ((ratio > REDUCED * before[index]) | (factor >= MAX_REFINEMENT))
-            done = (ratio <= 1.0) | is_jump | hopeless[index]
-            jumps[index] = is_jump[:, None] & (steps > 1.0)
+            along = np.where(is_line, steps, 0.0).max(axis=1)
+            is_jump = (along > 1.0) & ((along > REDUCED * before[index]) | (factor >= MAX_REFINEMENT))
+            done = (steps.max(axis=1) <= 1.0) | is_jump | hopeless[index] | (factor >= MAX_REFINEMENT)
+            jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
             if done.any():
                 found = tuple(MotionPath(path.motion, path.q[done]) for path in paths)
                 groups.append(CycleGroup(index[done], part[np.flatnonzero(done)], found))
-            before[index], refinement[index] = ratio, _refined(refinement[index], ratio)
+            before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
             waiting.append(index[~done])
         unfinished = np.concatenate(waiting)
     return _measure(n, plan, groups, jumps, obstacles, device)
@@ -178,8 +179,8 @@ def _choose(
     """Return the chosen paths.
 
     Returns:
-        (N, B, D) posture at the first pose of each block, (N,) the ratio of its largest step to the allowed one, and
-        (N,) True if the path is so far off that more samples cannot mend it.
+        (N, B, D) posture at the first pose of each block, (N, 2) the ratios of the largest steps along lines and along
+        joint motions to the allowed one, and (N,) True if the path is so far off that more samples cannot mend it.
     """
     samples = plan.sample()
     entry = entry_postures(arms, plan, candidates, device)
@@ -195,17 +196,17 @@ def _choose(
     following = starts[:, [(b + 1) % len(plan.blocks) for b in range(len(plan.joint_motions))]]
     change = np.abs(following[:, :, None] - ends[:, : len(plan.joint_motions), :, None])  # (N, E, K, K, D)
     edges = (change / speed[:, None, None, None]).max(axis=-1)
-    choice = _avoid_collisions(arms, plan, samples, lines, blocks, edges, obstacles, device)
+    choice = _avoid_collisions(arms, plan, samples, lines, blocks.copy(), edges.copy(), obstacles, device)
     chosen = lines.choose(samples, choice)
     arm, block = np.arange(len(arms))[:, None], np.arange(len(plan.blocks))
-    steps = np.abs(np.diff(chosen, axis=1)) / np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
+    steps = np.abs(np.diff(chosen, axis=1))
     steps[:, samples.first[1:-1] - 1] = 0.0  # from one block to the next
     joint_motion = np.arange(len(plan.joint_motions))
     turn = change[arm, joint_motion, choice[:, joint_motion], choice[:, (joint_motion + 1) % len(plan.blocks)]]
-    turn = turn / JOINT_STEPS / np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
-    ratio = np.maximum(steps.max(axis=(1, 2), initial=0.0), turn.max(axis=(1, 2), initial=0.0))
+    allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
+    ratios = [(part / allowed).max(axis=(1, 2), initial=0.0) for part in (steps, turn / JOINT_STEPS)]
     hopeless = blocks[arm, block, choice].max(axis=1) > HOPELESS * BLOCKED
-    return starts[arm, block, choice], ratio, hopeless
+    return starts[arm, block, choice], np.stack(ratios, axis=1), hopeless
 
 
 def _speeds(arms: ArmArrays) -> Array:
