@@ -11,6 +11,7 @@ from armwright.exceptions import TaskError
 from armwright.rotations import rotation_from_rpy
 from armwright.tasks.cycle import PathTolerance
 from armwright.tasks.motions import Block, CyclePlan, Motion, along_line
+from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, ORIENTATION
 from armwright.tasks.task import Task
 from armwright.yaml_documents import check_document, dump_document, parse_document
@@ -22,6 +23,7 @@ targets:                                   # names are optional; targets are ref
   - {name: bin,  position: [0.15, 0.0, 0.02], axis: [0, 0, -1]}
   - {name: tray, position: [0.20, 0.25, 0.10], axis: [0, 0, -1], tolerance: 0.002}
 tool:    {tip: [0, 0, 0.10], mass: 0.35, center: [0, 0, 0.05], inertia: [3e-4, 3e-4, 1e-4]}   # rpy optional
+payload: {mass: 0.5, center: [0, 0, 0.03], size: [0.06, 0.04, 0.06]}                          # tip frame
 cycle:
   closed: true                             # default: the last step returns to the first entry
   time: fastest                            # or seconds; default of every step
@@ -67,6 +69,9 @@ def test_example_of_the_issue_is_read_to_the_letter() -> None:
         ("tray", "joint", "place", 1.2),
     ]
     assert cycle.durations() == (None, 1.2)
+    assert isinstance(read.payload, Payload)
+    assert (read.payload.mass, read.payload.center, read.payload.size) == (0.5, (0, 0, 0.03), (0.06, 0.04, 0.06))
+    assert (read.tool.tip, read.tool.mass, read.tool.inertia) == ((0, 0, 0.1), 0.35, (3e-4, 3e-4, 1e-4))
     assert read.target_names == ("bin", "tray")
     assert read.target_arrays.tolerance.tolist() == [0.001, 0.002]
 

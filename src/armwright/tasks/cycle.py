@@ -47,7 +47,7 @@ class Strict(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             if key not in cls.model_fields:
                 allowed = ", ".join(cls.model_fields)
                 raise ValueError(f'unknown key "{key}". Allowed: {allowed}.{did_you_mean(str(key), cls.model_fields)}')
-        return content
+        return cast("Any", content)
 
 
 class Step(Strict, frozen=True):
