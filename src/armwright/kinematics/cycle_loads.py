@@ -5,7 +5,7 @@ s' = s_τ / T and s'' = s_ττ / T², and the torque is a polynomial in 1 / T at
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -14,10 +14,13 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.cycle_path import CyclePaths
+from armwright.kinematics.drive_limits import MotionLoad, least_time, motion_load
 from armwright.kinematics.torque_terms import TorqueTerms
 from armwright.tasks.motions import CyclePlan
 
 INSTANTS = 33  # of a motion, equally spaced in time
+ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
+MIN_TIME, MAX_TIME = 1e-3, 1e3  # [s] of a motion that is as fast as possible
 
 
 @dataclass(frozen=True)
@@ -77,49 +80,30 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
     durations, holding = np.empty((n, m)), np.empty((n, m, dof))
     torques, speeds = np.empty((2, n, m, INSTANTS, dof))
     for group, of_motions in zip(paths.groups, terms, strict=True):
-        profiles = [_Profile.of(part, group.arms) for part in of_motions]
-        times = _durations(group.arms, plan, of_motions, profiles)
+        loads = [_load(part, group.arms) for part in of_motions]
+        times = _durations(group.arms, plan, loads)
         durations[group.index] = times
-        for i, profile in enumerate(profiles):
-            torques[group.index, i], speeds[group.index, i] = profile.at(times[:, i])
+        for i, load in enumerate(loads):
+            torques[group.index, i] = load.torque(times[:, i])
+            speeds[group.index, i] = load.velocity / times[:, i, None, None]
             holding[group.index, i - 1] = of_motions[i].gravity[:, 0]
         if not plan.cycle.closed:
             holding[group.index, -1] = of_motions[-1].gravity[:, -1]
     return CycleLoads(durations, _dwells(plan), torques, speeds, holding)
 
 
-@dataclass(frozen=True)
-class _Profile:
-    """Loads along a motion of duration T at F instants: torque static + viscous / T + dynamic / T², speed rate / T.
-
-    All are (N, F, D). Rotors, gears and their friction count where they are known.
-    """
-
-    static: Array
-    viscous: Array
-    dynamic: Array
-    rate: Array
-
-    @classmethod
-    def of(cls, terms: TorqueTerms, arms: ArmArrays) -> "_Profile":
-        weights, s_t, s_tt = _instants(terms.gravity.shape[1])
-        drives = arms.actuation
-        nothing = np.zeros(arms.motion.shape)
-        known = (nothing,) * 3 if drives is None else (drives.rotor_inertia, drives.coulomb, drives.viscous)
-        inertia, coulomb, viscous = (np.nan_to_num(values)[:, None] for values in known)  # (N, 1, D)
-        drag, push = terms.drag + inertia * terms.q_ss, terms.push + inertia * terms.q_s
-        rate = (weights @ terms.q_s) * s_t[:, None]
-        return cls(
-            static=weights @ terms.gravity + coulomb * np.sign(rate),
-            viscous=viscous * rate,
-            dynamic=(weights @ drag) * s_t[:, None] ** 2 + (weights @ push) * s_tt[:, None],
-            rate=rate,
-        )
-
-    def at(self, duration: Array) -> tuple[Array, Array]:
-        """Return (N, F, D) torques and speeds for durations (N,) [s]."""
-        time = duration[:, None, None]
-        return self.static + self.viscous / time + self.dynamic / time**2, self.rate / time
+def _load(terms: TorqueTerms, arms: ArmArrays) -> MotionLoad:
+    """Return the load of a motion at F instants; the drives' own inertia and friction count where they are known."""
+    weights, s_t, s_tt = _instants(terms.gravity.shape[1])
+    q_s, q_ss, drag, push = (weights @ values for values in (terms.q_s, terms.q_ss, terms.drag, terms.push))
+    rate, change = s_t[:, None], s_tt[:, None]
+    gravity, inertial, velocity = weights @ terms.gravity, drag * rate**2 + push * change, q_s * rate
+    if arms.actuation is None:
+        nothing = np.zeros(gravity.shape)
+        return MotionLoad(gravity, nothing, nothing, inertial, velocity)
+    drives = arms.actuation
+    known = {name: np.nan_to_num(getattr(drives, name)) for name in ("rotor_inertia", "coulomb", "viscous")}
+    return motion_load(gravity, inertial, velocity, q_ss * rate**2 + q_s * change, replace(drives, **known))
 
 
 @cache
@@ -136,19 +120,28 @@ def _instants(samples: int) -> tuple[Array, Array, Array]:
     return weights, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
-def _durations(arms: ArmArrays, plan: CyclePlan, terms: Sequence[TorqueTerms], profiles: Sequence[_Profile]) -> Array:
-    """Return the (N, M) durations: a step's own time shared by its motions, or the least for torques and speeds."""
-    if any(time is None for time in plan.times):
+def _durations(arms: ArmArrays, plan: CyclePlan, loads: Sequence[MotionLoad]) -> Array:
+    """Return the (N, M) durations: the least for torques and speeds, scaled to a step's own time if it states one.
+
+    Without known torques and speeds, the motions of a step share its time by the largest travel of a joint.
+    """
+    drives = arms.actuation
+    unknown = drives is None or bool(np.isnan(drives.peak + drives.no_load_speed + drives.corner_speed).any())
+    if unknown and any(plan.times[motion.step] is None for motion in plan.motions):
         raise SettingsError(
-            "cycle_time and other quantities of time need the duration of each step, or actuators with known speeds; "
-            "try cycle: {time: 1.5, ...}"
+            "cycle_time and other quantities of time need the duration of each step, or actuators with known torques "
+            "and speeds; try cycle: {time: 1.5, ...}"
         )
-    least = np.stack([np.abs(part.q_s).mean(axis=1).max(axis=1) for part in terms], axis=1)  # (N, M) joint travel
-    least = np.maximum(least, 1e-6)
-    durations = np.empty(least.shape)
+    travel = np.stack([np.abs(load.velocity).max(axis=(1, 2)) for load in loads], axis=1)  # (N, M)
+    durations = travel + 1e-9
+    if drives is not None and not unknown:
+        least = np.stack([least_time(load, drives) for load in loads], axis=1)
+        durations = np.clip(np.where(np.isfinite(least), ROUNDING * least, MAX_TIME), MIN_TIME, MAX_TIME)
     for step in {motion.step for motion in plan.motions}:
         own = [i for i, motion in enumerate(plan.motions) if motion.step == step]
-        durations[:, own] = plan.times[step] * least[:, own] / least[:, own].sum(axis=1, keepdims=True)
+        time = plan.times[step]
+        if time is not None:
+            durations[:, own] *= time / durations[:, own].sum(axis=1, keepdims=True)
     return durations
 
 

@@ -18,6 +18,7 @@ from armwright.tasks.task import Task
 
 Relation = Literal["<=", ">="]
 
+DRIVE_QUANTITIES = ("dynamic_utilisation", "speed_utilisation", "thermal_utilisation", "voltages")
 MIN_SCALE = 1e-9  # bounds nearer to 0 count as 0
 _CONSTRAINT = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=)\s*(\S+)\s*")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -88,7 +89,7 @@ def cycle_constraints(task: Task, has_actuators: bool) -> tuple[str, ...]:
         **({"path_angle": tolerance.angle} if task.target_arrays.oriented else {}),
         "jumps": 0.0,
         "collision": 0.0,
-        **({"dynamic_utilisation": 1.0, "speed_utilisation": 1.0} if has_actuators else {}),
+        **(dict.fromkeys(DRIVE_QUANTITIES, 1.0) if has_actuators else {}),
     }
     own = {constraint.quantity.name for constraint in read_constraints(task.constraints)}
     own |= {"collision"} if own & {quantity.name for quantity in CLEARANCES} else set()

@@ -120,11 +120,10 @@ class Evaluation(Scene):
     def worst_loads(self, measure: Callable[[Array, Array], Array]) -> Array:
         """Return (N, T) a measure of torques and speeds, the largest along the motions of steps to a target, else 0.
 
-        measure: from torques [N m] and speeds [rad/s] of motors, each (N, K, J), to (N, K), of K instants.
+        measure: from torques [N m] and speeds [rad/s] of joints, each (N, K, J), to (N, K), of K instants.
         """
-        loads, travel = self.loads, self.arms.travel[:, None]
-        n, m, f, dof = loads.torques.shape
-        torques, speeds = loads.torques.reshape(n, m * f, dof) * travel, loads.speeds.reshape(n, m * f, dof) / travel
+        n, m, f, dof = self.loads.torques.shape
+        torques, speeds = (values.reshape(n, m * f, dof) for values in (self.loads.torques, self.loads.speeds))
         return self.largest_on_motions(measure(torques, speeds).reshape(n, m, f).max(axis=2))
 
     def largest_on_motions(self, along: Array, at_targets: Array | float = 0.0) -> Array:

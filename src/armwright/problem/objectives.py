@@ -8,6 +8,7 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.actuation import Actuation
 from armwright.kinematics.arm_arrays import FIXED
+from armwright.kinematics.drive_limits import torque_speed_utilisation
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.tasks.targets import REACHED
@@ -46,14 +47,26 @@ def _torque_utilisation(evaluation: Evaluation) -> Array:
 
 
 def _dynamic_utilisation(evaluation: Evaluation) -> Array:
-    peak = _motor_peak(evaluation, "dynamic_utilisation")
-    return evaluation.worst_loads(lambda torques, _: np.abs(torques / peak).max(axis=-1))
+    drives = _actuation(evaluation, "dynamic_utilisation", "peak", "corner_speed", "no_load_speed")
+    return evaluation.worst_loads(
+        lambda torques, speeds: torque_speed_utilisation(torques, speeds, drives).max(axis=-1)
+    )
 
 
 def _speed_utilisation(evaluation: Evaluation) -> Array:
-    speed = _actuation(evaluation, "speed_utilisation", "no_load_speed").no_load_speed
-    motor_speed = (speed / evaluation.arms.travel)[:, None]
-    return evaluation.worst_loads(lambda _, speeds: np.abs(speeds / motor_speed).max(axis=-1))
+    speed = _actuation(evaluation, "speed_utilisation", "no_load_speed").no_load_speed[:, None]
+    return evaluation.worst_loads(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
+
+
+def _dynamic_torque(evaluation: Evaluation) -> Array:
+    travel = evaluation.arms.travel[:, None]
+    return evaluation.worst_loads(lambda torques, _: np.abs(torques * travel).max(axis=-1))
+
+
+def _thermal_utilisation(evaluation: Evaluation) -> Array:
+    drives = _actuation(evaluation, "thermal_utilisation", "continuous")
+    share = evaluation.loads.rms_torques / drives.continuous
+    return drives.safety_factor * share.max(axis=1)
 
 
 def _voltages(evaluation: Evaluation) -> Array:
@@ -236,15 +249,15 @@ DYNAMIC_TORQUE = Objective(
     unit="N m",
     symbol="E_dynamic",
     description="the largest absolute torque of any motor on the way to the target, gravity and inertia included",
-    each=lambda e: e.worst_loads(lambda torques, _: np.abs(torques).max(axis=-1)),
+    each=_dynamic_torque,
     over="max",
 )
 DYNAMIC_UTILISATION = Objective(
     name="dynamic_utilisation",
     unit="of allowed",
     symbol="E_dynutil",
-    description="the largest share of any actuator's peak torque on the way to the target, times "
-    "the safety factor; above 1 it cannot",
+    description="the largest factor by which any actuator's torque, times the safety factor, and speed together exceed "
+    "its torque-speed limit on the way to the target; above 1 it cannot",
     each=_dynamic_utilisation,
     over="max",
 )
@@ -256,11 +269,21 @@ SPEED_UTILISATION = Objective(
     each=_speed_utilisation,
     over="max",
 )
+THERMAL_UTILISATION = Objective(
+    name="thermal_utilisation",
+    unit="of allowed",
+    symbol="E_thermal",
+    description="the largest share of any actuator's continuous torque that its torque takes, as a root mean square "
+    "over the cycle with its dwells, times the safety factor; above 1 it overheats",
+    each=_thermal_utilisation,
+    over="arm",
+)
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)
 _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, RMS_TORQUE, TORQUE_UTILISATION, MASS, LENGTH,
     PRICE, JOINTS, ORIENTATION_ERROR, WORST_ANGLE, COLLISION, CLEARANCE_SHORTFALL, PATH_ERROR, PATH_ANGLE,
-    JUMPS, CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, UNCOVERED_FRACTION, ANISOTROPY,
+    JUMPS, CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION,
+    UNCOVERED_FRACTION, ANISOTROPY,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 RENAMED = {
@@ -315,7 +338,7 @@ QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*CLE
 ORIENTATION_QUANTITIES = (ORIENTATION_ERROR, WORST_ANGLE)
 CLEARANCE_QUANTITIES = (COLLISION, CLEARANCE_SHORTFALL, *CLEARANCES)
 PATH_QUANTITIES = (*CLEARANCE_QUANTITIES, PEAK_TORQUE, TORQUE_UTILISATION)  # the worst of targets and motions counts
-TIMED_QUANTITIES = (CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION)
+TIMED_QUANTITIES = (CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION)
 MOTION_QUANTITIES = (*PATH_QUANTITIES, PATH_ERROR, PATH_ANGLE, JUMPS, *TIMED_QUANTITIES)
 
 

@@ -123,7 +123,7 @@ class Problem:
             TaskError: the reference point is for other objectives, or a constraint cannot be parsed.
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
-        texts = (*self.task.constraints, *cycle_constraints(self.task, self._has_speeds))
+        texts = (*self.task.constraints, *cycle_constraints(self.task, self._has_drives))
         object.__setattr__(self, "constraints", read_constraints(texts))
         if not self.objectives:
             object.__setattr__(self, "objectives", self._default_objectives())
@@ -141,10 +141,10 @@ class Problem:
         self._check_reach()
 
     @property
-    def _has_speeds(self) -> bool:
-        """True if all joints have actuators whose speeds are known."""
+    def _has_drives(self) -> bool:
+        """True if all joints have actuators whose speeds and voltages are known."""
         actuators = self.space.arm_actuators
-        return bool(actuators) and all(actuator.speed is not None for actuator in actuators)
+        return bool(actuators) and all(None not in (actuator.speed, actuator.voltage) for actuator in actuators)
 
     def _default_objectives(self) -> tuple[Objective, ...]:
         if self.task.objectives is not None:

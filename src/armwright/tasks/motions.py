@@ -176,6 +176,15 @@ class CyclePlan:
 
     def sample(self, refinement: int = 1) -> LineSamples:
         """Return samples of all lines, `refinement` times as many as at least."""
+        if refinement not in self._samples:
+            self._samples[refinement] = self._sample(refinement)
+        return self._samples[refinement]
+
+    @cached_property
+    def _samples(self) -> dict[int, LineSamples]:
+        return {}
+
+    def _sample(self, refinement: int) -> LineSamples:
         parts: list[Poses] = []
         first, spans = [0], [(0, 0)] * len(self.motions)
         at = 0
