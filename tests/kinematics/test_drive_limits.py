@@ -147,6 +147,10 @@ def test_unknown_ratings_give_no_number(name: str) -> None:
     motors = drives(3, D, rng)
     unknown = replace(motors, **{name: np.where(np.arange(D) == 1, np.nan, getattr(motors, name))})
     assert np.isnan(least_time(loads(unknown, rng), unknown)).all()
+    if "speed" in name:
+        moving = np.ones((3, S, D))
+        for use in (torque_speed_utilisation, available_torque):
+            assert np.isnan(use(moving, moving, unknown)[..., 1]).all()
 
 
 def test_available_torque_of_servos_and_drives() -> None:

@@ -6,12 +6,17 @@ Drives of which a rating is unknown give NaN.
 """
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.kinematics.actuation import Actuation
+
+MAX_RATE = 1e9  # [1/s] of motions without any limit, which take no time
+ALLOWED = 1.0 + 1e-10  # of a limit relative to the peak torque
+ROUNDING = 1e-13  # of a sum relative to its terms
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,8 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
     The third one, the falling line, always holds for τ <= 0 within the speed limit, so a motor that brakes needs no
     case of its own. α >= 0 allows an interval of u, α < 0 excludes one: gravity may permit a motion that is impossible
     at a lower speed. So the result is the largest u that all inequalities allow together, not the least of their ends.
-    An arm that could not stop on the way, because k |gravity| > P, has none.
+    From the speed limit, u descends to the roots of the inequalities that do not hold there, until all hold. An arm
+    that could not stop on the way, because k |gravity| > P, has none.
 
     Args:
         load: Load of the motions of N arms.
@@ -119,83 +125,92 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
         >>> float(least_time(motion_load(still, still, turn, still, drives), drives)[0])
         0.1
     """
-    limits = _limits(load, drives)
-    lower, upper = limits.allowed()
+    limits = _Limits.of(load, drives)
+    holds = (drives.safety_factor[:, None, None] * np.abs(load.gravity) <= drives.peak[:, None]).all(axis=(1, 2))
+    rate, rows = np.where(holds, limits.fastest, -np.inf), np.flatnonzero(holds)
+    while len(rows):  # each step passes at least one root for good
+        lower = limits.largest_root_below(rate, rows)
+        rows, lower = rows[lower < np.inf], lower[lower < np.inf]
+        rate[rows] = lower
+        rows = rows[lower > 0.0]
     with np.errstate(divide="ignore"):
-        fastest = (drives.no_load_speed[:, None] / np.abs(load.velocity)).min(axis=(1, 2))
-    rate = limits.largest_allowed(np.minimum(upper, fastest))
-    peak = drives.peak[:, None]
-    holds = (drives.safety_factor[:, None, None] * np.abs(load.gravity) <= peak).all(axis=(1, 2))
-    with np.errstate(divide="ignore"):
-        time = np.where(holds & (rate >= lower) & (rate > 0.0), 1.0 / rate, np.inf)
+        time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0))
     known = ~np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
     return np.where(known & ~np.isnan(load.coulomb + load.viscous + load.inertial).any(axis=(1, 2)), time, np.nan)
 
 
 def _falling_range(drives: Actuation) -> Array:
     """Return the (N, D) range of speeds over which the available torque falls [rad/s]; 0 for fixed joints."""
-    finite = np.isfinite(drives.no_load_speed)
-    return np.where(finite, drives.no_load_speed - np.where(finite, drives.corner_speed, 0.0), 0.0)
+    fixed = np.isinf(drives.no_load_speed)
+    return np.where(fixed, 0.0, drives.no_load_speed - np.where(fixed, 0.0, drives.corner_speed))
 
 
 @dataclass(frozen=True)
-class _Quadratics:
-    """Inequalities α u² + β u + γ <= 0 of N arms, (N, M) each, and the roots r <= s of the left sides."""
+class _Limits:
+    """Limits of N motions: a + b u + c u² within ±1, plus d u at most the level, for M joints and samples.
 
-    alpha: Array
-    constant: NDArray[np.bool_]  # True if α = β = 0, or if there is no limit
-    possible: NDArray[np.bool_]  # True if there are real roots, or if a constant is at most 0
-    r: Array
-    s: Array
+    Attributes:
+        a, b, c: (N, M) torque in the direction of the motion, with the safety factor, relative to the peak torque.
+        d: (N, M) speed relative to the range of falling torque [s].
+        level: (N, M) no-load speed relative to that range; infinite without one.
+        fastest: (N,) largest u by the no-load speeds, at most MAX_RATE [1/s].
+    """
 
-    def allowed(self) -> tuple[Array, Array]:
-        """Return the (N,) least and largest u > 0 that the inequalities with α >= 0 allow; least > largest if none."""
-        convex = ~self.constant & (self.alpha >= 0.0)
-        lower = np.where(convex, np.where(self.possible, self.r, np.inf), 0.0)
-        lower = np.where(self.constant & ~self.possible, np.inf, lower)
-        return lower.max(axis=1, initial=0.0), np.where(convex, self.s, np.inf).min(axis=1, initial=np.inf)
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+    level: Array
+    fastest: Array
 
-    def largest_allowed(self, rate: Array) -> Array:
-        """Return the (N,) largest u <= rate that no inequality with α < 0 excludes: each excludes r < u < s."""
-        excludes = (self.alpha < 0.0) & ~self.constant & self.possible
-        r, s = np.where(excludes, self.r, np.inf), np.where(excludes, self.s, -np.inf)
-        while True:  # each step leaves an interval for good
-            inside = (r < rate[:, None]) & (rate[:, None] < s)
-            if not inside.any():
-                return rate
-            rate = np.minimum(rate, np.where(inside, r, np.inf).min(axis=1))
+    @classmethod
+    def of(cls, load: MotionLoad, drives: Actuation) -> Self:
+        """Return the limits of a load."""
+        n, samples, _ = load.gravity.shape
+        scale = np.where(load.velocity < 0.0, -1.0, 1.0) * (drives.safety_factor[:, None] / drives.peak)[:, None]
+        torques = (load.gravity + load.coulomb, load.viscous, load.inertial)
+        speed, gap = np.abs(load.velocity), _falling_range(drives)
+        falls = gap > 0.0
+        width = np.where(falls, gap, 1.0)
+        level = np.where(falls, np.where(falls, drives.no_load_speed, 1.0) / width, np.inf)
+        with np.errstate(divide="ignore"):
+            fastest = (drives.no_load_speed / speed.max(axis=1)).min(axis=1)
+        return cls(
+            *((scale * torque).reshape(n, -1) for torque in torques),
+            d=(speed * np.where(falls, 1.0 / width, 0.0)[:, None]).reshape(n, -1),
+            level=np.repeat(level[:, None], samples, axis=1).reshape(n, -1),
+            fastest=np.minimum(fastest, MAX_RATE),
+        )
+
+    def largest_root_below(self, rate: Array, rows: NDArray[np.intp]) -> Array:
+        """Return, for each row, the least over the limits that its rate exceeds of their largest smaller roots.
+
+        No u between is allowed. It is infinite if no limit is exceeded, and -infinite if one has no smaller root.
+        """
+        u = rate[rows, None]
+        a, b, c, d, level = (each[rows] for each in (self.a, self.b, self.c, self.d, self.level))
+        torque = a + (b + c * u) * u
+        lower = np.full(len(rows), np.inf)
+        for sign, exceeded in ((1.0, torque > ALLOWED), (-1.0, torque < -ALLOWED)):
+            i, j = np.nonzero(exceeded)
+            roots = _largest_root_below(sign * c[i, j], sign * b[i, j], sign * a[i, j] - 1.0, u[i, 0])
+            np.minimum.at(lower, i, roots)
+        i, j = np.nonzero(torque + d * u > level + (ALLOWED - 1.0))
+        roots = _largest_root_below(c[i, j], b[i, j] + d[i, j], a[i, j] - level[i, j], u[i, 0])
+        np.minimum.at(lower, i, roots)
+        return lower
 
 
-def _limits(load: MotionLoad, drives: Actuation) -> _Quadratics:
-    """Return the limits of the torque, relative to its peak."""
-    forward = np.where(load.velocity < 0.0, -1.0, 1.0) * drives.safety_factor[:, None, None] / drives.peak[:, None]
-    a, b, c = forward * (load.gravity + load.coulomb), forward * load.viscous, forward * load.inertial
-    gap = _falling_range(drives)
-    falls = gap > 0.0
-    slope = np.where(falls, 1.0 / np.where(falls, gap, 1.0), 0.0)
-    level = np.where(falls, np.where(falls, drives.no_load_speed, 0.0) * slope, np.inf)
-    alpha = np.stack([c, -c, c], axis=1)
-    beta = np.stack([b, -b, b + slope[:, None] * np.abs(load.velocity)], axis=1)
-    gamma = np.stack([a - 1.0, -a - 1.0, a - level[:, None]], axis=1)
-    return _solved(*(each.reshape(len(gap), -1) for each in (alpha, beta, gamma)))
+def _largest_root_below(alpha: Array, beta: Array, gamma: Array, u: Array) -> Array:
+    """Return the largest root of α x² + β x + γ below u, where it is positive; infinite where it is 0 but for rounding.
 
-
-def _solved(alpha: Array, beta: Array, gamma: Array) -> _Quadratics:
-    """Return the quadratics with their roots, without cancellation (Press et al. 2007, section 5.6)."""
-    alpha = alpha + 0.0  # -0 would turn the sign of an infinite root
-    constant = (alpha == 0.0) & (beta == 0.0)
-    endless = np.isinf(gamma)  # no limit
-    gamma = np.where(endless, -1.0, gamma)
-    alpha, beta = np.where(endless, 0.0, alpha), np.where(endless, 0.0, beta)
-    constant = constant | endless
+    -infinite without such a root. Roots are free of cancellation (Press et al. 2007, section 5.6).
+    """
+    terms = np.stack([alpha * u**2, beta * u, gamma])
     discriminant = beta**2 - 4.0 * alpha * gamma
     q = -0.5 * (beta + np.copysign(np.sqrt(np.maximum(discriminant, 0.0)), beta))
     with np.errstate(divide="ignore", invalid="ignore"):
-        one, other = q / alpha, np.where(q == 0.0, 0.0, gamma / q)
-    return _Quadratics(
-        alpha=alpha,
-        constant=constant,
-        possible=np.where(constant, gamma <= 0.0, discriminant >= 0.0),
-        r=np.minimum(one, other),
-        s=np.maximum(one, other),
-    )
+        roots = np.stack([q / alpha, gamma / q])
+    below = np.where(roots < u, roots, -np.inf).max(axis=0)  # NaN is not below
+    positive = terms.sum(axis=0) > ROUNDING * np.abs(terms).sum(axis=0)
+    return np.where(positive, np.where(discriminant >= 0.0, below, -np.inf), np.inf)
