@@ -29,6 +29,7 @@ def pick(
 ) -> None:
     """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee."""
     from armwright.cli.show_results import show_picked
+    from armwright.runs.path_report import path_record
     from armwright.runs.selection import numbers_of, pick_from, read_condition, read_weights
 
     if n < 1:
@@ -40,6 +41,7 @@ def pick(
         print_json(
             [
                 {"number": m.number, "source": m.source, "joints": m.design.joints, **numbers_of(history, m)}
+                | path_record(history.evaluation([m.number]), 0)
                 for m in picked[:n]
             ]
         )

@@ -17,6 +17,7 @@ from armwright.problem.objective import Objective
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.report.style import look
 from armwright.runs.history import FrontMember, History
+from armwright.runs.path_report import describe_extremes
 from armwright.runs.results import REPORT, describe_infeasibility
 from armwright.study.front_run import FrontRun
 from armwright.study.progress import StudyResult
@@ -157,6 +158,8 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
         base = format_point([round(value, 3) for value in member.design.origin])
         console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}")
+        if along := describe_extremes(history.evaluation([member.number]), 0):
+            console.print(f"  worst along its cycle: {along}")
     first = picked[0].number
     console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
 

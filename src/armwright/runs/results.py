@@ -27,6 +27,7 @@ from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.front_gap import front_gap
 from armwright.runs.history import FrontMember, History
+from armwright.runs.path_report import describe_faults, path_record
 from armwright.runs.proposer_bias import proposer_bias
 from armwright.runs.summary import ProposerSummary, parse_summary
 from armwright.runs.trial import FinishedTrial
@@ -193,13 +194,16 @@ def describe_infeasibility(history: History) -> str:
     worst_first = sorted(pairs, key=lambda pair: -pair[1])
     violated = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in worst_first if v > 0.0]
     others = f", and {', '.join(violated[1:])}" if len(violated) > 1 else ""
-    return f"no design meets all constraints yet; the nearest, #{number}, violates {violated[0]} most{others}"
+    faults = describe_faults(history.evaluation([number]), 0)
+    along = f"; along its cycle: {faults}" if faults else ""
+    return f"no design meets all constraints yet; the nearest, #{number}, violates {violated[0]} most{others}{along}"
 
 
 def _feasibility_record(history: History) -> dict[str, Any]:
     """Return how many designs violate each constraint; empty for a task without constraints.
 
-    nearest: If no design is feasible, the one with the smallest violation, and the quantities that it violates.
+    nearest: If no design is feasible, the one with the smallest violation, the quantities that constraints bound, and
+        where along its cycle it is worst.
     """
     constraints = history.problem.constraints
     if not constraints:
@@ -214,6 +218,7 @@ def _feasibility_record(history: History) -> dict[str, Any]:
             "number": number,
             "violation": float(total_violation(violations[None])[0]),
             "measured": dict(zip(names, measured, strict=True)),
+            **path_record(history.evaluation([number]), 0),
         }
     counts = (history.violations > 0.0).sum(axis=0).tolist()
     return {
@@ -320,6 +325,8 @@ def _name(member: FrontMember) -> str:
 
 def _design_records(history: History) -> Iterator[dict[str, Any]]:
     """Yield the content of design.json for each design of the front."""
+    if not history.front:
+        return
     evaluation = history.evaluation([member.number for member in history.front])
     for row, member in enumerate(history.front):
         trial = history.trials[member.number]
@@ -331,6 +338,7 @@ def _design_records(history: History) -> Iterator[dict[str, Any]]:
             "objectives": _objectives(history, member.values),
             **({"violations": _violations(history, trial)} if trial.violations else {}),
             "masses": history.problem.space.mass_note,
+            **path_record(evaluation, row),
             "targets": [_target_record(evaluation, row, t, member.arm) for t in range(len(evaluation.targets))],
         }
 
