@@ -13,12 +13,15 @@ from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from armwright.exceptions import ReplayError
 from armwright.llm.transcript import Call
 from armwright.runs.config import RunConfig
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
 
 ENDING = ".jsonl.xz"
 MAX_RECORDING = 64 * 1024 * 1024  # [bytes] of text, far above the largest run
@@ -74,10 +77,19 @@ def find_recording(name_or_path: str) -> Recording | None:
 
 
 def pack_recording(recording: Recording) -> bytes:
-    """Return the content of a recording's file."""
+    """Return the content of a recording's file, without values of task and space that are the defaults."""
     header = _Header(provenance=recording.provenance, calls=len(recording.calls), config=recording.config)
-    lines = [header.model_dump_json(), *(json.dumps(asdict(call)) for call in recording.calls)]
+    content = header.model_dump(mode="json")
+    for name, model in (("task", Task), ("space", DesignSpace)):
+        content["config"][name] = _without_defaults(content["config"][name], model)
+    lines = [json.dumps(content), *(json.dumps(asdict(call)) for call in recording.calls)]
     return lzma.compress("".join(line + "\n" for line in lines).encode(), preset=9 | lzma.PRESET_EXTREME)
+
+
+def _without_defaults(values: dict[str, Any], model: type[BaseModel]) -> dict[str, Any]:
+    defaults = {name: field.get_default(call_default_factory=True) for name, field in model.model_fields.items()}
+    plain = TypeAdapter(dict[str, Any]).dump_python(defaults, mode="json", warnings=False, fallback=lambda _: None)
+    return {name: value for name, value in values.items() if value != plain[name]}
 
 
 def read_recording(file: Path | Traversable) -> Recording:
