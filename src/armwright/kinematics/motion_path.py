@@ -9,6 +9,8 @@ from scipy.interpolate import CubicSpline
 from armwright.arrays import Array
 from armwright.tasks.motions import Motion
 
+MANY_SAMPLES = 256  # beyond which the weights of all samples take more time and memory than they save
+
 
 @dataclass(frozen=True)
 class MotionPath:
@@ -33,6 +35,8 @@ class MotionPath:
             change = self.q[:, -1:] - self.q[:, :1]
             weight = (share, np.ones(len(share)), np.zeros(len(share)))[order]
             return (self.q[:, :1] if order == 0 else 0.0) + weight[:, None] * change
+        if self.q.shape[1] > MANY_SAMPLES:
+            return CubicSpline(self.share, self.q, axis=1)(share, order)
         weights = _spline_weights(self.q.shape[1], tuple(share.tolist()), order)
         return np.matmul(weights, self.q)
 
@@ -42,7 +46,7 @@ class MotionPath:
         return np.abs(np.diff(self.q, axis=1)).max(axis=1)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=128)
 def _spline_weights(samples: int, share: tuple[float, ...], order: int) -> Array:
     """Return (F, R) weights of equally spaced samples in the values of their spline, or its derivatives."""
     spline = CubicSpline(np.linspace(0.0, 1.0, samples), np.eye(samples))
