@@ -31,8 +31,9 @@ JOINT_STEPS = 16  # of a joint motion
 MAX_REFINEMENT = 64  # of the samples
 REDUCED = 0.75  # a step that twice the samples leave above this share of it is a jump
 HOPELESS = 10.0  # times the tolerance that a path is off, beyond which it is not refined
-ROUNDS = 4  # of choosing candidates again where the chosen ones collide
+ROUNDS = 4  # at least, of choosing candidates again where the chosen ones collide
 LOOPS = 3  # of a closed cycle without joint motions, until it ends where it began
+DISTINCT = 1e-3  # [rad] or [m] between candidates; nearer ones are the same
 CLOSED = 1e-3  # [rad] or [m] between its ends
 DEPTH = 1e-3  # [m] of a collision that costs as much as a path that is off by its tolerance
 CHUNK = 2**12  # samples that a thread takes at a time
@@ -143,22 +144,20 @@ def find_paths(
     groups: list[CycleGroup] = []
     unfinished = np.arange(n)
     while len(unfinished):
-        waiting: list[IndexArray] = []
-        for factor in np.unique(refinement[unfinished]):
-            index = unfinished[refinement[unfinished] == factor]
-            part = arms[index]
-            paths = _follow(part, plan, entry[index], int(factor), device)
-            steps = np.stack([_step_ratio(part, path) for path in paths], axis=1)  # (n, M)
-            along = np.where(is_line, steps, 0.0).max(axis=1)
-            is_jump = (along > 1.0) & ((along > REDUCED * before[index]) | (factor >= MAX_REFINEMENT))
-            done = (steps.max(axis=1) <= 1.0) | is_jump | hopeless[index] | (factor >= MAX_REFINEMENT)
-            jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
-            if done.any():
-                found = tuple(MotionPath(path.motion, path.q[done]) for path in paths)
-                groups.append(CycleGroup(index[done], part[np.flatnonzero(done)], found))
-            before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
-            waiting.append(index[~done])
-        unfinished = np.concatenate(waiting)
+        factor = int(refinement[unfinished].min())
+        index = unfinished[refinement[unfinished] == factor]
+        part = arms[index]
+        paths = _follow(part, plan, entry[index], factor, device)
+        steps = np.stack([_step_ratio(part, path) for path in paths], axis=1)  # (n, M)
+        along = np.where(is_line, steps, 0.0).max(axis=1)
+        is_jump = (along > 1.0) & ((along > REDUCED * before[index]) | (factor >= MAX_REFINEMENT))
+        done = (steps.max(axis=1) <= 1.0) | is_jump | hopeless[index] | (factor >= MAX_REFINEMENT)
+        jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
+        if done.any():
+            found = tuple(MotionPath(path.motion, path.q[done]) for path in paths)
+            groups.append(CycleGroup(index[done], part[np.flatnonzero(done)], found))
+        before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
+        unfinished = np.setdiff1d(unfinished, index[done])
     return _measure(n, plan, groups, jumps, obstacles, device)
 
 
@@ -191,6 +190,8 @@ def _choose(
         starts, ends = lines.ends(samples)
     speed = _speeds(arms)
     blocks = _block_costs(lines, samples, speed)
+    same = np.abs(starts[:, :, :, None] - starts[:, :, None]).max(axis=-1) < DISTINCT  # (N, B, K, K)
+    blocks[np.tril(same, -1).any(axis=-1)] = np.inf  # equal to an earlier candidate
     if plan.is_loop:
         blocks += _cost_of(np.abs(ends - starts).max(axis=-1) / CLOSED - 1.0)
     following = starts[:, [(b + 1) % len(plan.blocks) for b in range(len(plan.joint_motions))]]
@@ -249,7 +250,7 @@ def _avoid_collisions(
     index = np.arange(len(arms))
     share = np.arange(1, JOINT_STEPS) / JOINT_STEPS
     n_blocks, n_edges = blocks.shape[1], edges.shape[1]
-    for _ in range(ROUNDS):
+    for _ in range(max(ROUNDS, blocks.shape[2])):
         part = arms[index]
         of_sample = np.repeat(choice[index], np.diff(samples.first), axis=1)
         chosen = lines.q[index[:, None], of_sample, np.arange(len(samples.poses))]  # (n, S, D)
