@@ -238,9 +238,9 @@ def test_slides_of_existing_arms_use_the_travel_of_the_space(tmp_path: Path) -> 
 def test_invalid_arguments_are_refused(run: Path, tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="expected at least one arm"):
         compare_arms(TASK, [])
-    with pytest.raises(TaskError, match="is a run of the task feeder, with other targets or payloads"):
+    with pytest.raises(TaskError, match="is a run of the task feeder, with other targets, another tool"):
         compare_arms("target-1", [UR5], run)
-    with pytest.raises(TaskError, match="other targets or payloads"):
+    with pytest.raises(TaskError, match="another tool or other payloads"):
         compare_arms(TASK.model_copy(update={"payload": 1.0}), [UR5], run)
     with pytest.raises(SettingsError, match="the run has its own space"):
         compare_arms(TASK, [UR5], run, space=SPACE)
@@ -306,7 +306,7 @@ def test_compare_arms_command_prints_table_json_and_errors(run: Path, in_folder:
     for args, words in (
         (("task.yaml", UR5, "--base", "0,0"), '--base "0,0": expected three numbers with commas'),
         (("task.yaml", UR5, "--tip", "tool1"), 'Did you mean "tool0"?'),
-        (("target-1", UR5, "--run", run), "with other targets or payloads"),
+        (("target-1", UR5, "--run", run), "with other targets, another tool or other payloads"),
     ):
         done = armwright("compare-arms", *args)
         assert done.returncode == 2
