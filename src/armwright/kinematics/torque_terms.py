@@ -55,6 +55,24 @@ def torque_terms(paths: CyclePaths, payload: float, device: Device = "cpu") -> l
     return found
 
 
+def inverse_dynamics_torques(
+    arms: ArmArrays, q: Array, qd: Array, qdd: Array, carried: Array, payload: float, device: Device = "cpu"
+) -> Array:
+    """Return (N, S, D) torques of N arms in S states, without rotors and friction [N m], or forces [N].
+
+    Args:
+        arms: N arms.
+        q: (N, S, D) joint values [rad] or [m].
+        qd: (N, S, D) speeds [rad/s] or [m/s].
+        qdd: (N, S, D) accelerations [rad/s²] or [m/s²].
+        carried: (S,) share of the payload that is carried.
+        payload: Its mass [kg].
+        device: The device to compute on.
+    """
+    gravity, drag, _ = _terms(arms, q, qd, qdd, carried, payload, device)  # M q_ss + C q_s, with the time as share
+    return gravity + drag
+
+
 def _values(path: MotionPath, order: int) -> Array:
     """Return (n, R, D) joint values at the samples, or their derivatives."""
     if order == 0:

@@ -22,6 +22,8 @@ from armwright.robot.link_geometry import (
 )
 
 TYPES = {"revolute": "hinge", "prismatic": "slide"}  # a fixed joint is a body without a joint
+# XYZ: roll, pitch and yaw about fixed axes, as in a URDF.
+COMPILER = {"angle": "radian", "autolimits": "true", "eulerseq": "XYZ", "inertiafromgeom": "false", **MIN_INERTIA}
 SKY = {"builtin": "gradient", "rgb1": "0.97 0.97 0.98", "rgb2": "0.84 0.86 0.90", "width": "64", "height": "384"}
 TIP_COLOUR = "0.07 0.07 0.07 1"
 
@@ -40,18 +42,16 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     `python -m mujoco.viewer --mjcf=arm.xml` shows the arm.
     """
     root = Element("mujoco", model=name)
-    # XYZ: roll, pitch and yaw about fixed axes, as in a URDF.
-    compiler = {"angle": "radian", "autolimits": "true", "eulerseq": "XYZ", "inertiafromgeom": "false", **MIN_INERTIA}
-    SubElement(root, "compiler", compiler)
+    SubElement(root, "compiler", COMPILER)
     SubElement(root, "option", gravity=numbers((0.0, 0.0, -GRAVITY)))
     SubElement(SubElement(root, "default"), "geom", contype="0", conaffinity="0", mass="0")
-    body = SubElement(_add_scene(root, arm), "body", name="base", pos=numbers(arm.base))
+    body = SubElement(add_scene(root, arm), "body", name="base", pos=numbers(arm.base))
     for segment in segments(arm):
         body = SubElement(body, "body", name=segment.name, pos=numbers(segment.position))
         _add_joint(body, f"joint_{segment.number}", segment.joint)
         _add_link(body, segment.joint, segment.link)
-    _add_tip(body, arm)
-    _add_tool(body, arm)
+    add_tip(body, arm)
+    add_tool(body, arm)
     actuators = SubElement(root, "actuator")
     for n, joint in moving_joints(arm):
         motor = {"name": f"motor_{n}", "joint": f"joint_{n}", "gear": "1"}
@@ -61,7 +61,7 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     return to_xml(root)
 
 
-def _add_scene(root: Element, arm: Arm) -> Element:
+def add_scene(root: Element, arm: Arm) -> Element:
     """Add an empty world, lit from one side, with everything within reach in view; return its body."""
     x, y, z = arm.base
     size = arm.reach + arm.links[0].radius  # never 0
@@ -77,14 +77,28 @@ def _add_scene(root: Element, arm: Arm) -> Element:
 
 
 def _add_joint(body: Element, name: str, joint: Joint) -> None:
-    if joint.kind == "fixed":
-        return
+    if joint.kind != "fixed":
+        SubElement(body, "joint", joint_attributes(name, joint))
+
+
+def joint_attributes(name: str, joint: Joint) -> dict[str, str]:
+    """Return name, type, axis and limits of a joint that moves."""
     limits = f"{number(joint.lower)} {number(joint.upper)}"
-    attributes = {"name": name, "type": TYPES[joint.kind], "axis": AXIS_VECTORS[joint.axis], "range": limits}
-    SubElement(body, "joint", attributes)
+    return {"name": name, "type": TYPES[joint.kind], "axis": AXIS_VECTORS[joint.axis], "range": limits}
 
 
 def _add_link(body: Element, joint: Joint, link: Link) -> None:
+    add_inertial(body, link)
+    if link.length > 0.0:
+        cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}
+        euler = numbers(rpy_along(link.offset))
+        SubElement(body, "geom", {**cylinder, "pos": numbers(midpoint(link)), "euler": euler, "material": "link"})
+    marker = {"type": "sphere", "size": number(marker_radius(link)), "material": f"joint_{joint.axis}"}
+    SubElement(body, "geom", marker)
+
+
+def add_inertial(body: Element, link: Link) -> None:
+    """Add mass and inertia of a link."""
     euler = numbers(rpy_along(link.offset))
     inertial = {"pos": numbers(link.total_com), "mass": number(link.total_mass)}
     moments = list(inertia_moments(link).values())
@@ -93,14 +107,10 @@ def _add_link(body: Element, joint: Joint, link: Link) -> None:
     else:
         inertial["fullinertia"] = " ".join(moments)
     SubElement(body, "inertial", inertial)
-    if link.length > 0.0:
-        cylinder = {"type": "cylinder", "size": f"{number(link.radius)} {number(link.length / 2.0)}"}
-        SubElement(body, "geom", {**cylinder, "pos": numbers(midpoint(link)), "euler": euler, "material": "link"})
-    marker = {"type": "sphere", "size": number(marker_radius(link)), "material": f"joint_{joint.axis}"}
-    SubElement(body, "geom", marker)
 
 
-def _add_tip(body: Element, arm: Arm) -> None:
+def add_tip(body: Element, arm: Arm) -> None:
+    """Add the site `tip` to the last link."""
     rpy = tip_rpy(arm)
     tip = {"name": "tip", "pos": numbers(tip_position(arm)), "size": number(arm.links[-1].radius), "rgba": TIP_COLOUR}
     if any(rpy):
@@ -108,7 +118,8 @@ def _add_tip(body: Element, arm: Arm) -> None:
     SubElement(body, "site", tip)
 
 
-def _add_tool(body: Element, arm: Arm) -> None:
+def add_tool(body: Element, arm: Arm) -> None:
+    """Add the body of a tool with mass to the last link."""
     if arm.tool.mass == 0.0:
         return
     tool = SubElement(body, "body", name="tool", pos=numbers(arm.links[-1].offset))
