@@ -14,6 +14,7 @@ from armwright.tasks.motions import CyclePlan
 
 PERIOD = 0.004  # [s] between rows
 SAME_TIME = 1e-9  # [s]
+STILL = 1e-6  # [rad/s] or [m/s]; rounding moves a joint that rests at less, and its friction would follow the sign
 
 IndexArray = NDArray[np.intp]
 
@@ -57,7 +58,7 @@ def sample_trajectory(
         payload: Mass of the payload [kg].
     """
     begin = np.concatenate([[0.0], np.cumsum(durations + dwells)])
-    time = np.arange(int(np.ceil((begin[-1] - SAME_TIME) / PERIOD)) + 1) * PERIOD
+    time = np.arange(int(np.ceil((begin[-1] - SAME_TIME) / PERIOD)) + 1, dtype=np.float64) * PERIOD
     # The row at which a motion begins is the last one of the dwell before it.
     motion = np.maximum(np.searchsorted(begin[:-1], time - SAME_TIME) - 1, 0)
     q, qd, qdd = np.empty((3, len(time), arm.dof))
@@ -67,9 +68,7 @@ def sample_trajectory(
     step, target, carried = _events(plan, motion)
     tau = _drive_torques(arm, q, qd, qdd, carried, payload)
     moves = arm.motion[0] != FIXED
-    return Trajectory(
-        time, step, target, payload * carried, q[:, moves], qd[:, moves], qdd[:, moves], tau[:, moves]
-    )
+    return Trajectory(time, step, target, payload * carried, q[:, moves], qd[:, moves], qdd[:, moves], tau[:, moves])
 
 
 def _states(path: MotionPath, time: Array, duration: float) -> tuple[Array, Array, Array]:
@@ -84,7 +83,8 @@ def _states(path: MotionPath, time: Array, duration: float) -> tuple[Array, Arra
     else:
         spline = CubicSpline(path.share, path.q[0])
         q, q_s, q_ss = spline(s), spline(s, 1), spline(s, 2)
-    return q, q_s * rate, q_ss * rate**2 + q_s * change
+    qd = q_s * rate
+    return q, np.where(np.abs(qd) < STILL, 0.0, qd), q_ss * rate**2 + q_s * change
 
 
 def _events(plan: CyclePlan, motion: IndexArray) -> tuple[IndexArray, IndexArray, Array]:
