@@ -1,7 +1,7 @@
 """What the file formats share: bodies and limits of an arm, colours, and numbers as text."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
@@ -160,7 +160,7 @@ def number(value: float) -> str:
     return f"{value:.10g}"
 
 
-def numbers(values: Vector) -> str:
+def numbers(values: Iterable[float]) -> str:
     """Format numbers with ten digits each, separated by spaces."""
     return " ".join(number(value) for value in values)
 

@@ -4,6 +4,7 @@ summary.json              the result of the run
 trials.csv, front.csv     all trials, and those of the front
 designs/NNNN/arm.urdf     each design of the front, for simulators
 designs/NNNN/design.json  its postures, errors and torques at every target
+designs/NNNN/arm.xml, trajectory.csv  with a cycle: its model for MuJoCo, and its motion (cycle_export.py)
 """
 
 import json
@@ -24,9 +25,10 @@ from armwright.robot.arm import Arm
 from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.config import FrontMethod, RunConfig
+from armwright.runs.cycle_export import cycle_files
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.front_gap import front_gap
-from armwright.runs.history import FrontMember, History
+from armwright.runs.history import History
 from armwright.runs.path_report import describe_faults, path_record
 from armwright.runs.proposer_bias import proposer_bias
 from armwright.runs.summary import ProposerSummary, parse_summary
@@ -93,7 +95,9 @@ def verify_run(path: str | Path) -> tuple[History, dict[str, Any]]:
 def complete_summary(path: Path, history: History) -> dict[str, Any] | None:
     """Return the summary of a run folder that holds all results of these trials; None if one is missing."""
     files = [path / name for name in TABLES]
-    files += [path / DESIGNS / _name(m) / name for m in history.front for name in ("arm.urdf", "design.json")]
+    files += [
+        path / DESIGNS / design_name(m.number) / name for m in history.front for name in ("arm.urdf", "design.json")
+    ]
     summary = read_summary(path) if all(file.is_file() for file in files) else None
     return summary if summary is not None and summary["n_trials"] == len(history) else None
 
@@ -307,27 +311,30 @@ def _overlap_record(history: History, config: RunConfig, reserved: Sequence[Fini
 
 
 def _write_designs(folder: RunFolder, history: History, verdicts: Mapping[int, Mapping[str, Any]]) -> None:
-    names = {_name(member) for member in history.front}
+    names = {design_name(member.number) for member in history.front}
     for stale in (folder.path / DESIGNS).glob("[0-9]*"):
         if stale.name not in names:
             shutil.rmtree(stale)
-    for member, record in zip(history.front, _design_records(history), strict=True):
-        place = f"{DESIGNS}/{_name(member)}"
-        folder.write_text(f"{place}/arm.urdf", to_urdf(member.arm, name=f"{history.problem.task.name}-{member.number}"))
+    if not history.front:
+        return
+    evaluation = history.evaluation([member.number for member in history.front])
+    for row, (member, record) in enumerate(zip(history.front, _design_records(history, evaluation), strict=True)):
+        place, name = f"{DESIGNS}/{design_name(member.number)}", f"{history.problem.task.name}-{member.number}"
+        folder.write_text(f"{place}/arm.urdf", to_urdf(member.arm, name))
+        for file, text in cycle_files(history.problem, member.arm, evaluation, row, name).items():
+            folder.write_text(f"{place}/{file}", text)
         if member.number in verdicts:
             record["verification"] = verdicts[member.number]
         folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
 
 
-def _name(member: FrontMember) -> str:
-    return f"{member.number:04d}"
+def design_name(number: int) -> str:
+    """Return the name of a design's folder."""
+    return f"{number:04d}"
 
 
-def _design_records(history: History) -> Iterator[dict[str, Any]]:
-    """Yield the content of design.json for each design of the front."""
-    if not history.front:
-        return
-    evaluation = history.evaluation([member.number for member in history.front])
+def _design_records(history: History, evaluation: Evaluation) -> Iterator[dict[str, Any]]:
+    """Yield the content of design.json for each design of the front, which was evaluated."""
     for row, member in enumerate(history.front):
         trial = history.trials[member.number]
         yield {

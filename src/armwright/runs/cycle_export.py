@@ -1,0 +1,103 @@
+"""The files of a design with a cycle: its model in its surroundings, and its trajectory."""
+
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from armwright.exceptions import SettingsError
+from armwright.kinematics.arm_arrays import FIXED, carrying, stack_arms
+from armwright.kinematics.motion_path import MotionPath
+from armwright.kinematics.trajectory import Trajectory, sample_trajectory
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm
+from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
+
+MODEL, TRAJECTORY = "arm.xml", "trajectory.csv"
+DIGITS = 9
+
+
+def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, name: str) -> Mapping[str, str]:
+    """Return the content of the files by name; none for a task without a cycle or with a step of unknown duration.
+
+    Args:
+        problem: The problem.
+        arm: The arm of a design.
+        evaluation: Physics of some designs.
+        row: Which of them it is.
+        name: Name of the model.
+    """
+    if evaluation.plan is None:
+        return {}
+    try:
+        trajectory = trajectory_of(arm, evaluation, row)
+    except SettingsError:
+        return {}
+    task = problem.task
+    surroundings = Surroundings(
+        positions=evaluation.targets,
+        target_arrays=evaluation.target_arrays,
+        target_names=task.target_names,
+        obstacles=task.obstacles,
+        payload=float(evaluation.payload.max()),
+        load_shape=evaluation.load_shape,
+    )
+    moves = [joint for joint, one in enumerate(arm.joints) if one.kind != "fixed"]
+    postures, peaks = evaluation.q[row][:, moves], np.abs(trajectory.tau).max(axis=0)
+    model = to_simulation_mjcf(arm, surroundings, postures, peaks, name)
+    return {MODEL: model, TRAJECTORY: trajectory_csv(trajectory, task.target_names)}
+
+
+def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:
+    """Return the trajectory of an arm, which is row `row` of an evaluation.
+
+    Raises:
+        SettingsError: The task has no cycle, or a step of unknown duration.
+    """
+    arrays = carrying(stack_arms([arm], "float64"), evaluation.load_shape)
+    paths = tuple(
+        MotionPath(path.motion, np.where(arrays.motion == FIXED, 0.0, path.q[..., : arrays.dof]))
+        for path in evaluation.paths.of_arm(row)[1]
+    )
+    loads = evaluation.loads
+    payload = float(evaluation.payload.max())
+    return sample_trajectory(arrays, paths, evaluation.paths.plan, loads.durations[row], loads.dwells, payload)
+
+
+def trajectory_csv(trajectory: Trajectory, target_names: Sequence[str]) -> str:
+    """Return a trajectory as CSV, all joints' values after each other: q_1, …, qd_1, …, qdd_1, …, tau_1, ….
+
+    target is the name of a target where the arm has reached it and rested there, else empty.
+    """
+    n = trajectory.q.shape[1]
+    quantities = ("q", "qd", "qdd", "tau")
+    out = io.StringIO()
+    columns = [f"{quantity}_{k}" for quantity in quantities for k in range(1, n + 1)]
+    out.write(",".join(["time", "step", "target", "payload", *columns]) + "\n")
+    values = np.hstack([getattr(trajectory, quantity) for quantity in quantities]) + 0.0  # no -0.0
+    line = ",".join([f"%.{DIGITS}g"] * (4 * n)) + "\n"
+    heads = zip(trajectory.time, trajectory.step, trajectory.target, trajectory.payload, strict=True)
+    for (time, step, target, payload), row in zip(heads, values.tolist(), strict=True):
+        name = target_names[target] if target >= 0 else ""
+        out.write(f"{time:.{DIGITS}g},{step},{name},{payload:.{DIGITS}g}," + line % tuple(row))
+    return out.getvalue()
+
+
+def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
+    """Return the trajectory of a CSV file."""
+    head, *lines = text.splitlines()
+    cells = [line.split(",") for line in lines]
+    n = (len(head.split(",")) - 4) // 4
+    number = {name: index for index, name in enumerate(target_names)} | {"": -1}
+    values = np.array([row[4:] for row in cells], dtype=np.float64).reshape(len(cells), 4, n)
+    return Trajectory(
+        time=np.array([row[0] for row in cells], dtype=np.float64),
+        step=np.array([row[1] for row in cells], dtype=np.intp),
+        target=np.array([number[row[2]] for row in cells], dtype=np.intp),
+        payload=np.array([row[3] for row in cells], dtype=np.float64),
+        q=values[:, 0],
+        qd=values[:, 1],
+        qdd=values[:, 2],
+        tau=values[:, 3],
+    )

@@ -1,0 +1,229 @@
+"""The MJCF of an arm in its task: with servos, friction, payload, obstacles, contacts and a keyframe per target.
+
+`robot.mjcf` writes the arm alone. Here links are capsules, the solids of which `kinematics.clearance` measures the
+distances, and touch exactly what it counts.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.robot.arm import GRAVITY, Arm, Joint
+from armwright.robot.link_geometry import (
+    Segment,
+    moving_joints,
+    number,
+    numbers,
+    segments,
+    tip_position,
+    tip_rpy,
+    to_xml,
+)
+from armwright.robot.mjcf import COMPILER, add_inertial, add_scene, add_tip, add_tool, joint_attributes
+from armwright.tasks.obstacles import Obstacle
+from armwright.tasks.payload import LoadShape
+from armwright.tasks.targets import TargetArrays
+
+TIMESTEP = 0.001  # [s]
+NOTHING = 1e-9  # mass [kg] and moments of inertia [kg m²] of a payload that is not carried
+STIFFNESS = 20.0  # [1/rad] or [1/m] position gain of a joint without actuator, relative to its peak torque
+DAMPING = 0.05  # [s] damping gain, relative to the position gain, where none is stated
+
+# Geoms touch if a type of one is among the affinities of the other.
+OBSTACLE, LINK = 1, 2
+TOUCHES_ALL = {"contype": str(LINK), "conaffinity": str(LINK | OBSTACLE)}
+TOUCHES_LINKS = {"contype": str(LINK), "conaffinity": str(LINK)}
+TOUCHES_NOTHING = {"contype": "0", "conaffinity": "0"}
+COLOURS = {"obstacle": "0.55 0.55 0.58 0.5", "target": "0.84 0.16 0.16 0.6", "payload": "0.95 0.77 0.06 0.7"}
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What an arm works with.
+
+    Attributes:
+        positions: (T, 3) of the targets [m].
+        target_arrays: How the targets are to be reached.
+        target_names: Their names.
+        obstacles: What the arm should keep away from.
+        payload: Mass of the payload [kg].
+        load_shape: How it is distributed.
+    """
+
+    positions: Array
+    target_arrays: TargetArrays
+    target_names: Sequence[str]
+    obstacles: Sequence[Obstacle]
+    payload: float
+    load_shape: LoadShape
+
+
+def to_simulation_mjcf(
+    arm: Arm, surroundings: Surroundings, postures: Array, peak_torques: Array, name: str = "arm"
+) -> str:
+    """Return the MJCF of an arm in its surroundings.
+
+    Moving joints are joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque), whose sum
+    is limited to the actuator's peak torque. Link k is the capsule link_k, its actuator the sphere motor_k. A site
+    target_NAME is at each target; its user data are the tolerance of the position [m], of the angle [rad], and how many
+    angles count (2: the z axis, 3: all). The keyframe NAME is the posture there.
+
+    Args:
+        arm: The arm.
+        surroundings: What it works with.
+        postures: (T, D) values of the moving joints at the targets [rad] or [m].
+        peak_torques: (D,) largest torques of the moving joints, for the gains of joints without actuators.
+        name: Name of the model.
+    """
+    root = Element("mujoco", model=name)
+    SubElement(root, "compiler", COMPILER)
+    gravity = numbers((0.0, 0.0, -GRAVITY))
+    SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP), integrator="implicitfast")
+    SubElement(SubElement(root, "default"), "geom", {**TOUCHES_NOTHING, "mass": "0"})
+    world = add_scene(root, arm)
+    _add_obstacles(world, surroundings.obstacles)
+    _add_targets(world, surroundings, arm)
+    body = SubElement(world, "body", name="base", pos=numbers(arm.base))
+    names = {n: f"joint_{k}" for k, (n, _) in enumerate(moving_joints(arm), start=1)}
+    for segment in segments(arm):
+        if segment.joint.kind != "fixed":
+            _add_motor(body, f"motor{names[segment.number].removeprefix('joint')}", segment, arm)
+        body = SubElement(body, "body", name=segment.name, pos=numbers(segment.position))
+        if segment.joint.kind != "fixed":
+            SubElement(body, "joint", _joint(names[segment.number], segment.joint))
+        add_inertial(body, segment.link)
+        if segment.link.length > 0.0:
+            _add_link(body, segment)
+    add_tip(body, arm)
+    add_tool(body, arm)
+    _add_payload(body, arm, surroundings)
+    contact = SubElement(root, "contact")
+    for first, second in uncounted_pairs(arm):
+        SubElement(contact, "exclude", body1=f"link_{first + 1}", body2=f"link_{second + 1}")
+    _add_actuators(root, arm, peak_torques)
+    frames = SubElement(root, "keyframe")
+    for target, q in zip(surroundings.target_names, postures.tolist(), strict=True):
+        SubElement(frames, "key", name=target, qpos=numbers(q), ctrl=numbers([*q, *np.zeros(len(q))]))
+    return to_xml(root)
+
+
+def uncounted_pairs(arm: Arm) -> Iterator[tuple[int, int]]:
+    """Yield pairs of links, counted from 0, whose distance `self_clearance` leaves out, or takes in part only.
+
+    These are neighbours, rigidly connected links, and links so near along the arm that their ends always touch.
+    """
+    links, joints = arm.links, arm.joints
+    travelled = list(accumulate((link.length for link in links), initial=0.0))
+    for i, first in enumerate(links):
+        for j in range(i + 1, len(links)):
+            second = links[j]
+            if first.length == 0.0 or second.length == 0.0:
+                continue
+            solid_between = any(link.length > 0.0 for link in links[i + 1 : j])
+            moves = any(joint.kind != "fixed" for joint in joints[i + 1 : j + 1])
+            slides = sum(max(joint.lower, -joint.upper, 0.0) for joint in joints[i + 1 : j + 1])
+            between = travelled[j] - travelled[i + 1] + slides
+            if not solid_between or not moves or between < 2.0 * (first.radius + second.radius):
+                yield i, j
+
+
+def _add_obstacles(world: Element, obstacles: Sequence[Obstacle]) -> None:
+    names = Counter(obstacle.name for obstacle in obstacles)
+    for index, obstacle in enumerate(obstacles, start=1):
+        solid = obstacle.solid
+        label = obstacle.name if obstacle.name and names[obstacle.name] == 1 else f"{obstacle.name}{index}"
+        size = {
+            "box": solid.half,
+            "sphere": solid.half[:1],
+            "cylinder": (solid.half[0], solid.half[2]),
+            "ground": (0.0, 0.0, 0.1),  # of a plane without end, and the spacing of its grid
+        }[solid.shape]
+        geom = {"type": "plane" if solid.shape == "ground" else solid.shape, "size": numbers(size)}
+        place = {"pos": numbers(solid.centre), "xyaxes": numbers(solid.rotation[:, :2].T.ravel().tolist())}
+        bits = {"contype": str(OBSTACLE), "conaffinity": "0"}
+        SubElement(world, "geom", {"name": f"obstacle_{label}", **geom, **place, **bits, "rgba": COLOURS["obstacle"]})
+
+
+def _add_targets(world: Element, surroundings: Surroundings, arm: Arm) -> None:
+    arrays = surroundings.target_arrays
+    size = number(arm.links[-1].radius / 2.0)
+    for t, name in enumerate(surroundings.target_names):
+        site = {"name": f"target_{name}", "pos": numbers(surroundings.positions[t].tolist()), "size": size}
+        axes = numbers(arrays.rotation[t][:, :2].T.ravel().tolist())
+        allowed = (float(arrays.tolerance[t]), float(arrays.angle_tolerance[t]), float(arrays.n_angular[t]))
+        SubElement(world, "site", {**site, "xyaxes": axes, "user": numbers(allowed), "rgba": COLOURS["target"]})
+
+
+def _joint(name: str, joint: Joint) -> dict[str, str]:
+    """Return the attributes of a joint with its drive: rotor inertia, friction and limit."""
+    attributes, actuator = joint_attributes(name, joint), joint.actuator
+    if actuator is None or joint.effort is None:
+        return attributes
+    travel = joint.travel
+    drive = {
+        "armature": (actuator.rotor_inertia or 0.0) / travel**2,
+        "damping": (actuator.viscous_friction or 0.0) / travel**2,
+        "frictionloss": (actuator.coulomb_friction or 0.0) / travel,
+    }
+    limit = f"{number(-joint.effort)} {number(joint.effort)}"
+    return attributes | {key: number(value) for key, value in drive.items() if value} | {"actuatorfrcrange": limit}
+
+
+def _add_link(body: Element, segment: Segment) -> None:
+    """Add the capsule of a link; the foot of the first one, where the arm is mounted, touches other links alone."""
+    link, name = segment.link, segment.name
+    end, radius = np.array(link.offset), link.radius
+    share = min(1.0, 2.0 * radius / link.length) if segment.number == 1 else 0.0
+    if 0.0 < share < 1.0:
+        _add_capsule(body, "foot", np.zeros(3), share * end, radius, TOUCHES_LINKS)
+    _add_capsule(body, name, share % 1.0 * end, end, radius, TOUCHES_LINKS if share == 1.0 else TOUCHES_ALL)
+
+
+def _add_capsule(body: Element, name: str, start: Array, end: Array, radius: float, bits: dict[str, str]) -> None:
+    shape = {"type": "capsule", "fromto": numbers([*start.tolist(), *end.tolist()]), "size": number(radius)}
+    SubElement(body, "geom", {"name": name, **shape, "material": "link", **bits})
+
+
+def _add_motor(body: Element, name: str, segment: Segment, arm: Arm) -> None:
+    """Add the actuator of a joint to the link before: a sphere within its capsule, if it has one."""
+    before = arm.links[segment.number - 2] if segment.number > 1 else None
+    counts = before is not None and before.length > 0.0
+    radius = segment.link.radius if before is None else before.radius
+    shape = {"type": "sphere", "pos": numbers(segment.position), "size": number(radius)}
+    bits = TOUCHES_ALL if counts else TOUCHES_NOTHING
+    SubElement(body, "geom", {"name": name, **shape, "material": f"joint_{segment.joint.axis}", **bits})
+
+
+def _add_payload(body: Element, arm: Arm, surroundings: Surroundings) -> None:
+    mass, shape = surroundings.payload, surroundings.load_shape
+    payload = SubElement(body, "body", name="payload", pos=numbers(tip_position(arm)), euler=numbers(tip_rpy(arm)))
+    moments = [mass * value for value in shape.gyration] if mass > 0.0 else [NOTHING] * 3
+    inertial = {"pos": numbers(shape.center), "mass": number(mass or NOTHING), "diaginertia": numbers(moments)}
+    SubElement(payload, "inertial", inertial)
+
+
+def _add_actuators(root: Element, arm: Arm, peak_torques: Array) -> None:
+    actuators = SubElement(root, "actuator")
+    joints = [joint for _, joint in moving_joints(arm)]
+    for k, (joint, peak) in enumerate(zip(joints, peak_torques.tolist(), strict=True), start=1):
+        kp, kv = _gains(joint, peak)
+        gains = {"kp": number(kp), "kv": number(kv)}
+        SubElement(actuators, "position", {"name": f"servo_{k}", "joint": f"joint_{k}", **gains})
+    for k in range(1, len(joints) + 1):
+        SubElement(actuators, "motor", {"name": f"ff_{k}", "joint": f"joint_{k}", "gear": "1"})
+
+
+def _gains(joint: Joint, peak: float) -> tuple[float, float]:
+    """Return position gain [N m/rad] and damping gain [N m s/rad] of a joint, or [N/m] and [N s/m]."""
+    actuator, travel = joint.actuator, joint.travel
+    if actuator is None or actuator.position_gain is None:
+        gain = STIFFNESS * (joint.effort or max(peak, NOTHING))
+        return gain, DAMPING * gain
+    gain = actuator.position_gain / travel**2
+    damping = actuator.damping_gain
+    return gain, DAMPING * gain if damping is None else damping / travel**2
