@@ -18,6 +18,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
         "openai": "openai",
         "pydantic_ai": "pydantic-ai-slim",
     },
+    "sim": {"mujoco": "mujoco"},
 }
 
 

@@ -16,6 +16,7 @@ from armwright.exceptions import MissingExtraError, UsageError
 from armwright.extras import EXTRAS, missing_packages, requires_extra
 from armwright.report.live_server import serve, start_server
 from armwright.robot.robot_descriptions import find_urdf
+from armwright.runs.simulation import mujoco_version
 from tests import ROOT
 from tests.support.extras import NEEDS_GP
 
@@ -56,6 +57,7 @@ ASKED: dict[str, tuple[str, str, Callable[[], object]]] = {
     "arms": ("arms", "robot_descriptions", lambda: find_urdf("ur5e")),
     "distributed": ("distributed", "distributed", lambda: aw.Workers(2)),
     "gp": ("gp", "torch", lambda: aw.optimize(aw.Problem(aw.load_task("target-1")), sampler="gp")),
+    "simulation": ("sim", "mujoco", mujoco_version),
     "page": ("live", "uvicorn", lambda: serve(Path("run"), print)),
     "page of a run": ("live", "starlette", lambda: start_server(Path("run"))),
     "model": ("llm", "pydantic_ai", lambda: aw.LlmProposer("openai-chat:gpt-4o")),

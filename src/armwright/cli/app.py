@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from armwright.cli import experiment_commands, input_commands, output_commands, search_commands
+from armwright.cli import experiment_commands, input_commands, output_commands, search_commands, simulate_command
 from armwright.cli.signals import INTERRUPTED, install_handlers, open_closed_streams
 from armwright.exceptions import ArmwrightError
 
@@ -40,6 +40,7 @@ COMMANDS = {
     "After a run": (
         output_commands.pick,
         output_commands.export,
+        simulate_command.simulate,
         experiment_commands.compare,
         experiment_commands.compare_arms,
         experiment_commands.runs,

@@ -1,0 +1,97 @@
+"""The command that drives designs of a run in a simulator: simulate."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armwright.cli.options import Json, RunFolder
+from armwright.cli.streams import open_console, plain_table, print_json
+from armwright.exceptions import SettingsError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from armwright.runs.recommendation import Recommendation
+    from armwright.runs.simulated_run import Simulator
+    from armwright.runs.simulation import SimulatedDesign
+
+
+def simulate(
+    run: RunFolder,
+    design: Annotated[int | None, typer.Option(help="Number of the design.")] = None,
+    recommended: Annotated[
+        bool, typer.Option("--recommended", help="The knee of the front and its two ends (the default).")
+    ] = False,
+    all_: Annotated[bool, typer.Option("--all", help="All designs of the front.")] = False,
+    json_: Json = False,
+) -> None:
+    """Drive designs of RUN through their cycle in MuJoCo (extra sim), and say which pass.
+
+    If a recommended design fails, the next one is tried.
+    """
+    import json
+
+    from armwright.report.simulation_figure import write_simulation_figure
+    from armwright.runs.folder import RunFolder as Folder
+    from armwright.runs.folder import read_run
+    from armwright.runs.simulated_run import SIMULATION, Simulator, simulation_record, write_simulated
+
+    if (design is not None) + recommended + all_ > 1:
+        raise SettingsError("--design, --recommended and --all choose the designs; use one of them")
+    _, history = read_run(run)
+    if design is not None and not 0 <= design < len(history):
+        raise SettingsError(f"--design {design}: {run} has the designs 0 to {len(history) - 1}")
+    simulator = Simulator(history)
+    choice = _simulate_chosen(simulator, design, all_)
+    members = [simulator.members[number] for number in sorted(simulator.members)]
+    record = simulation_record(members)
+    with Folder(run) as folder:
+        for member in members:
+            write_simulated(folder, member)
+        folder.write_text(SIMULATION, json.dumps(record, indent=2) + "\n")
+        for member in () if all_ else members:
+            write_simulation_figure(run, history.member(member.result.design).arm, member)
+    if json_:
+        print_json(record)
+        return
+    _show(open_console(), run, [member.result for member in members], choice)
+
+
+def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) -> "list[Recommendation]":
+    """Simulate the chosen designs; return the recommended ones if those were chosen."""
+    from armwright.runs.recommendation import recommend
+
+    if design is None and not every:
+        return recommend(simulator.history, lambda number: simulator(number).result)
+    for number in [member.number for member in simulator.history.front] if design is None else [design]:
+        simulator(number)
+    return []
+
+
+def _show(
+    console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: "Sequence[Recommendation]"
+) -> None:
+    from armwright.runs.results import DESIGNS
+    from armwright.runs.simulation import PASS, mujoco_version
+
+    numbers = ("cycle [s]", "energy [J]", "tip error [mm]", "without feed-forward", "peak torque / claimed")
+    table = plain_table("#", "verdict", *numbers, right=("#", *numbers))
+    for one in results:
+        off = [max((getattr(arrival, name) for arrival in one.targets), default=0.0) for name in ("tip_error", "droop")]
+        ratio = max(
+            (joint.peak_torque / joint.claimed_peak_torque for joint in one.joints if joint.claimed_peak_torque),
+            default=0.0,
+        )
+        cells = (f"{one.cycle_time:.2f}", f"{one.energy:.1f}", *(f"{1e3 * value:.2f}" for value in off), f"{ratio:.3f}")
+        table.add_row(str(one.design), one.verdict, *cells)
+    console.print(table)
+    for one in results:
+        for reason in one.reasons:
+            console.print(f"#{one.design}: {reason}")
+    for one in choice:
+        demoted = "".join(f"; #{other.design} was demoted: {other.reason}" for other in one.demoted)
+        console.print(f"{one.role}: #{one.design}, {one.status}{demoted}")
+    passed = sum(one.verdict == PASS for one in results)
+    console.print(f"{passed} of {len(results)} pass in MuJoCo {mujoco_version()}: {run / DESIGNS}/NNNN/simulation.csv")

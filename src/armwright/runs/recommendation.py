@@ -1,0 +1,68 @@
+"""The recommended designs of a front: its knee and its two ends, each verified in the simulator."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from armwright.runs.history import History
+from armwright.runs.selection import pick
+from armwright.runs.simulation import PASS, SimulatedDesign
+
+MAX_TRIED = 10  # designs for each role
+VERIFIED, NOT_SIMULATED = "verified", "not simulated"
+
+
+@dataclass(frozen=True)
+class Demoted:
+    """A design that was chosen first and failed in the simulator."""
+
+    design: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """A recommended design.
+
+    Attributes:
+        role: Why it is recommended: knee, or least OBJECTIVE.
+        design: Its number.
+        status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`.
+        demoted: The designs tried before.
+    """
+
+    role: str
+    design: int
+    status: str
+    demoted: tuple[Demoted, ...] = ()
+
+
+def candidates(history: History) -> dict[str, list[int]]:
+    """Return the designs of the front by role, the best first."""
+    if not history.front:
+        return {}
+    roles = {"knee": [member.number for member in pick(history)]}
+    objectives = history.problem.objectives
+    for index in (0, len(objectives) - 1):
+        by_value = sorted(history.front, key=lambda member: member.values[index])
+        roles[f"least {objectives[index].name}"] = [member.number for member in by_value]
+    return roles
+
+
+def recommend(history: History, simulate: Callable[[int], SimulatedDesign] | None) -> list[Recommendation]:
+    """Return the recommended designs; without a simulator, the first candidates."""
+    return [_recommended(role, numbers, simulate) for role, numbers in candidates(history).items()]
+
+
+def _recommended(
+    role: str, numbers: Sequence[int], simulate: Callable[[int], SimulatedDesign] | None
+) -> Recommendation:
+    if simulate is None:
+        return Recommendation(role, numbers[0], NOT_SIMULATED)
+    demoted: list[Demoted] = []
+    for number in numbers[:MAX_TRIED]:
+        result = simulate(number)
+        if result.verdict == PASS:
+            return Recommendation(role, number, VERIFIED, tuple(demoted))
+        demoted.append(Demoted(number, result.reasons[0]))
+    first, *others = demoted
+    return Recommendation(role, first.design, f"not verified: {first.reason}", tuple(others))
