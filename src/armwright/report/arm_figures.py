@@ -1,6 +1,7 @@
-"""Arms in three dimensions: the chosen designs at their targets, with moves, workspace and obstacles."""
+"""Arms in three dimensions: the chosen designs at their targets, with motions, workspace and obstacles."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from itertools import combinations, product
 from typing import Any
@@ -23,25 +24,29 @@ from armwright.tasks.targets import AXIS
 
 ARROW = 0.15  # length of a target's direction arrow, as a share of the arm's reach
 MAX_PANELS = 12
+COLUMNS = 42  # characters of a caption above one of several panels
+LINE_HEIGHT = 0.2  # [inches]
 
 # Lines
 MISS: Any = {"color": MISSED, "linewidth": 1.2, "linestyle": (0, (2, 2))}  # from the tip to a target not reached
 MOVE: Any = {"color": TARGET, "linewidth": 1.2}  # between two targets
-TIP: Any = {"color": FRONT, "linewidth": 1.4, "linestyle": (0, (3, 1))}  # path of the tip on a move
+TIP: Any = {"color": FRONT, "linewidth": 1.4, "linestyle": (0, (3, 1))}  # path of the tip on a motion
 EDGE: Any = {"color": "#8A8A8A", "linewidth": 0.8}  # of boxes to cover
 
 
 def draw_arms(history: History, chosen: Sequence[tuple[str, FrontMember]]) -> Figure:
     """Draw the chosen designs side by side, each with its postures at all targets."""
-    figure = Figure(figsize=(3.8 * len(chosen), 4.4))
+    captions = [f"{title}\n{_caption(history, member, COLUMNS)}" for title, member in chosen]
+    height = 3.8 + LINE_HEIGHT * max(caption.count("\n") + 1 for caption in captions)
+    figure = Figure(figsize=(3.8 * len(chosen), height))
     # The layout engines do not know how far the labels of a 3D plot reach.
-    figure.subplots_adjust(left=0.01, right=0.97, bottom=0.1, top=0.9, wspace=0.08)
+    figure.subplots_adjust(left=0.01, right=0.97, bottom=0.44 / height, top=3.96 / height, wspace=0.08)
     evaluation = history.evaluation([member.number for _, member in chosen])
     extent = _extent(evaluation, [member for _, member in chosen])
-    for column, (title, member) in enumerate(chosen):
+    for column, (_, member) in enumerate(chosen):
         axes: Any = figure.add_subplot(1, len(chosen), column + 1, projection="3d")
         _draw_panel(axes, member, evaluation, column, range(len(evaluation.targets)), extent)
-        axes.set_title(f"{title}\n{_caption(history, member)}", y=1.0)
+        axes.set_title(captions[column], y=1.0)
     _add_legend(figure, evaluation, is_narrow=len(chosen) == 1)
     return figure
 
@@ -180,11 +185,11 @@ def _add_legend(figure: Figure, evaluation: Evaluation, is_narrow: bool) -> None
     figure.legend(handles=handles, loc="lower center", ncols=3 if is_narrow else len(handles))
 
 
-def _caption(history: History, member: FrontMember) -> str:
+def _caption(history: History, member: FrontMember, columns: int = 200) -> str:
     length = sum(member.design.links)
     first = f"#{member.number} ({look(member.source).label}), {member.design.joints}, length {length:.2f} m"
     values = (
         f"{objective.label.lower()} {value:.4g}" + ("" if objective is TORQUE else f" {objective.unit}")
         for objective, value in zip(history.problem.objectives, member.values, strict=True)
     )
-    return f"{first}\n{', '.join(values)}"
+    return f"{first}\n{textwrap.fill(', '.join(values), columns)}"
