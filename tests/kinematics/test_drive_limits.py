@@ -18,9 +18,9 @@ from armwright.kinematics.drive_limits import (
     motion_load,
     torque_speed_utilisation,
 )
-from armwright.kinematics.dynamics import inverse_dynamics
 from armwright.robot.actuators import catalogue
 from armwright.spaces.design_space import DesignSpace
+from tests.support.dynamics import inverse_dynamics
 
 N, S, D = 400, 9, 3
 TIMES = np.geomspace(1e-2, 1e3, 3001)  # [s]
@@ -247,7 +247,7 @@ def test_time_optimal_motion_is_a_lower_bound() -> None:
         q, velocity, acceleration = (start + share[:, None] * line)[None], rate[:, None] * line, change[:, None] * line
         none = np.zeros(len(share))
         gravity = inverse_dynamics(arms, q, np.zeros_like(q), np.zeros_like(q), none)
-        inertial = inverse_dynamics(arms, q, velocity[None], acceleration[None], none, gravity=0.0)
+        inertial = inverse_dynamics(arms, q, velocity[None], acceleration[None], none, gravity=False)
         load = motion_load(gravity, inertial, velocity[None], acceleration[None], motors)
         (time,) = least_time(load, motors)
         bound = fastest_by_toppra(arms, motors, start, end)

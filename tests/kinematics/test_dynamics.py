@@ -1,4 +1,4 @@
-"""Dynamics against Pinocchio, MuJoCo, closed forms and finer steps."""
+"""Inverse dynamics against Pinocchio, MuJoCo and energy."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,21 +11,15 @@ import pytest
 from numpy.typing import NDArray
 
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
-from armwright.kinematics.dynamics import inverse_dynamics
 from armwright.kinematics.forward import forward_kinematics
 from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
 from armwright.robot.link_geometry import inertia_tensor
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
-from armwright.tasks.task import Task
+from tests.support.dynamics import inverse_dynamics
 from tests.support.exported_arms import a_body
 
 Array = NDArray[np.float64]
-CORNERS = ((0.35, 0.1, 0.3), (0.1, 0.45, 0.2), (0.3, -0.3, 0.3))
-
-
-def task(**more: Any) -> Task:
-    return Task.model_validate({"name": "moves", "targets": CORNERS, "moves": "in_order", **more})
 
 
 def any_arms(n: int, seed: int) -> list[Arm]:
@@ -132,7 +126,7 @@ def test_power_equals_change_of_energy() -> None:
         at = q + v * t + 0.5 * a * t**2
         # v' M v / 2 from torques without gravity, of an acceleration v; and height from gravity as the only force
         speed = v + a * t
-        kinetic = 0.5 * (speed * inverse_dynamics(arrays, at, 0.0 * v, speed, load, 0.0)).sum(axis=(1, 2))
+        kinetic = 0.5 * (speed * inverse_dynamics(arrays, at, 0.0 * v, speed, load, gravity=False)).sum(axis=(1, 2))
         frames = forward_kinematics(arrays, at)
         bodies = arrays.rigid_bodies
         heights = (frames.position + (frames.rotation @ bodies.com[:, None, :, :, None])[..., 0])[..., 2]

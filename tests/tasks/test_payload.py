@@ -7,7 +7,6 @@ import pinocchio
 import pytest
 
 from armwright.kinematics.arm_arrays import carrying, stack_arms
-from armwright.kinematics.dynamics import inverse_dynamics
 from armwright.kinematics.ik import solve_postures
 from armwright.llm.prompt import load_prompt
 from armwright.problem.evaluation import evaluate
@@ -17,6 +16,7 @@ from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.payload import Payload
 from armwright.tasks.task import Task
+from tests.support.dynamics import inverse_dynamics
 from tests.support.exported_arms import ARMS, Peer, full, load, moving, postures
 
 BOX = Payload(mass=0.8, center=(0.02, -0.01, 0.05), size=(0.06, 0.04, 0.1))

@@ -8,7 +8,6 @@ import pinocchio
 import pytest
 
 from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.dynamics import inverse_dynamics
 from armwright.kinematics.forward import joint_positions
 from armwright.kinematics.ik import solve_postures
 from armwright.problem.problem import Problem
@@ -18,6 +17,7 @@ from armwright.spaces.design_space import paper_space
 from armwright.spaces.tool_mount import with_tool
 from armwright.tasks.task import Task
 from armwright.tasks.tool import Tool
+from tests.support.dynamics import inverse_dynamics
 from tests.support.exported_arms import ARMS, full, load, moving, peer_of, postures
 
 NO_INERTIA = MountedTool().inertia
