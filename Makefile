@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constr
 demo: .venv/.run  ## replay a language model's proposals for target-1, then design an arm with real motors
 	$(BIN)/armwright optimize target-1 --proposer replay:target-1-plus-seed0 --out runs/demo-model
 	$(BIN)/armwright design examples/2-assembly-task.yaml --space examples/2-assembly-space.yaml --out runs/demo-arm
-	$(BIN)/armwright pick runs/demo-arm --where "worst_error<=0.001" --where "torque_utilisation<1" --by torque_utilisation
+	$(BIN)/armwright pick runs/demo-arm --robust --by cycle_time
 
 test: .venv/.test  ## the fast tests: two minutes on two cores, without browser and other processes
 	$(BIN)/python -m pytest -m "not slow"
