@@ -89,7 +89,7 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
             holding[group.index, i - 1] = of_motions[i].gravity[:, 0]
         if not plan.cycle.closed:
             holding[group.index, -1] = of_motions[-1].gravity[:, -1]
-    return CycleLoads(durations, _dwells(plan), torques, speeds, holding)
+    return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding)
 
 
 def _load(terms: TorqueTerms, arms: ArmArrays) -> MotionLoad:
@@ -143,10 +143,3 @@ def _durations(arms: ArmArrays, plan: CyclePlan, loads: Sequence[MotionLoad]) ->
         if time is not None:
             durations[:, own] *= time / durations[:, own].sum(axis=1, keepdims=True)
     return durations
-
-
-def _dwells(plan: CyclePlan) -> Array:
-    """Return the (M,) time at rest after each motion [s]."""
-    return np.array(
-        [plan.cycle.dwell if motion.arrives and plan.cycle.steps[motion.step].do else 0.0 for motion in plan.motions]
-    )

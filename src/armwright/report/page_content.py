@@ -18,6 +18,7 @@ from armwright.experiments.run_summary import describe_method
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pareto import hypervolume
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
+from armwright.report.page_cycles import cycle_motions, cycle_of_design
 from armwright.report.repeat_command import repeat_command
 from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LABEL, MISSED, OBSTACLE, TARGET, look
 from armwright.robot.arm import AXES, Arm, Joint, Link
@@ -50,6 +51,7 @@ class RunContent:
         self._reader = TrialsReader(folder, self.config)
         self._chunks: list[tuple[int, Arrays]] = []  # chunks of designs, by the number of the first
         self._n = 0
+        self._cycle_of: dict[int, dict[str, Any]] = {}  # of designs that are or were on the front
         self.history = self._nothing()
         self.refresh()
 
@@ -64,7 +66,7 @@ class RunContent:
         self.config = read_config(self.folder)  # the reference point may have been chosen since
         is_other = self._reader.read_on() or len(self._reader.trials) < self._n
         if is_other:
-            self._chunks, self._n, self.history = [], 0, self._nothing()
+            self._chunks, self._n, self._cycle_of, self.history = [], 0, {}, self._nothing()
         summary = read_summary(self.folder)
         # A summary of another kind of run does not belong to this one.
         self.summary = summary if summary is not None and ("search" in summary) == (self.study is None) else None
@@ -103,6 +105,7 @@ class RunContent:
             "designs_from": designs_from,
             "front": front,
             "arms": {number: _of_arm(self.history, number) for number in front},
+            "cycles": self._cycles(),
             "proposals": _proposals(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
             "looks": {trial.source: look(trial.source)._asdict() for trial in self.history},
@@ -114,6 +117,17 @@ class RunContent:
             "files": {number: design_files(self.history, number) for number in front} if with_files else {},
         }
         return pack(head, {**arrays, "curve": self.history.hypervolumes})
+
+    def _cycles(self) -> dict[int, dict[str, Any]]:
+        """Return how the designs of the front move through the cycle of the task; empty without one."""
+        if self.config.task.cycle is None:
+            return {}
+        new = [member for member in self.history.front if member.number not in self._cycle_of]
+        if new:
+            evaluation = self.history.evaluation([member.number for member in new])
+            for row, member in enumerate(new):
+                self._cycle_of[member.number] = cycle_of_design(evaluation, row, len(member.arm.joints))
+        return {member.number: self._cycle_of[member.number] for member in self.history.front}
 
 
 def _existing_arms(folder: Path, history: History) -> list[dict[str, Any]]:
@@ -229,6 +243,8 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "workspace": [{"low": r.low, "high": r.high, "description": r.describe()} for r in task.workspace],
         "cycle": task.cycle_description,
         "lines": _lines(task),
+        "motions": cycle_motions(task),
+        "is_closed": task.cycle is not None and task.cycle.closed,
         "reference_point": reference,
         "constraints": [
             {

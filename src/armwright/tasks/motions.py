@@ -158,6 +158,12 @@ class CyclePlan:
         return tuple(index for index in order if self.motions[index].by == "joint")
 
     @property
+    def dwells(self) -> tuple[float, ...]:
+        """Time at rest after each motion [s]."""
+        picks_or_places = [motion.arrives and self.cycle.steps[motion.step].do is not None for motion in self.motions]
+        return tuple(self.cycle.dwell if rests else 0.0 for rests in picks_or_places)
+
+    @property
     def is_loop(self) -> bool:
         """True for a closed cycle of lines alone, which has to end in the posture where it began."""
         return self.cycle.closed and not self.joint_motions

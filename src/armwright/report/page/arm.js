@@ -1,5 +1,6 @@
 // The selected arm in space, in one posture for each target.
 
+import { during } from "./cycle.js";
 import { describeMiss, postures, why } from "./design.js";
 import { PRISMATIC, chain, length, rail } from "./kinematics.js";
 import { solidParts } from "./solids.js";
@@ -24,6 +25,7 @@ let materials = {};
 let frame = null; // { centre, radius } of the visible scene
 let moving = null; // { from, to, began } in joint space
 let playing = false;
+let began = null; // time [ms] at which the played cycle began; null while not moving along one
 let turned = false; // whether the user has rotated the view
 let unit = {}; // unit shapes, shared by all parts
 
@@ -55,8 +57,11 @@ export function openArm(shownContent) {
     for (const id of ["ghost", "reset", "play"]) $(id).disabled = true;
   }
   listen((changed) => {
-    if (changed.has("target") && !changed.has("design")) move();
-    else if (changed.has("design") || changed.has("target") || changed.has("compared")) drawArm();
+    const isDriven = began !== null;
+    if (changed.has("target") && !changed.has("design")) {
+      if (!isDriven) move();
+    } else if (changed.has("design") || changed.has("compared")) drawArm();
+    if (changed.has("design") && playing && (isDriven || during(content.head, state.design, 0) !== null)) play(true);
     if (changed.size) describeTarget();
   });
   drawArm();
@@ -338,10 +343,7 @@ export function drawArm() {
   const shape = { link: materials.link, joints: materials.joints, base: materials.base };
   const tip = drawPosture(groups.arm, arm, content.q(state.design, state.target), shape);
   gap(tip);
-  groups.targets.children.forEach((mesh, t) => {
-    mesh.material = t === state.target ? materials.now : posed[t].missed ? materials.missed : materials.reached;
-    mesh.scale.setScalar((t === state.target ? 1.6 : 1) * ballSize());
-  });
+  paintTargets(posed);
   empty(groups.ghost);
   if ($("ghost").checked) {
     posed.forEach((one, t) => {
@@ -359,6 +361,13 @@ export function drawArm() {
   render();
 }
 
+function paintTargets(posed = postures(state.design)) {
+  groups.targets.children.forEach((mesh, t) => {
+    mesh.material = t === state.target ? materials.now : posed[t].missed ? materials.missed : materials.reached;
+    mesh.scale.setScalar((t === state.target ? 1.6 : 1) * ballSize());
+  });
+}
+
 // Draws the line from the tip to a missed target.
 function gap(tip) {
   const target = content.targets[state.target];
@@ -373,13 +382,15 @@ function move() {
   const to = Array.from(content.q(state.design, state.target));
   const from = moving?.now ?? moving?.to ?? lastPosture ?? to;
   lastPosture = to;
-  if (matchMedia("(prefers-reduced-motion: reduce)").matches) {
+  if (isStill()) {
     drawArm();
     return;
   }
   moving = { from, to, began: performance.now(), now: from };
   requestAnimationFrame(tick);
 }
+
+const isStill = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 let lastPosture = null;
 
@@ -399,6 +410,7 @@ function tick(now) {
 
 function step(by) {
   if (state.design === null) return;
+  if (began !== null) play(false);
   const n = content.targets.length;
   lastPosture = Array.from(content.q(state.design, state.target));
   set({ target: (state.target + by + n) % n });
@@ -410,10 +422,33 @@ let beat = null;
 function play(on) {
   playing = on;
   clearInterval(beat);
-  beat = on ? setInterval(() => step(1), MOVE + REST) : null;
+  beat = began = null;
   $("play").setAttribute("aria-pressed", on);
   $("play").textContent = on ? "Stop" : "Play";
-  if (on) step(1);
+  if (!on) drawArm();
+  else if (during(content.head, state.design, 0) !== null && !isStill()) {
+    began = performance.now();
+    requestAnimationFrame(drive);
+  } else {
+    beat = setInterval(() => step(1), MOVE + REST);
+    step(1);
+  }
+}
+
+// Draws the arm on its way through the cycle, in real time.
+function drive(now) {
+  if (began === null) return;
+  const at = during(content.head, state.design, Math.max(0, now - began) / 1000);
+  if (at === null) { // it has left the front
+    play(true);
+    return;
+  }
+  set({ target: at.target });
+  empty(groups.ghost);
+  drawPosture(groups.arm, content.arm(state.design), at.q, { link: materials.link, joints: materials.joints, base: materials.base });
+  paintTargets();
+  render();
+  requestAnimationFrame(drive);
 }
 
 function describeTarget() {

@@ -3,6 +3,7 @@
 import { drawArm, drawnJoints, drawnObstacles, openArm } from "./arm.js";
 import { Content, embedded } from "./content.js";
 import { drawCurve, openCurve } from "./curve.js";
+import { during } from "./cycle.js";
 import { drawDesign, openDesign, postures } from "./design.js";
 import { drawConfiguration, drawHeader, openHeader } from "./header.js";
 import { fileFetcher, openLive } from "./live.js";
@@ -84,5 +85,5 @@ async function start() {
 }
 
 // For the console and for tests.
-window.armwright = { content, state, set, postures, drawnJoints, drawnObstacles, drawArm };
+window.armwright = { content, state, set, postures, during, drawnJoints, drawnObstacles, drawArm };
 start();
