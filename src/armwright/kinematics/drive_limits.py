@@ -16,6 +16,7 @@ from armwright.kinematics.actuation import Actuation
 
 MAX_RATE = 1e9  # [1/s] of motions without any limit, which take no time
 ALLOWED = 1.0 + 1e-10  # of a limit relative to the peak torque
+STILL = 1e-6  # [rad] or [m] in a duration of 1 s; a joint that rests moves by less, from rounding
 ROUNDING = 1e-13  # of a sum relative to its terms
 
 
@@ -52,7 +53,7 @@ def motion_load(gravity: Array, inertial: Array, velocity: Array, acceleration: 
     coulomb, viscous, rotor = (each[:, None] for each in (drives.coulomb, drives.viscous, drives.rotor_inertia))
     return MotionLoad(
         gravity=gravity,
-        coulomb=coulomb * np.sign(velocity),
+        coulomb=coulomb * np.sign(np.where(np.abs(velocity) > STILL, velocity, 0.0)),
         viscous=viscous * velocity,
         inertial=inertial + rotor * acceleration,
         velocity=velocity,
