@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
+from armwright.kinematics.arm_arrays import ArmArrays, carrying, stack_arms
 from armwright.kinematics.cycle_path import CyclePaths, find_paths
-from armwright.robot.arm import Arm
+from armwright.robot.arm import Actuator, Arm
 from armwright.tasks.motions import CyclePlan
 from armwright.tasks.task import Task
 from tests.support.exported_arms import Peer, moving, odd_arms, peer_of
@@ -33,7 +33,7 @@ class Case:
         return [peer_of(arm) for arm in self.arms]
 
 
-def random_task(arm: Arm, kind: str, rng: np.random.Generator, **cycle: Any) -> Task:
+def random_task(arm: Arm, kind: str, rng: np.random.Generator, picks: bool = False, **cycle: Any) -> Task:
     """Three poses of the arm, each near the one before: a line, a joint motion, and a line or joint motion back."""
     joints = [joint for _, joint in moving(arm)]
     lower, upper = (np.array([getattr(joint, end) for joint in joints]) for end in ("lower", "upper"))
@@ -50,14 +50,19 @@ def random_task(arm: Arm, kind: str, rng: np.random.Generator, **cycle: Any) -> 
         q = np.clip(q + rng.uniform(-0.1, 0.1, len(joints)) * (upper - lower), lower, upper)
     by = rng.choice(["line", "joint"], 3).tolist()
     by[1] = "line"
-    steps = [{"to": number, "by": how} for number, how in enumerate(by, start=1)]
+    actions = ("pick", "place", None) if picks else (None, None, None)
+    steps = [{"to": n, "by": how, "do": do} for n, (how, do) in enumerate(zip(by, actions, strict=True), start=1)]
     return Task.model_validate({"name": "random", "targets": targets, "cycle": {"steps": steps, **cycle}})
 
 
-def random_case(dof: int, kind: str, seed: int, n: int = 3, **cycle: Any) -> Case:
-    arms = tuple(map(_with_short_slides, odd_arms(n, dof, seed)))
+def random_case(
+    dof: int, kind: str, seed: int, n: int = 3, payload: Any = 0.0, drive: Actuator | None = None, **cycle: Any
+) -> Case:
+    """Arms along a random cycle; payload: as in a task file; drive: of all joints that move."""
+    arms = tuple(_with_drive(_with_short_slides(arm), drive) for arm in odd_arms(n, dof, seed))
     task = random_task(arms[0], kind, np.random.default_rng([seed, dof]), **cycle)
-    arrays, plan = stack_arms(arms, "float64"), task.plan(task.target_positions)
+    task = Task.model_validate({**task.model_dump(), "payload": payload})
+    arrays, plan = carrying(stack_arms(arms, "float64"), task.load_shape), task.plan(task.target_positions)
     return Case(task, arms, arrays, plan, find_paths(arrays, plan))
 
 
@@ -67,6 +72,11 @@ def _with_short_slides(arm: Arm) -> Arm:
         replace(joint, lower=0.15 * joint.lower, upper=0.15 * joint.upper) if joint.kind == "prismatic" else joint
         for joint in arm.joints
     )
+    return replace(arm, joints=tuple(joints))
+
+
+def _with_drive(arm: Arm, drive: Actuator | None) -> Arm:
+    joints = (joint if joint.kind == "fixed" else replace(joint, actuator=drive) for joint in arm.joints)
     return replace(arm, joints=tuple(joints))
 
 

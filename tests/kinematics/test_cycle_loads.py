@@ -1,0 +1,254 @@
+"""Torques along cycles, against Pinocchio, MuJoCo and finer integration."""
+
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+
+from armwright.kinematics.cycle_loads import INSTANTS, CycleLoads, cycle_loads
+from armwright.kinematics.motion_path import MotionPath
+from armwright.kinematics.torque_terms import torque_terms
+from armwright.robot.arm import Actuator, Arm
+from armwright.robot.mjcf import to_mjcf
+from armwright.tasks.payload import Payload
+from tests.support.cycles import Case, own_joints, random_case, tolerated
+from tests.support.exported_arms import Peer, load, moving, peer_of
+from tests.support.reference_kinematics import Array
+
+PAYLOAD = {"mass": 0.8, "center": [0.02, -0.01, 0.05], "size": [0.06, 0.04, 0.1]}
+CASES = [(3, "position"), (4, "axis"), (5, "position"), (6, "axis"), (6, "orientation"), (7, "position")]
+CYCLE: dict[str, Any] = {"picks": True, "payload": PAYLOAD, "dwell": 0.3}
+INERTIA, COULOMB, VISCOUS = 0.02, 0.3, 0.1  # of the rotor [kg m²], [N m], [N m s/rad]
+DRIVE = Actuator(
+    "drive",
+    0.3,
+    60.0,
+    8.0,
+    continuous_torque=20.0,
+    corner_speed=0.0,
+    rotor_inertia=INERTIA,
+    coulomb_friction=COULOMB,
+    viscous_friction=VISCOUS,
+    voltage=24.0,
+)
+
+
+@cache
+def case(dof: int, kind: str, driven: bool = False, time: float = 1.5) -> Case:
+    return random_case(dof, kind, seed=7, drive=DRIVE if driven else None, time=time, **CYCLE)
+
+
+def loads(found: Case) -> CycleLoads:
+    return cycle_loads(found.paths, torque_terms(found.paths, found.task.payloads.max()))
+
+
+def carrying_peer(arm: Arm, payload: Any, carries: bool) -> Peer:
+    """Pinocchio's model of an arm, with the payload in its tip frame if it carries it."""
+    peer = peer_of(arm)
+    if carries:
+        frame = peer.model.frames[peer.model.getFrameId("tip")]
+        gyration = np.diag(payload.shape.gyration)
+        body = pinocchio.Inertia(payload.mass, np.array(payload.center), payload.mass * gyration)
+        peer.model.appendBodyToJoint(frame.parentJoint, body, frame.placement)
+        peer.data = peer.model.createData()
+    return peer
+
+
+def rnea(peer: Peer, q: Array, v: Array, a: Array) -> Array:
+    """(S, D) torques [N m] of S states."""
+    return np.array([pinocchio.rnea(peer.model, peer.data, *state) for state in zip(q, v, a, strict=True)])
+
+
+def profile(tau: Array) -> tuple[Array, Array, Array]:
+    """Share of the way at shares of the time, and its derivatives: 10 τ³ - 15 τ⁴ + 6 τ⁵."""
+    polynomial = np.polynomial.Polynomial([0, 0, 0, 10, -15, 6])
+    return polynomial(tau), polynomial.deriv()(tau), polynomial.deriv(2)(tau)
+
+
+def states(arm: Arm, path: MotionPath, tau: Array, duration: float) -> tuple[Array, Array, Array]:
+    """(F, D) values, speeds and accelerations of the joints that move, at shares of the time of a motion."""
+    s, rate, change = profile(tau)
+    q, q_s, q_ss = (own_joints(arm, np.broadcast_to(path.at(s, n), (1, len(s), path.q.shape[2]))[0]) for n in range(3))
+    rate, change = rate[:, None] / duration, change[:, None] / duration**2
+    return q, q_s * rate, q_ss * rate**2 + q_s * change
+
+
+@pytest.mark.parametrize(("dof", "kind"), CASES)
+def test_torque_terms_agree_with_pinocchio(dof: int, kind: str) -> None:
+    """Gravity, Coriolis terms and the mass matrix, with a tool, with and without the payload."""
+    found = case(dof, kind)
+    terms = torque_terms(found.paths, found.task.payloads.max())
+    carried = {motion.carries for motion in found.plan.motions}
+    assert carried == {True, False}
+    for group, of_motions in zip(found.paths.groups, terms, strict=True):
+        for at, row in enumerate(group.index):
+            arm = found.arms[row]
+            for path, part in zip(group.paths, of_motions, strict=True):
+                peer = carrying_peer(arm, found.task.payload, path.motion.carries)
+                some = np.linspace(0, len(path.share) - 1, 4).astype(int)
+                q, q_s, q_ss = (own_joints(arm, values[at, some]) for values in (path.q, part.q_s, part.q_ss))
+                still = np.zeros_like(q)
+                gravity = rnea(peer, q, still, still)
+                push = np.array([peer.mass_matrix(a) @ b for a, b in zip(q, q_s, strict=True)])
+                drag = rnea(peer, q, q_s, q_ss) - gravity
+                size = load(arm) + np.abs(q_s).max() ** 2 + np.abs(q_ss).max()
+                for mine, theirs in ((part.gravity, gravity), (part.drag, drag), (part.push, push)):
+                    assert own_joints(arm, mine[at, some]) == pytest.approx(theirs, rel=1e-7, abs=1e-8 * size)
+
+
+@pytest.mark.parametrize(("dof", "kind"), CASES)
+def test_torques_in_motion_agree_with_mujoco(dof: int, kind: str) -> None:
+    """With the rotors as armature, viscous friction as damping, and Coulomb friction by hand.
+
+    Between samples, torques are interpolated; half way and at the ends, samples are exact.
+    """
+    found = case(dof, kind, driven=True)
+    of_cycle, tau = loads(found), np.linspace(0.0, 1.0, INSTANTS)
+    left_out: list[float] = []
+    for row, arm in enumerate(found.arms):
+        own = [joint for _, joint in moving(arm)]
+        travel = np.array([joint.travel for joint in own])
+        model = mujoco.MjModel.from_xml_string(to_mjcf(arm))
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
+        model.dof_armature[:] = INERTIA / travel**2
+        model.dof_damping[:] = VISCOUS / travel**2
+        data = mujoco.MjData(model)
+        for i, path in enumerate(found.paths.of_arm(row)[1]):
+            if path.motion.carries:
+                continue
+            q, v, a = states(arm, path, tau, of_cycle.durations[row, i])
+            theirs = np.empty_like(q)
+            for k in range(INSTANTS):
+                data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
+                mujoco.mj_inverse(model, data)
+                theirs[k] = data.qfrc_inverse + COULOMB / travel * np.sign(v[k]) * (np.abs(v[k]) > 1e-9)
+            mine = own_joints(arm, of_cycle.torques[row, i])
+            barely = (np.abs(v) > 1e-9) & (np.abs(v) < 1e-3)  # where the sign of the interpolated speed is not certain
+            mine, theirs = np.where(barely, 0.0, mine), np.where(barely, 0.0, theirs)
+            left_out.append(barely.mean())
+            size = np.abs(theirs).max()
+            exact = [0, INSTANTS // 2, INSTANTS - 1]
+            assert mine[exact] == pytest.approx(theirs[exact], rel=1e-6, abs=1e-6 * size)
+            assert mine == pytest.approx(theirs, abs=0.05 * size)
+    assert np.mean(left_out) < 0.5
+
+
+@pytest.mark.parametrize(("dof", "kind"), CASES)
+def test_speeds_integrate_to_the_motion_from_rest_to_rest(dof: int, kind: str) -> None:
+    found = case(dof, kind)
+    of_cycle = loads(found)
+    assert not of_cycle.speeds[:, :, [0, -1]].any()
+    good = np.flatnonzero(tolerated(found.paths))
+    assert len(good)
+    for row in good:
+        for i, path in enumerate(found.paths.of_arm(row)[1]):
+            moved = np.trapezoid(of_cycle.speeds[row, i], dx=of_cycle.durations[row, i] / (INSTANTS - 1), axis=0)
+            change = path.q[0, -1] - path.q[0, 0]
+            assert moved == pytest.approx(change, abs=2e-3 * np.abs(path.q).max() + 1e-6)
+
+
+def test_durations_of_the_motions_of_a_step_add_up_to_its_time() -> None:
+    found = random_case(6, "axis", seed=7, time=1.5, approach=0.03, **CYCLE)
+    of_cycle = loads(found)
+    for step in range(3):
+        own = [i for i, motion in enumerate(found.plan.motions) if motion.step == step]
+        assert len(own) >= 2
+        assert of_cycle.durations[:, own].sum(axis=1) == pytest.approx(1.5)
+    assert of_cycle.cycle_time == pytest.approx(3 * 1.5 + 2 * 0.3)  # dwells after pick and place
+
+
+def test_torques_of_motion_grow_with_the_square_of_speed() -> None:
+    slow, fast = loads(case(6, "axis", time=3.0)), loads(case(6, "axis", time=1.5))
+    holding = loads(case(6, "axis", time=1e4)).torques
+    assert fast.durations * 2.0 == pytest.approx(slow.durations)
+    assert fast.torques - holding == pytest.approx(4.0 * (slow.torques - holding), rel=1e-4, abs=1e-4)
+    assert fast.speeds == pytest.approx(2.0 * slow.speeds)
+
+
+def test_drives_add_inertia_and_friction_at_the_joint() -> None:
+    """By hand, of the same path without drives; a joint that does not move has no friction."""
+    found, bare = case(5, "position", driven=True), case(5, "position")
+    of_drives, without = loads(found), loads(bare)
+    assert of_drives.durations == pytest.approx(without.durations)
+    half, signs = INSTANTS // 2, set[float]()
+    for row, arm in enumerate(found.arms):
+        scale = own_joints(arm, found.arrays.travel[[row]])
+        for i, path in enumerate(found.paths.of_arm(row)[1]):
+            _, v, a = states(arm, path, np.array([0.5]), of_drives.durations[row, i])
+            direction = np.where(np.abs(v) > 1e-6, np.sign(v), 0.0)
+            extra = INERTIA / scale**2 * a + VISCOUS / scale**2 * v + COULOMB / scale * direction
+            added = own_joints(arm, (of_drives.torques - without.torques)[row, i, [half]])
+            assert added == pytest.approx(extra, rel=1e-6, abs=1e-6 * max(1.0, np.abs(extra).max()))
+            signs |= set(direction.ravel().tolist())
+    assert signs == {-1.0, 0.0, 1.0}
+
+
+@pytest.mark.parametrize(("dof", "kind"), CASES)
+def test_rms_torques_agree_with_fine_integration(dof: int, kind: str) -> None:
+    """Pinocchio's torques at 801 instants of each motion, and the holding torques of the dwells."""
+    found = case(dof, kind)
+    of_cycle, tau = loads(found), np.linspace(0.0, 1.0, 801)
+    good = np.flatnonzero(tolerated(found.paths))
+    assert len(good)
+    for row in good:
+        arm = found.arms[row]
+        total = np.zeros(len(moving(arm)))
+        motions = found.paths.of_arm(row)[1]
+        for i, path in enumerate(motions):
+            duration = of_cycle.durations[row, i]
+            peer = carrying_peer(arm, found.task.payload, path.motion.carries)
+            torques = rnea(peer, *states(arm, path, tau, duration))
+            total += np.trapezoid(torques**2, dx=duration / 800, axis=0)
+            if of_cycle.dwells[i]:
+                after = motions[(i + 1) % len(motions)]
+                rest = carrying_peer(arm, found.task.payload, after.motion.carries)
+                total += of_cycle.dwells[i] * rest.gravity(own_joints(arm, after.q[0])[0]) ** 2
+        expected = np.sqrt(total / of_cycle.cycle_time[row])
+        assert own_joints(arm, of_cycle.rms_torques[[row]])[0] == pytest.approx(
+            expected, rel=0.01, abs=0.002 * expected.max()
+        )
+
+
+def test_dwells_hold_what_was_picked() -> None:
+    found = case(6, "axis")
+    of_cycle = loads(found)
+    dwells = {motion.step: dwell for motion, dwell in zip(found.plan.motions, of_cycle.dwells, strict=True)}
+    assert dwells == {0: 0.3, 1: 0.3, 2: 0.0}  # pick, place, neither
+    payload = found.task.payload
+    assert isinstance(payload, Payload)
+    for row, arm in enumerate(found.arms):
+        for i, path in enumerate(found.paths.of_arm(row)[1]):
+            carries = path.motion.step == 0  # it arrives with nothing, and picks
+            q = own_joints(arm, path.q[0])[-1]
+            expected = carrying_peer(arm, payload, carries).gravity(q)
+            assert own_joints(arm, of_cycle.holding[row, [i]])[0] == pytest.approx(expected, abs=1e-7 * load(arm))
+
+
+def test_open_cycles_dwell_where_they_end() -> None:
+    found = random_case(6, "axis", seed=7, time=1.5, closed=False, **CYCLE)
+    of_cycle = loads(found)
+    assert [m.step for m in found.plan.motions] == [1, 2]
+    assert of_cycle.dwells.tolist() == [0.3, 0.0]
+    arm, (_, motions) = found.arms[0], found.paths.of_arm(0)
+    q = own_joints(arm, motions[-1].q[0])[-1]
+    expected = carrying_peer(arm, found.task.payload, carries=False).gravity(q)
+    assert own_joints(arm, of_cycle.holding[[0], -1])[0] == pytest.approx(expected, abs=1e-7 * load(arm))
+
+
+def test_speeds_of_joint_motions_follow_the_profile_exactly() -> None:
+    _, rate, _ = profile(np.linspace(0.0, 1.0, INSTANTS))
+    seen = 0
+    for key in CASES:
+        found = case(*key)
+        of_cycle = loads(found)
+        for row in range(len(found.arms)):
+            for i, path in enumerate(found.paths.of_arm(row)[1]):
+                if path.motion.by == "joint":
+                    expected = rate[:, None] * (path.q[0, -1] - path.q[0, 0]) / of_cycle.durations[row, i]
+                    assert of_cycle.speeds[row, i] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+                    seen += 1
+    assert seen
