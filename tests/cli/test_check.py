@@ -83,3 +83,25 @@ def test_fixed_and_tied_parameters_are_not_free() -> None:
     space = DesignSpace.model_validate({"origin_z": [0.0, 0.0], "tie": {"link_2": "link_1"}})
     names = {parameter.name for parameter in free_parameters(space)}
     assert names == {p.name for p in space.parameters} - {"origin_z", "link_2"}
+
+
+def test_cycle_is_shown_with_its_durations_and_constraints(in_folder: Path) -> None:
+    steps = "[{to: bin, do: pick}, {to: 2, by: line, do: place, time: 2.5}]"
+    (in_folder / "task.yaml").write_text(
+        "name: cell\ntargets: [{name: bin, position: [0.2, 0, 0.3], axis: [0, 0, -1]}, "
+        "{position: [0, 0.2, 0.3], axis: [0, 0, -1]}]\n"
+        f"cycle: {{dwell: 0.2, time: 1.5, tolerance: {{path: 0.003}}, steps: {steps}}}\n"
+        "constraints: [clearance >= 0.01]\n"
+    )
+    (in_folder / "space.yaml").write_text("joints: 5\nactuators: [XM430-W350]\n")
+    bounds = ["unreached_targets <= 0", "path_error <= 0.003", "path_angle <= 0.02", "jumps <= 0"]
+    drives = ["dynamic_utilisation <= 1", "speed_utilisation <= 1", "thermal_utilisation <= 1", "voltages <= 1"]
+    shown = armwright("tasks", "task.yaml").stdout
+    assert "cycle: bin (pick), by a line to 2 (place), by a joint motion back to bin" in shown
+    assert "durations: 2.5 s, 1.5 s; 0.2 s at rest after each pick and place" in shown
+    assert f"constraints of the cycle: {', '.join(bounds)}\n" in shown
+    checked = armwright("check", "task.yaml", "--space", "space.yaml")
+    assert checked.returncode == 0, checked.stderr
+    assert f"constraints of the cycle: {', '.join([*bounds, *drives])}\n" in checked.stdout
+    record = json.loads(armwright("check", "task.yaml", "--space", "space.yaml", "--json").stdout)
+    assert record["constraints"] == ["clearance >= 0.01", *bounds, *drives]

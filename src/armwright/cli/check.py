@@ -49,7 +49,7 @@ def check_problem(problem: Problem) -> dict[str, Any]:
 def show_check(console: Console, problem: Problem) -> None:
     """Print what a task and a space mean."""
     record = check_problem(problem)
-    show_task(console, problem.task, None, ())
+    show_task(console, problem.task, has_drives=problem.has_drives)
     minimised = ", ".join(f"{objective.name} [{objective.unit}]" for objective in problem.objectives)
     console.print(f"  minimised: {minimised}")
     space = record["space"]

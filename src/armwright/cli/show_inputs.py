@@ -11,6 +11,7 @@ from rich.text import Text
 from armwright.cli.streams import format_point, plain_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.llm.draft import Draft
+from armwright.problem.constraints import cycle_constraints
 from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import describe_targets
@@ -72,7 +73,13 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
     console.print(table)
 
 
-def show_task(console: Console, task: DesignTask, best_known: float | None, stored: Sequence[Baseline]) -> None:
+def show_task(
+    console: Console,
+    task: DesignTask,
+    best_known: float | None = None,
+    stored: Sequence[Baseline] = (),
+    has_drives: bool = False,
+) -> None:
     """Print a task.
 
     Args:
@@ -80,6 +87,7 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
         task: The task.
         best_known: Its best known hypervolume, if any.
         stored: Its baselines.
+        has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
     """
     reference = task.reference_point
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
@@ -97,6 +105,7 @@ def show_task(console: Console, task: DesignTask, best_known: float | None, stor
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
         ("cycle", task.cycle_description),
         ("durations", task.cycle.describe_times() if task.cycle else ""),
+        ("constraints of the cycle", ", ".join(cycle_constraints(task, has_drives))),
         *(("workspace", region.describe()) for region in task.workspace),
         ("reference point", "chosen from the first random trials" if reference is None else format_point(reference)),
         ("provenance", task.provenance),
@@ -120,7 +129,7 @@ def _describe_payload(task: DesignTask) -> str:
 
 def show_draft(console: Console, draft: Draft) -> None:
     """Print a drafted task and space, the assumptions and the next commands."""
-    show_task(console, draft.task, None, ())
+    show_task(console, draft.task)
     if draft.space is None:
         console.print("design space: the default; no space file is needed")
     else:

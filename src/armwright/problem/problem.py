@@ -88,7 +88,7 @@ class Problem:
     """Find the arms of a design space that serve a task best.
 
     Attributes:
-        task: targets, moves, tool, payloads, obstacles and constraints.
+        task: targets, cycle, tool, payloads, obstacles and constraints.
         space: the designs to choose from.
         tolerance: build tolerance [m]. Above 0, each objective of a design is the worst of the exact arm and of arms
             with the base or one link off by this much.
@@ -123,7 +123,7 @@ class Problem:
             TaskError: the reference point is for other objectives, or a constraint cannot be parsed.
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
-        texts = (*self.task.constraints, *cycle_constraints(self.task, self._has_drives))
+        texts = (*self.task.constraints, *cycle_constraints(self.task, self.has_drives))
         object.__setattr__(self, "constraints", read_constraints(texts))
         if not self.objectives:
             object.__setattr__(self, "objectives", self._default_objectives())
@@ -141,7 +141,7 @@ class Problem:
         self._check_reach()
 
     @property
-    def _has_drives(self) -> bool:
+    def has_drives(self) -> bool:
         """True if all joints have actuators whose speeds and voltages are known."""
         actuators = self.space.arm_actuators
         return bool(actuators) and all(None not in (actuator.speed, actuator.voltage) for actuator in actuators)

@@ -1,1 +1,1 @@
-"""Tasks: targets, moves, obstacles, workspace and the built-in tasks."""
+"""Tasks: targets, tool, cycle, obstacles, workspace and the built-in tasks."""

@@ -44,7 +44,7 @@ export function describeMiss(one) {
 
 const degrees = (angle) => `${number((180 * angle) / Math.PI, 3)}°`;
 
-// Why a target is missed: as problem/miss_reasons.py has it.
+// Why a target is missed: as problem/unreached_reason.py has it.
 export function why(arm, one) {
   const beyond = distance(one.target, arm.base) - reach(arm);
   const reasons = beyond > 0 ? [`out of reach by ${millimetres(beyond)}`] : [];
