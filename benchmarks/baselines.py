@@ -12,9 +12,10 @@ from pathlib import Path
 
 import armwright
 from armwright.experiments.baselines import BASELINES, baselines, baselines_of
+from armwright.experiments.plan import suite_tasks
 from armwright.files import to_csv
 from armwright.runs.front_gap import best_known_hypervolume
-from armwright.tasks.catalogue import builtin_tasks
+from armwright.tasks.catalogue import load_task
 
 PACKAGE = Path(armwright.__file__).parent
 PAGE = PACKAGE.parents[1] / "docs" / "suite.md"
@@ -24,7 +25,7 @@ NUMBERS = {"e_hv": "e_hv", "sigma_hv": "sigma_hv", "final": "final", "share": "s
 
 def main(folder: Path) -> None:
     rows = list(csv.DictReader((folder / "table.csv").read_text(encoding="utf-8").splitlines()))
-    missing = set(builtin_tasks()) - {row["task"] for row in rows}
+    missing = set(suite_tasks()) - {row["task"] for row in rows}
     if missing:
         sys.exit(f"{folder} holds no finished runs of {', '.join(sorted(missing))}")
     records = [
@@ -46,7 +47,7 @@ def page() -> str:
     head = ["task", "targets", "what for", "best known", *(f"{m}: E_hv (σ_hv)" for m in methods)]
     head += [f"{m}: final" for m in methods]
     lines = [f"| {' | '.join(head)} |", "|---|--:|---|" + "--:|" * (1 + 2 * len(methods))]
-    for name, task in builtin_tasks().items():
+    for name, task in ((name, load_task(name)) for name in suite_tasks()):
         by_method = {baseline.method: baseline for baseline in baselines_of(name)}
         cells = [f"`{name}`", str(len(task.targets)), task.description]
         cells += [f"{best_known_hypervolume(task):.2f}"]
@@ -57,7 +58,7 @@ def page() -> str:
 # The benchmark suite
 
 After reading this page you can place a search method of your own next to the usual ones on
-{len(builtin_tasks())} tasks.
+{len(suite_tasks())} tasks.
 
 Each task has its points, a reference point, the best known front and baselines. `armwright tasks NAME` shows everything
 about one task, including its points and their source. `random-N` is one of a seeded family.

@@ -16,11 +16,12 @@ import numpy as np
 from peers import Nsga2
 
 from armwright.arrays import Array
+from armwright.experiments.plan import suite_tasks
 from armwright.pareto import default_reference_point, hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
 from armwright.search.front_search import FrontSearch
-from armwright.tasks.catalogue import builtin_tasks
+from armwright.tasks.catalogue import load_task
 
 BUDGETS = (10_000, 20_000, 50_000, 100_000, 200_000)
 PEERS_BUDGET = 100_000  # evaluations
@@ -42,7 +43,7 @@ class Run:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--tasks", nargs="+", default=list(builtin_tasks()))
+    parser.add_argument("--tasks", nargs="+", default=suite_tasks())
     parser.add_argument("--budget", type=int, default=BUDGETS[-1])
     parser.add_argument("--populations", nargs="*", type=int, default=[100, 200])
     options = parser.parse_args()
@@ -57,7 +58,7 @@ def main() -> None:
 
 def compare(name: str, budgets: list[int], options: argparse.Namespace) -> None:
     """One task's lines: ours, then pymoo's."""
-    problem = Problem(builtin_tasks()[name])
+    problem = Problem(load_task(name))
     reference_point = problem.reference_point or default_reference_point(
         problem.evaluate(problem.space.sample(10, 0)).values
     )

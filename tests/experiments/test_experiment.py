@@ -22,6 +22,7 @@ from armwright.experiments.plan import (
     builtin_experiments,
     builtin_text,
     load_experiment,
+    suite_tasks,
     with_model,
     with_only,
     with_seeds,
@@ -31,7 +32,6 @@ from armwright.llm.model_options import ModelOptions
 from armwright.llm.recording_file import shipped_recordings
 from armwright.report.tables import write_tables
 from armwright.search.samplers import SAMPLERS
-from armwright.tasks.catalogue import builtin_tasks
 from tests.support.chat_server import ChatServer
 
 SMALL: dict[str, Any] = {
@@ -92,7 +92,7 @@ def test_builtin_experiments_load_from_their_printed_files(tmp_path: Path) -> No
         file = tmp_path / f"{name}.yaml"
         file.write_text(builtin_text(name))
         assert load_experiment(str(file)) == (plan, tmp_path)
-    assert builtin_experiments()["suite"].task_list == tuple(builtin_tasks())
+    assert builtin_experiments()["suite"].task_list == suite_tasks()
     assert len(builtin_experiments()["rules"].seed_list) == 20
 
 

@@ -2,6 +2,7 @@
 
 from armwright.problem.objectives import CLEARANCE_QUANTITIES, UNCOVERED_FRACTION
 from armwright.problem.problem import Problem
+from armwright.spaces.design_space import paper_space
 from armwright.tasks.task import Task
 
 
@@ -17,6 +18,12 @@ def unused_parts(problem: Problem) -> list[str]:
         for part, given, quantities in parts
         if given and not problem.uses(*quantities)
     ]
+
+
+def space_note(problem: Problem) -> str:
+    """Return which space the task brings, or an empty string if it is the paper's."""
+    name = problem.space.name
+    return "" if name == paper_space().name else f"design space: {name}, the task's own; --space names another"
 
 
 def payload_note(task: Task) -> str:

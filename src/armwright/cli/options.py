@@ -19,7 +19,12 @@ TaskName = Annotated[
 ]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 SpaceFile = Annotated[
-    Path | None, typer.Option(help="Design space as a YAML file.", show_default="the paper's", rich_help_panel=TASK)
+    Path | None,
+    typer.Option(
+        help="Design space: the name of a built-in one, or a YAML file.",
+        show_default="the task's own, else the paper's",
+        rich_help_panel=TASK,
+    ),
 ]
 Objectives = Annotated[
     str | None,
@@ -105,7 +110,7 @@ def load_problem(
 
     Args:
         task: A built-in task or a task file.
-        space: A space file; None for the paper's space.
+        space: A built-in space or a space file; None for the space of the task's name, else the paper's.
         robust: Whether a design counts by its worst case within the build tolerance.
         device: "auto", "cpu" or "cuda".
         many: Whether many designs are evaluated at once, which makes "auto" prefer a GPU.
@@ -116,7 +121,7 @@ def load_problem(
     from armwright.problem.evaluators import load_evaluator
     from armwright.problem.objectives import PAPER_OBJECTIVES, named_objectives
     from armwright.problem.problem import Problem
-    from armwright.spaces.design_space import load_space, paper_space
+    from armwright.spaces.design_space import default_space, load_space
     from armwright.spaces.tolerance import TOLERANCE
     from armwright.tasks.catalogue import load_task
 
@@ -133,7 +138,7 @@ def load_problem(
         loaded = loaded.model_copy(update={"objectives": names, "reference_point": None})
     return Problem(
         loaded,
-        paper_space() if space is None else load_space(space),
+        default_space(loaded.name) if space is None else load_space(space),
         tolerance=TOLERANCE if robust else 0.0,
         device=resolve_device(device, many),
         objectives=chosen,

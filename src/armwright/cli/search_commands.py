@@ -57,6 +57,7 @@ def design(
 
     The same command with a larger --budget continues the search.
     """
+    from armwright.cli.notes import space_note
     from armwright.cli.progress import search_progress
     from armwright.cli.show_results import show_search
     from armwright.proposers.factory import choose_proposer
@@ -66,6 +67,8 @@ def design(
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
     console = open_console(json_)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
+    if space is None and (note := space_note(problem)):
+        console.print(note)
     choice = None if proposer is None else choose_proposer(proposer)
     if choice is not None:
         if choice.proposer is None:
@@ -171,6 +174,7 @@ def optimize(
 
     The same command resumes or shows the run; a larger --n-total extends it.
     """
+    from armwright.cli.notes import space_note
     from armwright.cli.progress import study_progress
     from armwright.cli.show_results import show_result
     from armwright.llm.configuration import load_model_options
@@ -180,6 +184,8 @@ def optimize(
 
     console = open_console(json_)
     problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
+    if space is None and (note := space_note(problem)):
+        console.print(note)
     initial_designs = [read_design(file, problem.space) for file in initial_design or ()]
     given = load_model_options(model_options, model=model, prompt=prompt, memory=memory, max_cost=max_cost)
     choice = choose_proposer(proposer, given)

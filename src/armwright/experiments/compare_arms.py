@@ -35,7 +35,7 @@ from armwright.robot.robot_descriptions import find_urdf
 from armwright.robot.urdf_reader import UrdfArm, read_urdf
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import FrontMember, History
-from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.design_space import DesignSpace, default_space
 from armwright.spaces.tool_mount import with_tool
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
@@ -112,7 +112,7 @@ def compare_arms(
         arms: URDF files, names of arms in `robot_descriptions`, or results of `read_urdf`.
         run: A run folder of the same task, whose problem is used. The arms are stored there for its figures and page.
         space: Design space with the ranges for the base and the travel of slides, without a run; by default the
-            paper's.
+            one of the task's name, else the paper's.
         base: Position of all base links [m]; by default it is searched for each arm.
         tip: Link of the URDFs that has to reach the targets, see `read_urdf`.
         base_link: Link of the URDFs that stands at the base, see `read_urdf`.
@@ -124,7 +124,7 @@ def compare_arms(
     if base is not None and not np.all(np.isfinite(base)):
         raise SettingsError(f"expected three finite numbers for the base [m], got {base}")
     history = None if run is None else _history(Path(run), task, space)
-    problem = Problem(task, paper_space() if space is None else space) if history is None else history.problem
+    problem = Problem(task, space or default_space(task.name)) if history is None else history.problem
     described = [arm if isinstance(arm, UrdfArm) else read_urdf(find_urdf(arm), tip, base_link) for arm in arms]
     placed: list[Arm] = []
     compared: list[ComparedArm] = []

@@ -12,10 +12,11 @@ from armwright.files import check_name
 from armwright.llm.configuration import configured_model
 from armwright.llm.model_options import ModelOptions
 from armwright.proposers.factory import PROPOSERS, Choice, choose_proposer
+from armwright.spaces.design_space import builtin_spaces
 from armwright.tasks.catalogue import builtin_names
 from armwright.yaml_documents import parse_document, read_document
 
-ALL_TASKS = "all"  # every built-in task, instead of a list
+ALL_TASKS = "all"  # the tasks of `suite_tasks`, instead of a list
 MAX_SEEDS = 10_000
 Key = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,39}$"), AfterValidator(check_name)]
 Count = Annotated[int, Field(ge=1, le=2**31 - 1)]
@@ -145,7 +146,7 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     @property
     def task_list(self) -> tuple[str, ...]:
         """The tasks as a list."""
-        return tuple(builtin_names()) if self.tasks == ALL_TASKS else tuple(self.tasks)
+        return suite_tasks() if self.tasks == ALL_TASKS else tuple(self.tasks)
 
     @property
     def baseline_key(self) -> str:
@@ -155,6 +156,11 @@ class ExperimentPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
 
 def _listed(seeds: int | tuple[int, ...]) -> tuple[int, ...]:
     return tuple(range(seeds)) if isinstance(seeds, int) else seeds
+
+
+def suite_tasks() -> tuple[str, ...]:
+    """Return the names of the built-in tasks in the paper's space, which have stored baselines."""
+    return tuple(name for name in builtin_names() if name not in builtin_spaces())
 
 
 def builtin_experiments() -> dict[str, ExperimentPlan]:

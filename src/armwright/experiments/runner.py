@@ -17,7 +17,7 @@ from armwright.runs.config import check_same_run
 from armwright.runs.folder import read_config
 from armwright.runs.results import read_summary
 from armwright.search.samplers import sampler_factory
-from armwright.spaces.design_space import load_space, paper_space
+from armwright.spaces.design_space import default_space, load_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.study.cluster import MAX_LOSSES, Cluster, Finished, Workers
 from armwright.study.front_run import find_front
@@ -76,9 +76,10 @@ def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
 
 
 def _problem(cell: Cell) -> Problem:
+    task = load_task(cell.task)
     return Problem(
-        load_task(cell.task),
-        paper_space() if cell.space is None else load_space(cell.space),
+        task,
+        default_space(task.name) if cell.space is None else load_space(cell.space),
         tolerance=TOLERANCE if cell.robust else 0.0,
         device=resolve_device("auto", many=cell.plan.design is not None),
     )

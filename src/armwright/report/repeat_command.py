@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from armwright.llm.model_options import ModelOptions
 from armwright.problem.objectives import OBJECTIVES
 from armwright.runs.config import FrontMethod, Method, RunConfig
-from armwright.spaces.design_space import builtin_spaces, load_space
+from armwright.spaces.design_space import builtin_spaces, default_space, load_space
 from armwright.spaces.tolerance import TOLERANCE
 from armwright.tasks.catalogue import builtin_names, load_task
 
@@ -40,7 +40,7 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
     spaces = [name for name in builtin_spaces() if _content(load_space(name)) == _content(config.space)]
     settings: dict[str, Any] = {}
     n_designs = 0
-    if "paper" not in spaces:
+    if _content(default_space(name)) != _content(config.space):
         settings["space"] = spaces[0] if spaces else CUSTOM_SPACE
     if isinstance(config.method, FrontMethod):
         first = config.method.initial_designs or {}

@@ -235,6 +235,17 @@ def builtin_spaces() -> list[str]:
     return ["paper", *sorted(f.name.removesuffix(".yaml") for f in BUILT_IN.iterdir() if f.name.endswith(".yaml"))]
 
 
+def default_space(task: str) -> DesignSpace:
+    """Return the design space for a task without a stated one: the built-in space of the task's name, or the paper's.
+
+    Examples:
+        >>> from armwright.spaces.design_space import default_space
+        >>> default_space("desk-sorting").name, default_space("target-1").name
+        ('desk-sorting', 'paper')
+    """
+    return load_space(task) if task in builtin_spaces() else paper_space()
+
+
 def load_space(name_or_path: str | Path) -> DesignSpace:
     """Load a built-in space by name, or a YAML file. Keys that a file leaves out are as in the paper.
 
