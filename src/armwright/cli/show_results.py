@@ -51,6 +51,7 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if is_scaled else []
     notes += [problem.space.mass_note, payload_note(problem.task), *unused_parts(problem)]
     console.print("; ".join(filter(None, notes)))
+    show_recommended(console, summary.get("recommended", ()))
     _show_files(console, run.folder, figures)
 
 
@@ -79,7 +80,15 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     infeasible = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
     console.print(f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}")
     console.print(run.history.problem.space.mass_note)
+    show_recommended(console, summary.get("recommended", ()))
     _show_files(console, run.folder, figures)
+
+
+def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) -> None:
+    """Print the recommended designs of a task with a cycle, and whether they were verified in the simulator."""
+    for one in recommended:
+        demoted = "".join(f"; #{other['design']} was demoted: {other['reason']}" for other in one["demoted"])
+        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}{demoted}")
 
 
 def show_refined(console: Console, refined: RefinedRun) -> None:

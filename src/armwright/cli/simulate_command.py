@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,7 +13,6 @@ from armwright.exceptions import SettingsError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from armwright.runs.recommendation import Recommendation
     from armwright.runs.simulated_run import Simulator
     from armwright.runs.simulation import SimulatedDesign
 
@@ -36,7 +35,9 @@ def simulate(
     from armwright.report.simulation_figure import write_simulation_figure
     from armwright.runs.folder import RunFolder as Folder
     from armwright.runs.folder import read_run
-    from armwright.runs.simulated_run import SIMULATION, Simulator, simulation_record, write_simulated
+    from armwright.runs.results import SUMMARY, read_summary
+    from armwright.runs.simulated_run import Simulator
+    from armwright.runs.simulation_files import SIMULATION, simulation_record, write_simulated
 
     if (design is not None) + recommended + all_ > 1:
         raise SettingsError("--design, --recommended and --all choose the designs; use one of them")
@@ -51,6 +52,10 @@ def simulate(
         for member in members:
             write_simulated(folder, member)
         folder.write_text(SIMULATION, json.dumps(record, indent=2) + "\n")
+        summary = read_summary(run)
+        if choice and summary is not None:
+            summary["recommended"] = choice
+            folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
         for member in () if all_ else members:
             write_simulation_figure(run, history.member(member.result.design).arm, member)
     if json_:
@@ -59,20 +64,23 @@ def simulate(
     _show(open_console(), run, [member.result for member in members], choice)
 
 
-def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) -> "list[Recommendation]":
+def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) -> list[dict[str, Any]]:
     """Simulate the chosen designs; return the recommended ones if those were chosen."""
+    from dataclasses import asdict
+
     from armwright.runs.recommendation import recommend
 
     if design is None and not every:
-        return recommend(simulator.history, lambda number: simulator(number).result)
+        return [asdict(one) for one in recommend(simulator.history, simulator)]
     for number in [member.number for member in simulator.history.front] if design is None else [design]:
         simulator(number)
     return []
 
 
 def _show(
-    console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: "Sequence[Recommendation]"
+    console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
+    from armwright.cli.show_results import show_recommended
     from armwright.runs.results import DESIGNS
     from armwright.runs.simulation import PASS, mujoco_version
 
@@ -90,8 +98,6 @@ def _show(
     for one in results:
         for reason in one.reasons:
             console.print(f"#{one.design}: {reason}")
-    for one in choice:
-        demoted = "".join(f"; #{other.design} was demoted: {other.reason}" for other in one.demoted)
-        console.print(f"{one.role}: #{one.design}, {one.status}{demoted}")
+    show_recommended(console, choice)
     passed = sum(one.verdict == PASS for one in results)
     console.print(f"{passed} of {len(results)} pass in MuJoCo {mujoco_version()}: {run / DESIGNS}/NNNN/simulation.csv")

@@ -134,7 +134,7 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
         rows, lower = rows[lower < np.inf], lower[lower < np.inf]
         rate[rows] = lower
         rows = rows[lower > 0.0]
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         time = np.where(rate >= MAX_RATE, 0.0, 1.0 / np.maximum(rate, 0.0))
     known = ~np.isnan(drives.peak + drives.corner_speed + drives.no_load_speed).any(axis=1)
     return np.where(known & ~np.isnan(load.coulomb + load.viscous + load.inertial).any(axis=(1, 2)), time, np.nan)
@@ -174,7 +174,7 @@ class _Limits:
         falls = gap > 0.0
         width = np.where(falls, gap, 1.0)
         level = np.where(falls, np.where(falls, drives.no_load_speed, 1.0) / width, np.inf)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             fastest = (drives.no_load_speed / speed.max(axis=1)).min(axis=1)
         return cls(
             *((scale * torque).reshape(n, -1) for torque in torques),

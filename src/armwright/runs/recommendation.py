@@ -1,11 +1,13 @@
 """The recommended designs of a front: its knee and its two ends, each verified in the simulator."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from armwright.exceptions import MissingExtraError, SettingsError
 from armwright.runs.history import History
-from armwright.runs.selection import pick
-from armwright.runs.simulation import PASS, SimulatedDesign
+from armwright.runs.ranking import knee_first
+from armwright.runs.simulated_run import Simulator
+from armwright.runs.simulation import PASS
 
 MAX_TRIED = 10  # designs for each role
 VERIFIED, NOT_SIMULATED = "verified", "not simulated"
@@ -40,7 +42,7 @@ def candidates(history: History) -> dict[str, list[int]]:
     """Return the designs of the front by role, the best first."""
     if not history.front:
         return {}
-    roles = {"knee": [member.number for member in pick(history)]}
+    roles = {"knee": [member.number for member in knee_first(history, history.front)]}
     objectives = history.problem.objectives
     for index in (0, len(objectives) - 1):
         by_value = sorted(history.front, key=lambda member: member.values[index])
@@ -48,19 +50,24 @@ def candidates(history: History) -> dict[str, list[int]]:
     return roles
 
 
-def recommend(history: History, simulate: Callable[[int], SimulatedDesign] | None) -> list[Recommendation]:
-    """Return the recommended designs; without a simulator, the first candidates."""
-    return [_recommended(role, numbers, simulate) for role, numbers in candidates(history).items()]
+def recommend(history: History, simulator: Simulator | None = None) -> list[Recommendation]:
+    """Return the recommended designs: simulated, unless MuJoCo is missing or a duration of the cycle is not known.
+
+    Args:
+        history: The trials.
+        simulator: Keeps what it simulates; None for a new one.
+    """
+    try:
+        simulator = simulator or Simulator(history)
+        return [_verified(role, numbers, simulator) for role, numbers in candidates(history).items()]
+    except (MissingExtraError, SettingsError):
+        return [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in candidates(history).items()]
 
 
-def _recommended(
-    role: str, numbers: Sequence[int], simulate: Callable[[int], SimulatedDesign] | None
-) -> Recommendation:
-    if simulate is None:
-        return Recommendation(role, numbers[0], NOT_SIMULATED)
+def _verified(role: str, numbers: Sequence[int], simulator: Simulator) -> Recommendation:
     demoted: list[Demoted] = []
     for number in numbers[:MAX_TRIED]:
-        result = simulate(number)
+        result = simulator(number).result
         if result.verdict == PASS:
             return Recommendation(role, number, VERIFIED, tuple(demoted))
         demoted.append(Demoted(number, result.reasons[0]))

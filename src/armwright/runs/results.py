@@ -31,6 +31,7 @@ from armwright.runs.front_gap import front_gap
 from armwright.runs.history import History
 from armwright.runs.path_report import describe_faults, path_record
 from armwright.runs.proposer_bias import proposer_bias
+from armwright.runs.recommendation import recommend
 from armwright.runs.summary import ProposerSummary, parse_summary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify_front
@@ -188,7 +189,15 @@ def _common_record(
         "front_gap": None if gap is None else asdict(gap),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
+        **_recommended_record(history),
     }
+
+
+def _recommended_record(history: History) -> dict[str, Any]:
+    """Return the recommended designs, verified in the simulator; empty for a task without a cycle."""
+    if history.problem.task.cycle is None:
+        return {}
+    return {"recommended": [asdict(one) for one in recommend(history)]}
 
 
 def describe_infeasibility(history: History) -> str:

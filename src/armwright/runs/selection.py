@@ -1,6 +1,5 @@
 """Selection of designs of a front: by conditions, by one quantity, by weights, or the knee."""
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
-from armwright.pareto import knee_index
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
+from armwright.runs.ranking import knee_first
 from armwright.runs.results import describe_infeasibility, read_summary
 from armwright.spaces.parameters import FloatParameter
 
@@ -121,14 +120,11 @@ def pick(
         raise FailureError(_describe_unmet(where, list(quantities.values())))
     if by is not None:
         return sorted(left, key=lambda member: quantities[member.number][by])
-    scale = np.array(history.reference_point or np.ones(len(objectives)))
     if weights is not None:
+        scale = np.array(history.reference_point or np.ones(len(objectives)))
         scaled_weights = np.array([weights.get(name, 0.0) for name in objectives]) / scale
         return sorted(left, key=lambda member: float(scaled_weights @ np.array(member.values)))
-    knee = knee_index(np.array([member.values for member in left]), history.reference_point or (math.inf,) * len(scale))
-    first = [] if knee is None else [left[knee]]
-    others = [member for member in left if member not in first]
-    return first + sorted(others, key=lambda member: float(np.linalg.norm(np.array(member.values) / scale)))
+    return knee_first(history, left)
 
 
 def pick_from(

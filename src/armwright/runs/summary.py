@@ -37,6 +37,18 @@ class _Verification(_Record):
     hypervolume_worst_case: float
 
 
+class _Demoted(_Record):
+    design: Count
+    reason: str
+
+
+class _Recommended(_Record):
+    role: str
+    design: Count
+    status: str
+    demoted: list[_Demoted]
+
+
 class _Age(_Record):
     mean: float
     max: int
@@ -94,6 +106,7 @@ class _Summary(_Record):
     front_gap: FrontGap | None
     front_size: Count
     verification: _Verification | None
+    recommended: list[_Recommended] = []
 
 
 class StudySummary(_Summary):

@@ -1,0 +1,108 @@
+"""Recommended designs, verified in the simulator, in summaries and by the command."""
+
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+import armwright as aw
+from armwright.runs.folder import read_run
+from armwright.runs.recommendation import candidates, recommend
+from armwright.runs.results import read_summary
+from armwright.runs.simulated_run import Simulator
+from tests.runs.test_simulation import Desk
+from tests.support.command_line import armwright, refused
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run whose first trial is the desk arm."""
+    desk = Desk(objectives=["peak_torque", "length"])
+    folder = tmp_path_factory.mktemp("runs") / "desk"
+    aw.optimize(
+        desk.problem, proposer="none", n_init=1, n_total=1, initial_designs=[desk.design], verify=False, out=folder
+    )
+    return folder
+
+
+def test_a_finished_run_states_what_is_verified(run: Path) -> None:
+    summary = read_summary(run)
+    assert summary is not None
+    assert summary["recommended"] == [
+        {"role": role, "design": 0, "status": "verified", "demoted": []}
+        for role in ("knee", "least peak_torque", "least length")
+    ]
+    assert {file.name for file in (run / "designs" / "0000").iterdir()} >= {"arm.xml", "trajectory.csv"}
+
+
+def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
+    content = json.loads(armwright("simulate", run, "--json").stdout)
+    assert list(content) == ["mujoco", "timestep", "feed_forward", "simulated", "passed", "designs"]
+    assert (content["simulated"], content["passed"]) == (1, 1)
+    (design,) = content["designs"]
+    assert list(design) == [
+        *("design", "verdict", "reasons", "cycle_time", "energy"),
+        *("targets", "joints", "contacts"),
+    ]
+    assert list(design["targets"][0])[:4] == ["step", "target", "tip_error", "angle_error"]
+    assert list(design["joints"][0]) == [
+        *("joint", "peak_torque", "rms_torque", "claimed_peak_torque"),
+        *("claimed_rms_torque", "peak_speed", "saturated_fraction"),
+    ]
+    assert json.loads((run / "simulation.json").read_text()) == content
+    place = run / "designs" / "0000"
+    assert (place / "figures" / "simulation.png").is_file()
+    rows = (place / "simulation.csv").read_text().splitlines()
+    assert rows[0].startswith("time,step,tip_x,tip_y,tip_z,q_1")
+    assert len(rows) == len((place / "trajectory.csv").read_text().splitlines())
+    shown = armwright("simulate", run, "--design", "0").stdout
+    assert "1 of 1 pass" in shown
+
+
+def test_simulate_refuses_what_it_cannot_drive(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "has the designs 0 to" in refused(2, "simulate", run, "--design", "7")
+    assert "use one of them" in refused(2, "simulate", run, "--design", "0", "--all")
+    aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_init=1, n_total=1, verify=False, out=tmp_path)
+    assert "has no cycle" in refused(2, "simulate", tmp_path)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert 'pip install "armwright[sim]"' in refused(2, "simulate", run)
+
+
+def test_without_mujoco_designs_are_not_simulated(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, history = read_run(run)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert {one.status for one in recommend(history)} == {"not simulated"}
+
+
+class Verdicts:
+    """A simulator in which some designs fail."""
+
+    def __init__(self, failing: set[int]) -> None:
+        self.failing = failing
+
+    def __call__(self, number: int) -> Any:
+        fails = number in self.failing
+        reasons = ("joint_2 is at its torque limit",) if fails else ()
+        return SimpleNamespace(result=SimpleNamespace(verdict="fail" if fails else "pass", reasons=reasons))
+
+
+def test_failing_designs_are_demoted_with_their_reason() -> None:
+    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+    order = candidates(history)
+    knee, second = order["knee"][:2]
+    chosen = {one.role: one for one in recommend(history, cast("Simulator", Verdicts({knee})))}
+    assert (chosen["knee"].design, chosen["knee"].status) == (second, "verified")
+    assert [(one.design, one.reason) for one in chosen["knee"].demoted] == [(knee, "joint_2 is at its torque limit")]
+    for one in recommend(history, cast("Simulator", Verdicts({member.number for member in history.front}))):
+        assert one.design == order[one.role][0]
+        assert one.status == "not verified: joint_2 is at its torque limit"
+
+
+def test_ends_of_the_front_have_the_least_objectives() -> None:
+    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+    for index, role in enumerate(("least position_error", "least torque")):
+        first = candidates(history)[role][0]
+        assert history.values[first, index] == min(member.values[index] for member in history.front)
