@@ -66,17 +66,17 @@ def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:
 
 
 def trajectory_csv(trajectory: Trajectory, target_names: Sequence[str]) -> str:
-    """Return a trajectory as CSV, all joints' values after each other: q_1, …, qd_1, …, qdd_1, …, tau_1, ….
+    """Return a trajectory as CSV, all joints' values after each other: q_1, …, qd_1, …, tau_1, ….
 
     target is the name of a target where the arm has reached it and rested there, else empty.
     """
     n = trajectory.q.shape[1]
-    quantities = ("q", "qd", "qdd", "tau")
+    quantities = ("q", "qd", "tau")
     out = io.StringIO()
     columns = [f"{quantity}_{k}" for quantity in quantities for k in range(1, n + 1)]
     out.write(",".join(["time", "step", "target", "payload", *columns]) + "\n")
     values = np.hstack([getattr(trajectory, quantity) for quantity in quantities]) + 0.0  # no -0.0
-    line = ",".join([f"%.{DIGITS}g"] * (4 * n)) + "\n"
+    line = ",".join([f"%.{DIGITS}g"] * (3 * n)) + "\n"
     heads = zip(trajectory.time, trajectory.step, trajectory.target, trajectory.payload, strict=True)
     for (time, step, target, payload), row in zip(heads, values.tolist(), strict=True):
         name = target_names[target] if target >= 0 else ""
@@ -88,9 +88,9 @@ def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
     """Return the trajectory of a CSV file."""
     head, *lines = text.splitlines()
     cells = [line.split(",") for line in lines]
-    n = (len(head.split(",")) - 4) // 4
+    n = (len(head.split(",")) - 4) // 3
     number = {name: index for index, name in enumerate(target_names)} | {"": -1}
-    values = np.array([row[4:] for row in cells], dtype=np.float64).reshape(len(cells), 4, n)
+    values = np.array([row[4:] for row in cells], dtype=np.float64).reshape(len(cells), 3, n)
     return Trajectory(
         time=np.array([row[0] for row in cells], dtype=np.float64),
         step=np.array([row[1] for row in cells], dtype=np.intp),
@@ -98,6 +98,5 @@ def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
         payload=np.array([row[3] for row in cells], dtype=np.float64),
         q=values[:, 0],
         qd=values[:, 1],
-        qdd=values[:, 2],
-        tau=values[:, 3],
+        tau=values[:, 2],
     )
