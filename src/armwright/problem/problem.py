@@ -238,11 +238,14 @@ class Problem:
     def scenes(self) -> tuple[Scene, ...]:
         """Return the targets and surroundings of each case of the task."""
         task = self.task
-        plans = (task.plan(points) if task.cycle else None for points, _ in task.cases)
-        return tuple(
-            Scene(points, payloads, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
-            for (points, payloads), plan in zip(task.cases, plans, strict=True)
-        )
+        scenes: list[Scene] = []
+        for points, payloads in task.cases:
+            plan = task.plan(points) if task.cycle else None
+            held = payloads if plan is None else payloads * plan.holds_payload(len(points))
+            scenes.append(
+                Scene(points, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
+            )
+        return tuple(scenes)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.

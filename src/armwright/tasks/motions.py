@@ -126,6 +126,13 @@ class CyclePlan:
     targets: tuple[int, ...]
     times: tuple[float | None, ...]
 
+    def holds_payload(self, n_targets: int) -> NDArray[np.bool_]:
+        """Return (T,) whether the payload is carried to or from each of T targets; True where the cycle never is."""
+        held: dict[int, bool] = {}
+        for target, step, carried in zip(self.targets, self.cycle.steps, self.cycle.carried(), strict=True):
+            held[target] = held.get(target, False) or carried or step.do == "pick"
+        return np.array([held.get(target, True) for target in range(n_targets)])
+
     @property
     def first_motion(self) -> int:
         """Index of the motion that the blocks begin with: any after a joint motion serves in a closed cycle."""
