@@ -1,0 +1,201 @@
+"""Problems whose tasks have a cycle: implied constraints, quantities of motions, variations and reach."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.exceptions import SettingsError
+from armwright.problem.objectives import MOTION_QUANTITIES, OBJECTIVES, PATH_QUANTITIES
+from armwright.problem.problem import Problem
+from armwright.spaces.design_space import DesignSpace, load_space
+from armwright.tasks.task import Task
+
+DOWN = [0, 0, -1]
+TARGETS = [
+    {"name": "bin", "position": [0.3, 0.0, 0.1], "axis": DOWN},
+    {"name": "tray", "position": [0.2, 0.25, 0.15], "axis": DOWN},
+    {"name": "home", "position": [0.15, -0.2, 0.25], "axis": DOWN},
+]
+PICKS = [{"to": "bin", "do": "pick"}, {"to": "tray", "do": "place"}, {"to": "home", "by": "line"}]
+IMPLIED = ["unreached_targets <= 0", "path_error <= 0.002", "path_angle <= 0.02", "jumps <= 0", "collision <= 0"]
+DRIVES = ["dynamic_utilisation <= 1", "speed_utilisation <= 1", "thermal_utilisation <= 1", "voltages <= 1"]
+ARM: dict[str, Any] = {
+    "name": "arm",
+    "joints": 5,
+    "restrict": {f"joint_{j}": letter for j, letter in enumerate("YPPPP", start=1)},
+    "link": [0.1, 0.3],
+    "origin_x": [-0.1, 0.1],
+    "origin_y": [-0.1, 0.1],
+    "origin_z": [0.0, 0.1],
+}
+BARE, DRIVEN = (DesignSpace.model_validate({**ARM, **more}) for more in ({}, {"actuators": ["XM540-W270"]}))
+N = 12
+
+
+def task(cycle: Any = None, **more: Any) -> Task:
+    steps = {"steps": PICKS, "time": 2.0, **(cycle or {})}
+    content = {"name": "cell", "targets": TARGETS, "payload": 0.2, "cycle": steps, "objectives": ["worst_error"]}
+    return Task.model_validate({**content, **more})
+
+
+def bounds(problem: Problem) -> list[str]:
+    return [constraint.description for constraint in problem.constraints]
+
+
+# Implied constraints
+
+
+def test_cycle_implies_constraints() -> None:
+    assert bounds(Problem(task(), BARE)) == IMPLIED
+    assert bounds(Problem(task(), DRIVEN)) == [*IMPLIED, *DRIVES]
+    assert bounds(Problem(task(cycle={"tolerance": {"path": 0.005, "angle": 0.1}}), BARE))[1:3] == [
+        "path_error <= 0.005",
+        "path_angle <= 0.1",
+    ]
+
+
+def test_points_have_no_angle_along_their_path() -> None:
+    points = [target["position"] for target in TARGETS]
+    assert bounds(
+        Problem(task(cycle={"steps": [{"to": n, "by": "line"} for n in (1, 2, 3)]}, targets=points), BARE)
+    ) == [c for c in IMPLIED if "angle" not in c]
+
+
+def test_tasks_without_a_cycle_imply_nothing() -> None:
+    assert bounds(Problem(task(cycle=None).model_copy(update={"cycle": None}), DRIVEN)) == []
+
+
+@pytest.mark.parametrize("implied", [*IMPLIED, *DRIVES])
+def test_a_bound_of_the_task_replaces_the_implied_one(implied: str) -> None:
+    own = f"{implied.split()[0]} <= 3"
+    assert bounds(Problem(task(constraints=[own]), DRIVEN)) == [own, *(c for c in [*IMPLIED, *DRIVES] if c != implied)]
+
+
+@pytest.mark.parametrize("quantity", ["clearance", "self_clearance", "obstacle_clearance"])
+def test_bounds_of_clearances_replace_the_bound_of_collisions(quantity: str) -> None:
+    own = f"{quantity} >= 0.01"
+    assert bounds(Problem(task(constraints=[own]), BARE)) == [own, *(c for c in IMPLIED if "collision" not in c)]
+
+
+def test_bounds_of_other_quantities_replace_nothing() -> None:
+    assert bounds(Problem(task(constraints=["mass <= 3", "path_error >= 0"]), BARE))[2:] == [
+        c for c in IMPLIED if "path_error" not in c
+    ]
+
+
+# Quantities of motions
+
+
+@pytest.mark.parametrize("name", [q.name for q in MOTION_QUANTITIES if q not in PATH_QUANTITIES])
+def test_quantities_of_motions_need_a_cycle(name: str) -> None:
+    still = task().model_copy(update={"cycle": None})
+    designs = DRIVEN.sample(2, 0)
+    for update in ({"objectives": (name,)}, {"constraints": (f"{name} <= 1",)}):
+        if name not in OBJECTIVES and "objectives" in update:
+            continue
+        problem = Problem(still.model_copy(update=update), DRIVEN)
+        with pytest.raises(SettingsError, match=r"need a cycle in the task; try cycle: in_order"):
+            problem.evaluate(designs)
+    assert np.isfinite(Problem(task(constraints=[f"{name} <= 1"]), DRIVEN).evaluate(designs).violations).all()
+
+
+def test_quantities_of_time_need_durations_or_drives() -> None:
+    fastest = task(cycle={"time": "fastest"}, objectives=["cycle_time"])
+    designs = DRIVEN.sample(2, 0)
+    with pytest.raises(
+        SettingsError, match=r"need the duration of each step, or actuators with known torques and spee"
+    ):
+        Problem(fastest, BARE).evaluate(designs)
+    assert (Problem(fastest, DRIVEN).evaluate(designs).values > 0.0).all()
+    assert Problem(task(objectives=["cycle_time"]), BARE).evaluate(designs).values == pytest.approx(6.0)
+
+
+# What the cycle decides at targets
+
+
+def test_postures_at_targets_are_those_of_the_cycle_whatever_the_restarts() -> None:
+    plain, restarted = (Problem(task(restarts=n), BARE) for n in (0, 4))
+    designs = BARE.sample(N, 1)
+    first, second = plain.physics(designs), restarted.physics(designs)
+    assert np.array_equal(first.q, first.paths.postures(3).astype(np.float32))
+    assert np.array_equal(first.q, second.q)
+    assert np.array_equal(plain.evaluate(designs).values, restarted.evaluate(designs).values)
+
+
+def test_payload_counts_only_where_the_cycle_carries_it() -> None:
+    loaded, empty = (Problem(task(payload=kg), BARE).physics(BARE.sample(N, 1)) for kg in (0.5, 0.0))
+    assert loaded.payload.tolist() == [0.5, 0.5, 0.0]
+    assert np.array_equal(loaded.joint_torques[:, 2], empty.joint_torques[:, 2])
+    assert not np.allclose(loaded.joint_torques[:, :2], empty.joint_torques[:, :2])
+    carried = Problem(task(cycle={"steps": [{"to": n} for n in (1, 2)]}, payload=0.5), BARE)
+    assert carried.scenes[0].payload.tolist() == [0.5, 0.5, 0.5]  # throughout, and at a target that it leaves out
+
+
+def test_payload_factors_count_as_heavier_payloads() -> None:
+    designs = DRIVEN.sample(N, 2)
+    names = ("dynamic_torque", "thermal_utilisation", "peak_torque")
+    both, once, twice = (
+        Problem(task(objectives=names, **more), DRIVEN).evaluate(designs)
+        for more in ({"payload_factors": [2.0]}, {}, {"payload": 0.4})
+    )
+    assert np.array_equal(both.values, np.maximum(once.values, twice.values))
+    assert np.array_equal(both.violations, np.maximum(once.violations, twice.violations))
+    assert (twice.values > once.values).any()
+
+
+def test_target_noise_shifts_the_whole_cycle() -> None:
+    designs, noise = BARE.sample(4, 3), 0.01
+
+    def shifted(shift: Any) -> Any:
+        moved = [{**t, "position": (np.array(t["position"]) + shift).tolist()} for t in TARGETS]
+        return Problem(task(targets=moved), BARE).evaluate(designs)
+
+    found = Problem(task(target_noise=noise), BARE).evaluate(designs)
+    cases = [shifted(0.0), *(shifted(sign * noise * axis) for axis in np.eye(3) for sign in (-1.0, 1.0))]
+    assert found.values == pytest.approx(np.max([case.values for case in cases], axis=0), abs=1e-9)
+    assert found.violations == pytest.approx(np.max([case.violations for case in cases], axis=0), abs=1e-6)
+
+
+def test_a_batch_equals_single_designs_to_the_bit() -> None:
+    problem = Problem(task(objectives=["worst_error", "dynamic_torque", "path_error"]), DRIVEN)
+    designs = DRIVEN.sample(N, 4)
+    whole = problem.evaluate(designs)
+    for row, design in enumerate(designs):
+        assert problem.evaluate([design])[0] == whole[row]
+
+
+def test_feasible_designs_exist_and_stay_within_what_is_implied() -> None:
+    problem = Problem(task(cycle={"approach": 0.05}), BARE)
+    designs = BARE.sample(60, 5)
+    outcomes, physics = problem.evaluate(designs), problem.physics(designs)
+    feasible = (outcomes.violations <= 0.0).all(axis=1)
+    assert feasible.any()
+    assert not feasible.all()
+    assert physics.paths.path_error[feasible].max() <= 0.002
+    assert not physics.paths.jumps[feasible].any()
+    assert not physics.unreached[feasible].any()
+    assert physics.clearance[feasible].min() >= 0.0
+
+
+# Reach
+
+
+def test_cycles_with_a_target_out_of_reach_are_refused() -> None:
+    far = [*TARGETS[:2], {"name": "home", "position": [1.7, 0.0, 0.05], "axis": DOWN}]
+    message = (
+        "step 3: target home is 1.6 m from the nearest allowed base, but the longest arm with its tool reaches 1.5 m"
+    )
+    with pytest.raises(SettingsError) as error:
+        Problem(task(targets=far), BARE)
+    assert message in str(error.value)
+    assert Problem(task(targets=far, tool={"tip": [0.0, 0.0, 0.101]}), BARE).max_reach == pytest.approx(1.601)
+    visited = {"steps": [{"to": 1}, {"to": 2}]}
+    assert Problem(task(targets=far, cycle=visited), BARE).constraints
+    assert Problem(task(targets=far).model_copy(update={"cycle": None}), BARE).objectives
+
+
+@pytest.mark.parametrize("space", [BARE, load_space("slideopt"), load_space("paper")])
+def test_no_design_reaches_further_than_the_longest_arm(space: DesignSpace) -> None:
+    problem = Problem(task().model_copy(update={"cycle": None}), space)
+    assert max(problem.arm(design).reach for design in space.sample(200, 0)) <= problem.max_reach + 1e-12
