@@ -33,6 +33,7 @@ from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task
+from armwright.tasks.tool import Tool
 from tests.support.browser import Tab
 from tests.support.command_line import armwright
 from tests.support.robots import robot
@@ -242,6 +243,8 @@ def test_invalid_arguments_are_refused(run: Path, tmp_path: Path) -> None:
         compare_arms("target-1", [UR5], run)
     with pytest.raises(TaskError, match="another tool or other payloads"):
         compare_arms(TASK.model_copy(update={"payload": 1.0}), [UR5], run)
+    with pytest.raises(TaskError, match="another tool or other payloads"):
+        compare_arms(TASK.model_copy(update={"tool": Tool(mass=0.5)}), [UR5], run)
     with pytest.raises(SettingsError, match="the run has its own space"):
         compare_arms(TASK, [UR5], run, space=SPACE)
     with pytest.raises(SettingsError, match="expected three finite numbers"):
