@@ -28,7 +28,7 @@ _SHOWN: Mapping[str, tuple[str, str, float]] = {
     "path_error": ("path error", " mm", 1e3),
     "path_angle": ("angle error", "°", math.degrees(1.0)),
     "clearance": ("clearance", " mm", 1e3),
-    "limit_distance": ("distance to joint limits", " rad or m", 1.0),  # the joint may slide
+    "limit_distance": ("distance to joint limits", "", 1.0),  # [rad], or [m] of a sliding joint
     "manipulability": ("manipulability", " m³", 1.0),
 }
 
