@@ -225,3 +225,23 @@ def test_joints_without_actuators_are_driven() -> None:
 
 def test_a_task_without_cycle_has_no_further_files() -> None:
     assert Desk(cycle=None, payload=0.1).files == {}
+
+
+def test_torques_between_the_instants_of_loads_are_not_higher() -> None:
+    """Except where a joint meets its limit within a line: speeds jump there, so the line counts as a jump."""
+    cycle = DESK["cycle"] | {"time": "fastest", "steps": [{"to": "bin"}, {"to": "tray"}, {"to": 3, "by": "line"}]}
+    near = {"origin_x": [-0.1, 0.1], "origin_y": [-0.1, 0.1], "origin_z": [0.0, 0.05]}
+    problem = Problem(Task.model_validate(DESK | {"cycle": cycle}), DesignSpace.model_validate(SPACE | near))
+    designs = problem.space.sample(300, seed=1)
+    evaluation = problem.physics(designs)
+    smooth = ~evaluation.paths.jumps.any(axis=1) & ~evaluation.unreached.any(axis=1)
+    on_limit = evaluation.paths.jumps.any(axis=1) & (evaluation.paths.limit_distance.min(axis=1) <= 0.0)
+    assert smooth.sum() > 20
+    assert on_limit.any()
+    loads, actuation = evaluation.loads, evaluation.arms.actuation
+    assert actuation is not None
+    for row, design in enumerate(designs):
+        if smooth[row]:
+            claimed = np.abs(loads.torques[row]).max(axis=(0, 1))
+            peak = np.abs(trajectory_of(problem.arm(design), evaluation, row).tau).max(axis=0)
+            assert (peak - claimed < 0.05 * np.maximum(claimed, 0.1 * actuation.peak[row])).all()

@@ -35,6 +35,7 @@ ROUNDS = 4  # at least, of choosing candidates again where the chosen ones colli
 LOOPS = 3  # of a closed cycle without joint motions, until it ends where it began
 DISTINCT = 1e-3  # [rad] or [m] between candidates; nearer ones are the same
 CLOSED = 1e-3  # [rad] or [m] between its ends
+ON_LIMIT = 1e-6  # [rad] or [m] from the limit of a joint
 DEPTH = 1e-3  # [m] of a collision that costs as much as a path that is off by its tolerance
 CHUNK = 2**12  # samples that a thread takes at a time
 BLOCKED = 1e3  # cost in seconds or radians of a chain that is off by its tolerance, far above any detour
@@ -92,7 +93,8 @@ class CyclePaths:
         self_clearance: (N, M) smallest distance of two links that are not neighbours [m].
         obstacle_clearance: (N, M) smallest distance of a link from an obstacle [m].
         limit_distance: (N, M) smallest distance of a joint from its limits [rad] or [m].
-        jumps: (N, M) True where the joint path is not continuous.
+        jumps: (N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that
+            speeds are not.
         worst: (N, M, 3) share of the motion at which path error, angle and clearance are worst.
     """
 
@@ -322,6 +324,8 @@ def _measure(
             values[2:4, group.index, i] = own.min(axis=2)
             worst[group.index, i, 2] = own.min(axis=0).argmin(axis=1) / (path.q.shape[1] - 1)
             values[4, group.index, i] = margin[:, at:end].min(axis=1)
+            if path.motion.by == "line":  # where a joint meets its limit, the speeds of the others jump
+                jumps[group.index, i] |= (margin[:, at + 1 : end - 1] <= ON_LIMIT).any(axis=1)
             at = end
     path_error, path_angle, own, clear, margin = values
     return CyclePaths(plan, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
