@@ -51,6 +51,7 @@ if __name__ == "__main__":
 # What needs an extra, and which; all of them are asked for where a run folder "run" is.
 NEEDS = (
     ("live", "live", "run"),
+    ("sim", "simulate", "run"),
     ("live", "optimize", "target-1", "--live", "--out", "other"),
     ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
     (
