@@ -3,14 +3,17 @@
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
+from armwright.kinematics.motion_path import MotionPath
 from armwright.problem.evaluation import Evaluation
 from armwright.tasks.task import Task
 
-LINE_POINTS = 9  # of a line; the page interpolates between them
-DIGITS = 4  # of joint values [rad] or [m] and of durations [s]
+LINE_POINTS = (2, 3, 5, 9)  # of a line, between which the page interpolates: as few as are near enough
+NEAR = 5e-3  # [rad] or [m]
+DIGITS = 3  # of joint values [rad] or [m] and of durations [s]
 UNTIMED = 1.0  # [s] of each motion if durations are not known
 
 
@@ -34,12 +37,24 @@ def cycle_of_design(evaluation: Evaluation, row: int, joints: int) -> dict[str, 
         joints: Its number of joints.
 
     Returns:
-        seconds: the duration of each motion; q: its joint values at equal shares, two for a joint motion.
+        seconds: the duration of each motion; q: its joint values at equal shares.
     """
     _, paths = evaluation.paths.of_arm(row)
-    shares = [np.linspace(0.0, 1.0, 2 if path.motion.by == "joint" else LINE_POINTS) for path in paths]
-    q = [path.at(share)[0, :, :joints] for path, share in zip(paths, shares, strict=True)]
-    return {"seconds": _rounded(_durations(evaluation)[row]), "q": [_rounded(values) for values in q]}
+    q = [_rounded(_points(path)[:, :joints]) for path in paths]
+    return {"seconds": _rounded(_durations(evaluation)[row]), "q": q}
+
+
+def _points(path: MotionPath) -> Array:
+    """Return (F, D) joint values of one arm at equal shares, between which the path is nearly straight."""
+    n = next((n for n in LINE_POINTS if _distance(path, n) <= NEAR), LINE_POINTS[-1])
+    return path.at(np.linspace(0.0, 1.0, n))[0]
+
+
+def _distance(path: MotionPath, n: int) -> float:
+    """Return the largest distance of a joint [rad] or [m] from straight lines between n points of its path."""
+    share = np.linspace(0.0, 1.0, n)
+    straight = make_interp_spline(share, path.at(share)[0], k=1)
+    return float(np.abs(straight(path.share) - path.q[0]).max())
 
 
 def _durations(evaluation: Evaluation) -> Array:
