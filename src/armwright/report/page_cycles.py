@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
@@ -52,9 +51,11 @@ def _points(path: MotionPath) -> Array:
 
 def _distance(path: MotionPath, n: int) -> float:
     """Return the largest distance of a joint [rad] or [m] from straight lines between n points of its path."""
-    share = np.linspace(0.0, 1.0, n)
-    straight = make_interp_spline(share, path.at(share)[0], k=1)
-    return float(np.abs(straight(path.share) - path.q[0]).max())
+    points, at = path.at(np.linspace(0.0, 1.0, n))[0], path.share * (n - 1)
+    before = np.minimum(at.astype(np.intp), n - 2)
+    part = (at - before)[:, None]
+    straight = (1.0 - part) * points[before] + part * points[before + 1]
+    return float(np.abs(straight - path.q[0]).max())
 
 
 def _durations(evaluation: Evaluation) -> Array:
