@@ -202,7 +202,7 @@ def wrist_arm() -> Arm:
 
 def test_arm_leans_over_its_shoulder_without_turning() -> None:
     frames = [{"position": [0.0, y, 0.5], "orientation": [np.pi, 0.0, 0.0]} for y in (0.2, -0.2)]
-    paths = through(wrist_arm(), *frames, candidates=16)
+    paths = through(wrist_arm(), *frames)
     assert tolerated(paths).all()
     (path,) = paths.of_arm(0)[1]
     assert np.ptp(path.q[0, :, 0]) < 1e-3
@@ -302,7 +302,7 @@ def test_candidate_that_collides_gives_way_to_one_that_does_not() -> None:
 
 def test_first_candidates_stay_when_there_are_more() -> None:
     found = case(6, "axis")
-    few, many = (entry_postures(found.arrays, found.plan, k) for k in (4, 8))
+    few, many = (entry_postures(found.arrays, found.plan, candidates=k) for k in (4, 8))
     assert np.array_equal(few, many[:, :, :4])
 
 

@@ -24,7 +24,8 @@ from armwright.kinematics.motion_path import MotionPath
 from armwright.tasks.motions import CyclePlan, LineSamples, Poses, stack_poses
 from armwright.tasks.obstacles import Obstacle
 
-CANDIDATES = 4  # postures at each block's first pose
+STARTS = 16  # of the inverse kinematics at each block's first pose
+CANDIDATES = 4  # of the postures found there that lines are followed from
 MAX_STEP = 0.05  # [rad] between neighbouring samples
 MAX_SLIDE = 0.005  # [m] likewise of sliding joints
 JOINT_STEPS = 16  # of a joint motion
@@ -36,8 +37,11 @@ LOOPS = 3  # of a closed cycle without joint motions, until it ends where it beg
 DISTINCT = 1e-3  # [rad] or [m] between candidates; nearer ones are the same
 CLOSED = 1e-3  # [rad] or [m] between its ends
 ON_LIMIT = 1e-6  # [rad] or [m] from the limit of a joint
+LARGE_STEP = 0.5  # [rad] or [m] between coarse samples, where a jump is possible
+SUSPECT = 100.0  # cost of such a step: above any detour, below what is certain to be infeasible
 DEPTH = 1e-3  # [m] of a collision that costs as much as a path that is off by its tolerance
 CHUNK = 2**12  # samples that a thread takes at a time
+SPENT = 1e12  # cost of a posture that is a candidate already
 BLOCKED = 1e3  # cost in seconds or radians of a chain that is off by its tolerance, far above any detour
 
 
@@ -184,14 +188,14 @@ def _choose(
         joint motions to the allowed one, and (N,) True if the path is so far off that more samples cannot mend it.
     """
     samples = plan.sample()
-    entry = entry_postures(arms, plan, candidates, device)
+    entry = entry_postures(arms, plan, obstacles, candidates, device)
     lines = follow_lines(arms, samples, entry, device)
     starts, ends = lines.ends(samples)
     for _ in range(LOOPS if plan.is_loop else 0):
         lines = follow_lines(arms, samples, ends, device)
         starts, ends = lines.ends(samples)
     speed = _speeds(arms)
-    blocks = _block_costs(lines, samples, speed)
+    blocks = _block_costs(arms, lines, samples, speed)
     same = np.abs(starts[:, :, :, None] - starts[:, :, None]).max(axis=-1) < DISTINCT  # (N, B, K, K)
     blocks[np.tril(same, -1).any(axis=-1)] = np.inf  # equal to an earlier candidate
     if plan.is_loop:
@@ -220,15 +224,22 @@ def _speeds(arms: ArmArrays) -> Array:
     return np.where(np.isfinite(speed), speed, 1.0)
 
 
-def _block_costs(lines: BlockPaths, samples: LineSamples, speed: Array) -> Array:
-    """Return the (N, B, K) cost of each block: least time along its lines, and what it is off by."""
+def _block_costs(arms: ArmArrays, lines: BlockPaths, samples: LineSamples, speed: Array) -> Array:
+    """Return the (N, B, K) cost of each block: least time along its lines, what it is off by, and what may jump."""
     poses, first = samples.poses, samples.first[:-1]
     off = np.maximum(lines.position_error / poses.tolerance, lines.angle_error / poses.angle_tolerance)
-    step = np.zeros(off.shape)
-    step[:, :, 1:] = (np.abs(np.diff(lines.q, axis=2)) / speed[:, None, None]).max(axis=-1)
-    step[:, :, first] = 0.0
+    change = np.zeros(lines.q.shape)
+    change[:, :, 1:] = np.abs(np.diff(lines.q, axis=2))
+    change[:, :, first] = 0.0
+    lower, upper = arms.lower[:, None, None], arms.upper[:, None, None]
+    on_limit = np.minimum(lines.q - lower, upper - lines.q) <= ON_LIMIT
+    on_limit = np.any(on_limit & (arms.motion < FIXED)[:, None, None], axis=-1)
+    on_limit[:, :, first] = False
+    blocked = BLOCKED * on_limit + SUSPECT * (change.max(axis=-1) > LARGE_STEP)
+    step = (change / speed[:, None, None]).max(axis=-1)
     worst = np.maximum.reduceat(off, first, axis=2).swapaxes(1, 2)
-    return np.add.reduceat(step, first, axis=2).swapaxes(1, 2) + _cost_of(worst - 1.0)
+    cost = np.add.reduceat(step, first, axis=2).swapaxes(1, 2) + _cost_of(worst - 1.0)
+    return cost + np.maximum.reduceat(blocked, first, axis=2).swapaxes(1, 2)
 
 
 def _cost_of(excess: Array) -> Array:
@@ -343,24 +354,59 @@ def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device) -> list[Any
     return [next(errors) if path.motion.by == "line" else None for path in group.paths]
 
 
-def entry_postures(arms: ArmArrays, plan: CyclePlan, candidates: int = CANDIDATES, device: Device = "cpu") -> Array:
-    """Return (N, B, K, D) postures at the first pose of each block, the first candidate from the straight arm."""
+def entry_postures(
+    arms: ArmArrays,
+    plan: CyclePlan,
+    obstacles: Sequence[Obstacle] = (),
+    candidates: int = CANDIDATES,
+    device: Device = "cpu",
+) -> Array:
+    """Return (N, B, K, D) postures at the first pose of each block: the best of several starts that differ.
+
+    The first start is the straight arm, the others are spread over the joints' ranges. Postures are ranked by what they
+    are off by and how deep they collide, then by their distance to the joint limits.
+    """
     poses = plan.poses[[block.entry for block in plan.blocks]]
-    repeated = poses[np.repeat(np.arange(len(poses)), candidates)]
-    shares = np.random.default_rng(0).uniform(size=(candidates, MAX_JOINTS))[:, : arms.dof]
+    n, b, starts = len(arms), len(poses), max(STARTS, candidates)
+    repeated = poses[np.repeat(np.arange(b), starts)]
     lower, upper = arms.lower.astype(np.float64), arms.upper.astype(np.float64)
-    start = lower[:, None] + shares * (upper - lower)[:, None]  # (N, K, D)
+    shares = np.random.default_rng(0).uniform(size=(starts, MAX_JOINTS))[:, : arms.dof]
+    start = lower[:, None] + shares * (upper - lower)[:, None]  # (N, S, D)
     start[:, 0] = 0.0
     start = np.where(arms.motion[:, None] == FIXED, 0.0, start)
     solved = solve_postures(
         arms,
         repeated.position,
-        initial_q=np.tile(start, (1, len(poses), 1)),
+        initial_q=np.tile(start, (1, b, 1)),
         target_arrays=repeated.arrays,
         precision=arms.precision,
         device=device,
     )
-    return solved.q.astype(np.float64).reshape(len(arms), len(poses), candidates, arms.dof)
+    q = solved.q.astype(np.float64)
+    distance = np.linalg.norm(solved.reached - repeated.position, axis=-1)
+    off = np.maximum(distance / repeated.tolerance, solved.angle / repeated.angle_tolerance)
+    depth = np.maximum(0.0, -np.minimum(*clearances(arms, q, obstacles, device)))
+    room = np.minimum(q - lower[:, None], upper[:, None] - q) / (upper - lower)[:, None]
+    room = np.where(arms.motion[:, None] == FIXED, 1.0, room).min(axis=-1)
+    cost = (_cost_of(off - 1.0) + _cost_of(depth / DEPTH) - room).reshape(n, b, starts)
+    return _spread(q.reshape(n, b, starts, arms.dof), cost, candidates)
+
+
+def _spread(q: Array, cost: Array, count: int) -> Array:
+    """Return (N, B, K, D) of the postures (N, B, S, D): the cheapest, then the ones farthest from those chosen before.
+
+    cost: (N, B, S), far above any distance for postures that are off or collide.
+    """
+    chosen: list[Array] = []
+    nearness = cost
+    distance = np.full(cost.shape, np.inf)
+    for _ in range(count):
+        best = nearness.argmin(axis=-1)[..., None]
+        posture = np.take_along_axis(q, best[..., None], axis=2)
+        chosen.append(posture)
+        distance = np.minimum(distance, np.abs(q - posture).max(axis=-1))
+        nearness = np.where(distance < DISTINCT, SPENT, cost - distance)
+    return np.concatenate(chosen, axis=2)
 
 
 def follow_lines(arms: ArmArrays, samples: LineSamples, entry: Array, device: Device = "cpu") -> BlockPaths:
