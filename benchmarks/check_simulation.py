@@ -21,9 +21,7 @@ def check(folder: Path) -> list[str]:
     with (folder / "trajectory.csv").open() as file:
         rows = list(csv.DictReader(file))
     n = model.nu // 2
-    q, qd, tau = (np.array([[float(r[f"{x}_{k + 1}"]) for k in range(n)] for r in rows]) for x in ("q", "qd", "tau"))
-    gains = np.array([[model.actuator(f"servo_{k + 1}").gainprm[0] for k in range(n)],
-                      [-model.actuator(f"servo_{k + 1}").biasprm[2] for k in range(n)]])  # fmt: skip
+    q, tau = (np.array([[float(r[f"{x}_{k + 1}"]) for k in range(n)] for r in rows]) for x in ("q", "tau"))
     servo = np.array([model.actuator(f"servo_{k + 1}").id for k in range(n)])
     forward = np.array([model.actuator(f"ff_{k + 1}").id for k in range(n)])
     payload, tip = model.body("payload").id, model.site("tip").id
@@ -54,8 +52,7 @@ def check(folder: Path) -> list[str]:
             data.qpos[:], data.qvel[:] = state
         for s in range(substeps):
             now = (s + 0.5) / substeps
-            at, speed, torque = ((1.0 - now) * x[i] + now * x[i + 1] for x in (q, qd, tau))
-            data.ctrl[servo], data.ctrl[forward] = at + gains[1] / gains[0] * speed, torque
+            data.ctrl[servo], data.ctrl[forward] = ((1.0 - now) * x[i] + now * x[i + 1] for x in (q, tau))
             mujoco.mj_step(model, data)
             saturated += np.abs(data.qfrc_actuator) >= (1.0 - 1e-6) * limit
             steps += 1

@@ -1,7 +1,7 @@
 """The exported model of a design, driven through its trajectory in MuJoCo.
 
-Each joint is driven by the torque of the trajectory as feed-forward and by its servo: kp (q* - q) + kv (q̇* - q̇), with
-q* and q̇* from the trajectory, interpolated between its rows. The servo of the model is given q* + kv/kp q̇*.
+Each joint is driven by the torque of the trajectory as feed-forward and by its servo, kp (q* - q), with q* from the
+trajectory, interpolated between its rows. What damps is the friction of the joints.
 """
 
 from dataclasses import asdict, dataclass
@@ -134,8 +134,8 @@ def drive(model_xml: str, trajectory: Trajectory, target_names: tuple[str, ...],
         model_xml: MJCF, as `to_simulation_mjcf` writes it.
         trajectory: R rows.
         target_names: Names of the targets.
-        feed_forward: Whether the drives are given the torques of the trajectory. Without them and the reference of the
-            speed, servos alone hold the positions.
+        feed_forward: Whether the drives are given the torques of the trajectory. Without them, servos alone hold the
+            positions.
     """
     check_extra("sim", "the simulation")
     return _Driver(model_xml, trajectory, target_names, feed_forward).run()
@@ -189,16 +189,13 @@ class _Driver:
 
     def _commands(self) -> tuple[Array, Array]:
         """Return the (S, D) positions for the servos and torques for the feed-forward, at the middle of substeps."""
-        trajectory, gain = self._trajectory, self._model.actuator_gainprm[: self._n, 0]
-        damping = -self._model.actuator_biasprm[: self._n, 2]
+        trajectory = self._trajectory
         share = ((np.arange(SUBSTEPS) + 0.5) / SUBSTEPS)[:, None]
 
         def between(values: Array) -> Array:
             return (values[:-1, None] + share * (values[1:] - values[:-1])[:, None]).reshape(-1, self._n)
 
-        if not self._feed_forward:
-            return between(trajectory.q), np.zeros(((len(trajectory.q) - 1) * SUBSTEPS, self._n))
-        return between(trajectory.q + damping / gain * trajectory.qd), between(trajectory.tau)
+        return between(trajectory.q), self._feed_forward * between(trajectory.tau)
 
     def _carry(self, mass: float) -> None:
         """Give the payload this mass, and in proportion its inertia; NOTHING for 0."""

@@ -32,7 +32,6 @@ from armwright.tasks.targets import TargetArrays
 TIMESTEP = 0.001  # [s]
 NOTHING = 1e-9  # mass [kg] and moments of inertia [kg m²] of a payload that is not carried
 STIFFNESS = 20.0  # [1/rad] or [1/m] position gain of a joint without actuator, relative to its peak torque
-DAMPING = 0.05  # [s] damping gain, relative to the position gain, where none is stated
 
 # Geoms touch if a type of one is among the affinities of the other.
 OBSTACLE, LINK = 1, 2
@@ -211,19 +210,19 @@ def _add_actuators(root: Element, arm: Arm, peak_torques: Array) -> None:
     actuators = SubElement(root, "actuator")
     joints = [joint for _, joint in moving_joints(arm)]
     for k, (joint, peak) in enumerate(zip(joints, peak_torques.tolist(), strict=True), start=1):
-        kp, kv = _gains(joint, peak)
-        gains = {"kp": number(kp), "kv": number(kv)}
-        SubElement(actuators, "position", {"name": f"servo_{k}", "joint": f"joint_{k}", **gains})
+        servo = {"name": f"servo_{k}", "joint": f"joint_{k}", "kp": number(_position_gain(joint, peak))}
+        SubElement(actuators, "position", servo)
     for k in range(1, len(joints) + 1):
         SubElement(actuators, "motor", {"name": f"ff_{k}", "joint": f"joint_{k}", "gear": "1"})
 
 
-def _gains(joint: Joint, peak: float) -> tuple[float, float]:
-    """Return position gain [N m/rad] and damping gain [N m s/rad] of a joint, or [N/m] and [N s/m]."""
-    actuator, travel = joint.actuator, joint.travel
+def _position_gain(joint: Joint, peak: float) -> float:
+    """Return the position gain of a joint [N m/rad] or [N/m].
+
+    A position actuator of MuJoCo would damp the speed itself, not its deviation from the desired speed, so the damping
+    gain of the servo would delay the tool by 0.05 to 0.2 s. The friction of the joint damps enough.
+    """
+    actuator = joint.actuator
     if actuator is None or actuator.position_gain is None:
-        gain = STIFFNESS * (joint.effort or max(peak, NOTHING))
-        return gain, DAMPING * gain
-    gain = actuator.position_gain / travel**2
-    damping = actuator.damping_gain
-    return gain, DAMPING * gain if damping is None else damping / travel**2
+        return STIFFNESS * (joint.effort or max(peak, NOTHING))
+    return actuator.position_gain / joint.travel**2
