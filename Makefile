@@ -6,10 +6,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constr
 
 .PHONY: demo test test-all torture check gp docs docs-serve format bench package fuzz audit clean
 
-demo: .venv/.run  ## replay a language model's proposals for target-1, then design an arm with real motors
+demo: .venv/.run  ## replay a language model's proposals, then design an arm with real motors and drive it in MuJoCo
 	$(BIN)/armwright optimize target-1 --proposer replay:target-1-plus-seed0 --out runs/demo-model
 	$(BIN)/armwright design examples/2-assembly-task.yaml --space examples/2-assembly-space.yaml --out runs/demo-arm
 	$(BIN)/armwright pick runs/demo-arm --robust --by cycle_time
+	$(BIN)/armwright simulate runs/demo-arm
 
 test: .venv/.test  ## the fast tests: two minutes on two cores, without browser and other processes
 	$(BIN)/python -m pytest -m "not slow"
@@ -62,7 +63,7 @@ audit: .venv/.audit  ## known faults of all that may be installed, extras includ
 	@touch $@
 
 .venv/.run: .venv/.python pyproject.toml constraints.txt
-	$(PIP) --editable '.[live,llm]'
+	$(PIP) --editable '.[live,llm,sim]'
 	@touch $@
 
 .venv/.test: .venv/.run
@@ -86,7 +87,7 @@ audit: .venv/.audit  ## known faults of all that may be installed, extras includ
 	@touch $@
 
 .venv/.gp: .venv/.run
-	$(PIP) --editable '.[gp,live,llm]'
+	$(PIP) --editable '.[gp,live,llm,sim]'
 	@touch $@
 
 .venv/.package: .venv/.python
