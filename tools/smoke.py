@@ -136,7 +136,7 @@ def main(folder: Path) -> None:
     Path("out/urdf").rename("arm.urdf")
     armwright("compare-arms", "target-1", "arm.urdf", "--run", "run")
     health = armwright("doctor").stdout
-    assert health.count("-- extra") == 5, health
+    assert health.count("-- extra") == 6, health
     assert 'pip install "armwright[llm]"' in armwright("doctor", "--model", "openai-chat:gpt-4o", code=1).stdout
 
     Path("gp.yaml").write_text(EXPERIMENT.replace("proposer: none", "proposer: none, sampler: gp"))
