@@ -391,7 +391,7 @@ def have_begun(cells: list[Cell]) -> bool:
 
 def test_cell_of_a_killed_shell_worker_is_rerun(tmp_path: Path, shell: ShellCluster) -> None:
     victim, _ = shell.only(2)
-    _, cells = two_cells(tmp_path, n_total=300)
+    _, cells = two_cells(tmp_path, n_total=600)
 
     def kill() -> None:
         wait_until(lambda: have_begun(cells))
