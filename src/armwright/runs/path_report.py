@@ -21,6 +21,7 @@ from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.targets import REACHED
 
 VIA_DISTANCES = (0.05, 0.1, 0.2, 0.3)  # [m] of a via point from the tip where a step collides
+NEGLIGIBLE = 1e-3  # [mm], [°] of an error in texts
 VIA_SHARES = np.linspace(0.0, 1.0, 17)  # of the joint motions to and from a via point, at which it is checked
 
 # Label and unit of each extreme in texts, and the number of these units in a metre, radian or cubic metre.
@@ -187,4 +188,8 @@ def _manipulabilities(arm: ArmArrays, q: Array) -> Array:
 
 def _describe(name: str, extreme: Extreme) -> str:
     label, unit, factor = _SHOWN[name]
-    return f"{label} {factor * extreme.value:.3g}{unit} ({extreme.place})"
+    value = factor * extreme.value
+    shown = (
+        f"below {NEGLIGIBLE:g}" if 0.0 < value < NEGLIGIBLE and name in ("path_error", "path_angle") else f"{value:.3g}"
+    )
+    return f"{label} {shown}{unit} ({extreme.place})"
