@@ -59,10 +59,10 @@ class BlockPaths:
     position_error: Array
     angle_error: Array
 
-    def choose(self, samples: LineSamples, choice: IndexArray) -> Array:
-        """Return the (N, S, D) joint values from one candidate per block; choice: (N, B)."""
-        of_sample = np.repeat(choice, np.diff(samples.first), axis=1)  # (N, S)
-        return self.q[np.arange(len(choice))[:, None], of_sample, np.arange(len(samples.poses))]
+    def choose(self, samples: LineSamples, choice: IndexArray, arms: IndexArray) -> Array:
+        """Return the (n, S, D) joint values of some arms (n,) from one candidate per block; choice: (N, B)."""
+        of_sample = np.repeat(choice[arms], np.diff(samples.first), axis=1)  # (n, S)
+        return self.q[arms[:, None], of_sample, np.arange(len(samples.poses))]
 
     def ends(self, samples: LineSamples) -> tuple[Array, Array]:
         """Return the (N, B, K, D) first and last postures of each block."""
@@ -204,8 +204,8 @@ def _choose(
     change = np.abs(following[:, :, None] - ends[:, : len(plan.joint_motions), :, None])  # (N, E, K, K, D)
     edges = (change / speed[:, None, None, None]).max(axis=-1)
     choice = _avoid_collisions(arms, plan, samples, lines, blocks.copy(), edges.copy(), obstacles, device)
-    chosen = lines.choose(samples, choice)
-    arm, block = np.arange(len(arms))[:, None], np.arange(len(plan.blocks))
+    index, block = np.arange(len(arms), dtype=np.intp), np.arange(len(plan.blocks))
+    chosen, arm = lines.choose(samples, choice, index), index[:, None]
     steps = np.abs(np.diff(chosen, axis=1))
     steps[:, samples.first[1:-1] - 1] = 0.0  # from one block to the next
     joint_motion = np.arange(len(plan.joint_motions))
@@ -265,8 +265,7 @@ def _avoid_collisions(
     n_blocks, n_edges = blocks.shape[1], edges.shape[1]
     for _ in range(max(ROUNDS, blocks.shape[2])):
         part = arms[index]
-        of_sample = np.repeat(choice[index], np.diff(samples.first), axis=1)
-        chosen = lines.q[index[:, None], of_sample, np.arange(len(samples.poses))]  # (n, S, D)
+        chosen = lines.choose(samples, choice, index)  # (n, S, D)
         start = chosen[:, samples.first[1:] - 1][:, :n_edges]
         change = chosen[:, [samples.first[(b + 1) % n_blocks] for b in range(n_edges)]] - start
         between = start[:, :, None] + share[:, None] * change[:, :, None]  # (n, E, F, D)

@@ -10,7 +10,7 @@ from armwright.arrays import Array
 
 
 class PerArm:
-    """Arrays over arms, of which a slice is the same of fewer arms."""
+    """Arrays over arms; a part of them is the same arrays of fewer arms."""
 
     def __getitem__(self, part: slice | NDArray[np.integer]) -> Self:
         values = vars(self).items()
