@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.cycle_path import find_paths, tool_errors
+from armwright.kinematics.cycle_path import find_paths
+from armwright.kinematics.line_following import tool_errors
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace
 from armwright.tasks.task import Task

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.kinematics import cycle_path
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
-from armwright.kinematics.cycle_choice import choose_candidates
-from armwright.kinematics.cycle_path import MAX_SLIDE, MAX_STEP, CyclePaths, entry_postures, find_paths, follow_lines
+from armwright.kinematics.cycle_choice import CLOSED, MAX_SLIDE, MAX_STEP, choose_candidates
+from armwright.kinematics.cycle_path import CyclePaths, find_paths
+from armwright.kinematics.entry_postures import entry_postures
+from armwright.kinematics.line_following import follow_lines
 from armwright.kinematics.motion_path import MANY_SAMPLES, MotionPath
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.tasks.motions import Motion
@@ -53,6 +54,19 @@ def test_cases_have_arms_that_follow_their_cycle_and_arms_that_do_not() -> None:
     assert any(case(*key).paths.jumps.any() for key in CASES)
 
 
+def test_arms_keep_given_postures() -> None:
+    """Also those that they would not choose: the elbow of a planar arm, up and down."""
+    arm, targets = planar(0.3, 0.3), ((0.45, 0.0, 0.0), (0.4, 0.1, 0.0))
+    chosen = through(arm, *targets)
+    again = find_paths(stack_arms([arm], "float64"), chosen.plan, near=chosen.entry)
+    assert np.allclose(again.entry, chosen.entry, atol=1e-6)
+    assert again.path_error.max() < 1e-5
+    mirrored = find_paths(stack_arms([arm], "float64"), chosen.plan, near=chosen.entry * (1.0, -1.0))
+    assert np.sign(mirrored.entry[0, 0, 1]) == -np.sign(chosen.entry[0, 0, 1])
+    assert mirrored.path_error.max() < 1e-5
+    assert not mirrored.jumps.any()
+
+
 @pytest.mark.parametrize(("dof", "kind"), CASES)
 def test_joint_path_is_continuous_from_motion_to_motion(dof: int, kind: str) -> None:
     paths = case(dof, kind).paths
@@ -62,7 +76,7 @@ def test_joint_path_is_continuous_from_motion_to_motion(dof: int, kind: str) -> 
             assert np.abs(before.q[:, -1] - after.q[:, 0]).max() < 1e-9
         closed = paths.plan.cycle.closed and not (paths.plan.is_loop and paths.jumps[row, -1])
         if closed:
-            limit = cycle_path.CLOSED if paths.plan.is_loop else 1e-9
+            limit = CLOSED if paths.plan.is_loop else 1e-9
             assert np.abs(motions[-1].q[:, -1] - motions[0].q[:, 0]).max() <= limit
 
 
@@ -230,7 +244,7 @@ def test_loop_of_lines_ends_where_it_began() -> None:
         paths = through(arm, *corners, steps=lines, closed=True)
         motions = paths.of_arm(0)[1]
         gap = np.abs(motions[-1].q[:, -1] - motions[0].q[:, 0]).max()
-        assert paths.jumps[0, -1] == (gap > cycle_path.CLOSED)
+        assert paths.jumps[0, -1] == (gap > CLOSED)
         assert len(arm.joints) > 2 or gap < 1e-6
 
 

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from armwright.exceptions import SettingsError
+from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.objectives import MOTION_QUANTITIES, OBJECTIVES, PATH_QUANTITIES
 from armwright.problem.problem import Problem
+from armwright.runs.verification import verify
 from armwright.spaces.design_space import DesignSpace, load_space
+from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.task import Task
 
 DOWN = [0, 0, -1]
@@ -199,3 +202,32 @@ def test_cycles_with_a_target_out_of_reach_are_refused() -> None:
 def test_no_design_reaches_further_than_the_longest_arm(space: DesignSpace) -> None:
     problem = Problem(task().model_copy(update={"cycle": None}), space)
     assert max(problem.arm(design).reach for design in space.sample(200, 0)) <= problem.max_reach + 1e-12
+
+
+# Build tolerance
+
+
+def test_robust_values_are_the_worst_of_copies_that_keep_the_postures_of_the_arm() -> None:
+    problem, robust = Problem(task(), DRIVEN), Problem(task(), DRIVEN, tolerance=TOLERANCE)
+    rows = DRIVEN.matrix(DRIVEN.sample(N, 0))
+    exact = problem.physics(rows)
+    copies = [problem.physics_of_arms(problem.arms(moved), near=exact.cycle_paths) for moved in perturbed(DRIVEN, rows)]
+    reached = ~exact.unreached.any(axis=1)
+    assert reached.any()
+    for copy in copies:
+        assert np.abs(copy.paths.entry - exact.paths.entry)[reached].max() < 0.3  # [rad]; another branch is further
+    outcomes = [problem.outcomes(one) for one in (exact, *copies)]
+    found = robust.evaluate_matrix(rows)
+    assert np.array_equal(found.values, np.max([one.values for one in outcomes], axis=0))
+    assert np.array_equal(found.violations, np.max([one.violations for one in outcomes], axis=0))
+
+
+def test_other_starts_change_nothing_along_a_cycle() -> None:
+    problem = Problem(task(), DRIVEN)
+    designs = DRIVEN.sample(3, 0)
+    found = verify(problem, designs, problem.evaluate(designs).values, (1.0,))
+    assert np.array_equal(found.started, found.exact)
+    scene = problem.scenes[0]
+    arms = problem.arms(DRIVEN.matrix(designs), "float64")
+    started = evaluate_arrays(arms, scene, initial_q=np.full(arms.dof, 0.05))
+    assert np.array_equal(started.q, evaluate_arrays(arms, scene).q)

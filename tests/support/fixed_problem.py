@@ -66,7 +66,8 @@ def _fixed_paths(evaluation: Evaluation, plan: CyclePlan) -> CyclePaths:
     error = evaluation.position_error[:, targets] + 0.025
     clearances = np.full((2, *error.shape), np.inf)
     nothing = np.zeros(error.shape)
-    return CyclePaths(plan, (), error, nothing, *clearances, nothing, nothing > 0.0, np.zeros((*error.shape, 3)))
+    worst, entry = np.zeros((*error.shape, 3)), evaluation.q[:, [block.entry for block in plan.blocks]]
+    return CyclePaths(plan, entry, (), error, nothing, *clearances, nothing, nothing > 0.0, worst)
 
 
 LENGTH = Objective(

@@ -238,7 +238,11 @@ def evaluate(
 
 
 def evaluate_arrays(
-    arrays: ArmArrays, scene: Scene, device: Device = "cpu", initial_q: ArrayLike | None = None
+    arrays: ArmArrays,
+    scene: Scene,
+    device: Device = "cpu",
+    initial_q: ArrayLike | None = None,
+    near: CyclePaths | None = None,
 ) -> Evaluation:
     """Evaluate stacked arms at every target of a scene, in their precision.
 
@@ -247,7 +251,8 @@ def evaluate_arrays(
         scene: T targets.
         device: where the arms are evaluated.
         initial_q: initial joint values [rad] or [m] that broadcast to (N, T, D); None for the straight posture. The
-            restarts of the targets begin elsewhere.
+            restarts of the targets begin elsewhere. Where the cycle stops, its postures count instead.
+        near: Paths of N similar arms through the cycle, whose postures the arms keep; None to choose postures.
     """
     targets, arrays = scene.targets, carrying(arrays, scene.load_shape)
 
@@ -263,14 +268,21 @@ def evaluate_arrays(
             device=device,
         )
 
-    postures = solve(initial_q)
-    for other in _restarts(arrays, scene.target_arrays.restarts):
-        postures = _nearer(postures, solve(other), targets, scene.target_arrays)
-    paths = None
-    if scene.plan is not None:
-        paths = find_paths(arrays, scene.plan, scene.obstacles, device=device)
-        visited = paths.postures(len(targets))
-        postures = solve(np.where(np.isnan(visited), postures.q, visited), updates=0)
+    def nearest() -> Postures:
+        postures = solve(initial_q)
+        for other in _restarts(arrays, scene.target_arrays.restarts):
+            postures = _nearer(postures, solve(other), targets, scene.target_arrays)
+        return postures
+
+    if scene.plan is None:
+        paths, postures = None, nearest()
+    else:
+        entry = None if near is None else near.entry
+        paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=entry)
+        q = paths.postures(len(targets))
+        if np.isnan(q).any():
+            q = np.where(np.isnan(q), nearest().q, q)
+        postures = solve(q, updates=0)
     reached = postures.reached.astype(np.float64)
     return Evaluation(
         **vars(scene),

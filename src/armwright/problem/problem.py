@@ -10,6 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import EvaluatorError, SettingsError, TaskError
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
+from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, cycle_constraints, read_constraints
@@ -230,9 +231,9 @@ class Problem:
         matrix = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
         return self.physics_of_arms(self.arms(matrix))
 
-    def physics_of_arms(self, arms: ArmArrays, case: int = 0) -> Evaluation:
-        """Return the kinematics and statics of arms at all targets, in one case of the task."""
-        return evaluate_arrays(arms, self.scenes[case], self.device)
+    def physics_of_arms(self, arms: ArmArrays, case: int = 0, near: CyclePaths | None = None) -> Evaluation:
+        """Return the kinematics and statics of arms at all targets in one case; near as in `evaluate_arrays`."""
+        return evaluate_arrays(arms, self.scenes[case], self.device, near=near)
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
@@ -278,10 +279,11 @@ class Problem:
 
     def _variants(self, matrix: Array) -> Iterator[Evaluation]:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
-        for rows in (matrix, *(perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ())):
-            yield self.physics(rows)
-            for case in range(1, len(self.scenes)):
-                yield self.physics_of_arms(self.arms(rows), case)
+        for case in range(len(self.scenes)):
+            exact = self.physics_of_arms(self.arms(matrix), case)
+            yield exact
+            for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
+                yield self.physics_of_arms(self.arms(rows), case, near=exact.cycle_paths)
 
     @cached_property
     def _postures(self) -> int:

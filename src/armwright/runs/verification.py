@@ -4,7 +4,8 @@ Each design is evaluated again in float64: as it is, with its base or one link o
 postures (docs/method.md §10).
 
 Other start postures do not make a design sensitive: the posture that was found exists, and a controller that knows it
-can take it. They show whether the inverse kinematics would find an equally good one by itself.
+can take it. They show whether the inverse kinematics would find an equally good one by itself. Along a cycle there is
+nothing to show: its postures are chosen from many starts.
 """
 
 from collections.abc import Sequence
@@ -14,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
+from armwright.kinematics.cycle_path import CyclePaths
 from armwright.pareto import masked_objectives
-from armwright.problem.evaluation import evaluate_arrays
+from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.problem import Outcomes, Problem, worst_case
 from armwright.runs.history import History
 from armwright.spaces.parameters import Design
@@ -69,11 +71,12 @@ def verify(
         reference_point: (M,) scale of the allowed differences.
     """
     matrix = problem.space.matrix(designs)
-    exact = _outcomes(problem, matrix)
-    moved = worst_case([_outcomes(problem, copies) for copies in perturbed(problem.space, matrix)])
-    dof = problem.arms(matrix).dof
-    starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, (STARTS, len(problem.task.targets), dof))
-    started = worst_case([_outcomes(problem, matrix, start) for start in starts])
+    evaluations = _evaluate(problem, matrix)
+    exact = _outcomes(problem, evaluations)
+    paths = [evaluation.cycle_paths for evaluation in evaluations]
+    copies = perturbed(problem.space, matrix)
+    moved = worst_case([_outcomes(problem, _evaluate(problem, rows, near=paths)) for rows in copies])
+    started = exact if _visits_all(problem) else _started(problem, matrix)
     allowed = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
     built = worst_case([exact, moved])
     robust = _within(built, allowed)
@@ -87,8 +90,36 @@ def _within(outcomes: Outcomes, allowed: Array) -> NDArray[np.bool_]:
     return np.all(outcomes.values <= allowed, axis=1) & np.all(outcomes.violations <= ALLOWED_SHARE, axis=1)
 
 
-def _outcomes(problem: Problem, matrix: Array, start: Array | None = None) -> Outcomes:
-    """Evaluate designs in float64; start: (T, D) angles [rad], None for the straight start."""
-    arrays = problem.arms(matrix, "float64")
-    evaluations = [evaluate_arrays(arrays, scene, "cpu", start) for scene in problem.scenes]
+def _visits_all(problem: Problem) -> bool:
+    """Return whether the cycle stops at all targets, so that no posture depends on a start posture."""
+    plans = [scene.plan for scene in problem.scenes]
+    return all(plan is not None and len(set(plan.targets)) == len(problem.task.targets) for plan in plans)
+
+
+def _started(problem: Problem, matrix: Array) -> Outcomes:
+    """Return the worst from other start postures."""
+    shape = STARTS, len(problem.task.targets), problem.arms(matrix).dof
+    starts = np.random.default_rng(0).uniform(-START_SPREAD, START_SPREAD, shape)
+    return worst_case([_outcomes(problem, _evaluate(problem, matrix, start)) for start in starts])
+
+
+def _evaluate(
+    problem: Problem, matrix: Array, start: Array | None = None, near: Sequence[CyclePaths | None] = ()
+) -> list[Evaluation]:
+    """Evaluate designs in float64 in all cases of the task.
+
+    Args:
+        problem: The problem.
+        matrix: (N, P) designs.
+        start: (T, D) start posture [rad]; None for the straight one.
+        near: Paths of similar arms in each case, whose postures the designs keep.
+    """
+    arrays, near = problem.arms(matrix, "float64"), near or [None] * len(problem.scenes)
+    return [
+        evaluate_arrays(arrays, scene, initial_q=start, near=paths)
+        for scene, paths in zip(problem.scenes, near, strict=True)
+    ]
+
+
+def _outcomes(problem: Problem, evaluations: Sequence[Evaluation]) -> Outcomes:
     return worst_case([problem.outcomes(evaluation) for evaluation in evaluations])
