@@ -81,7 +81,7 @@ def _show(
     console: "Console", run: Path, results: "Sequence[SimulatedDesign]", choice: Sequence[dict[str, Any]]
 ) -> None:
     from armwright.cli.show_results import show_recommended
-    from armwright.runs.results import DESIGNS
+    from armwright.runs.design_folders import DESIGNS
     from armwright.runs.simulation import PASS, mujoco_version
 
     numbers = ("cycle [s]", "energy [J]", "tip error [mm]", "without feed-forward", "peak torque / claimed")

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from armwright.arrays import Array
 from armwright.report.drawing import write_drawn
 from armwright.robot.arm import Arm
-from armwright.runs.results import DESIGNS, FIGURES, design_name
+from armwright.runs.design_folders import DESIGNS, design_name
+from armwright.runs.results import FIGURES
 from armwright.runs.simulated_run import SimulatedMember
 from armwright.runs.simulation_model import TIMESTEP
 

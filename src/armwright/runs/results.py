@@ -2,15 +2,12 @@
 
 summary.json              the result of the run
 trials.csv, front.csv     all trials, and those of the front
-designs/NNNN/arm.urdf     each design of the front, for simulators
-designs/NNNN/design.json  its postures, errors and torques at every target
-designs/NNNN/arm.xml, trajectory.csv  with a cycle: its model for MuJoCo, and its motion (cycle_export.py)
+designs/NNNN/             each design of the front (design_folders.py)
 """
 
 import json
-import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,13 +16,9 @@ from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, replace_folder, to_csv
 from armwright.pareto import hypervolume, total_violation
-from armwright.problem.evaluation import Evaluation
-from armwright.problem.unreached_reason import unreached_reason
-from armwright.robot.arm import Arm
-from armwright.robot.urdf_writer import to_urdf
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.config import FrontMethod, RunConfig
-from armwright.runs.cycle_export import cycle_files
+from armwright.runs.design_folders import DESIGNS, design_name, objective_record, violation_record, write_designs
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.front_gap import front_gap
 from armwright.runs.history import History
@@ -37,7 +30,6 @@ from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify_front
 
 SUMMARY = "summary.json"
-DESIGNS = "designs"
 FIGURES = "figures"  # drawn by report/figures.py
 REPORT = "report.html"  # made by report/page.py
 TABLES = ("trials.csv", "front.csv")
@@ -62,7 +54,7 @@ def write_results(
     folder.write_text("trials.csv", to_csv(rows))
     on_front = sorted(member.number for member in history.front)
     folder.write_text("front.csv", to_csv(rows[number] | _flat_verdict(verdicts.get(number)) for number in on_front))
-    _write_designs(folder, history, verdicts)
+    write_designs(folder, history, verdicts)
     folder.write_text(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
@@ -267,7 +259,7 @@ def _verdicts(history: History, verification: Verification | None) -> dict[int, 
         member.number: {
             "robust": bool(verification.robust[i]),
             "from_any_start": bool(verification.from_any_start[i]),
-            **{case: _objectives(history, getattr(verification, case)[i].tolist()) for case in CASES},
+            **{case: objective_record(history, getattr(verification, case)[i].tolist()) for case in CASES},
         }
         for i, member in enumerate(history.front)
     }
@@ -319,70 +311,8 @@ def _overlap_record(history: History, config: RunConfig, reserved: Sequence[Fini
     }
 
 
-def _write_designs(folder: RunFolder, history: History, verdicts: Mapping[int, Mapping[str, Any]]) -> None:
-    names = {design_name(member.number) for member in history.front}
-    for stale in (folder.path / DESIGNS).glob("[0-9]*"):
-        if stale.name not in names:
-            shutil.rmtree(stale)
-    if not history.front:
-        return
-    evaluation = history.evaluation([member.number for member in history.front])
-    for row, (member, record) in enumerate(zip(history.front, _design_records(history, evaluation), strict=True)):
-        place, name = f"{DESIGNS}/{design_name(member.number)}", f"{history.problem.task.name}-{member.number}"
-        folder.write_text(f"{place}/arm.urdf", to_urdf(member.arm, name))
-        for file, text in cycle_files(history.problem, member.arm, evaluation, row, name).items():
-            folder.write_text(f"{place}/{file}", text)
-        if member.number in verdicts:
-            record["verification"] = verdicts[member.number]
-        folder.write_text(f"{place}/design.json", json.dumps(record, indent=2) + "\n")
-
-
-def design_name(number: int) -> str:
-    """Return the name of a design's folder."""
-    return f"{number:04d}"
-
-
-def _design_records(history: History, evaluation: Evaluation) -> Iterator[dict[str, Any]]:
-    """Yield the content of design.json for each design of the front, which was evaluated."""
-    for row, member in enumerate(history.front):
-        trial = history.trials[member.number]
-        yield {
-            "number": member.number,
-            "source": member.source,
-            "reason": trial.reason,
-            "params": dict(member.design.params),
-            "objectives": _objectives(history, member.values),
-            **({"violations": _violations(history, trial)} if trial.violations else {}),
-            "masses": history.problem.space.mass_note,
-            **path_record(evaluation, row),
-            "targets": [_target_record(evaluation, row, t, member.arm) for t in range(len(evaluation.targets))],
-        }
-
-
-def _target_record(evaluation: Evaluation, row: int, target: int, arm: Arm) -> dict[str, Any]:
-    """Return the posture of an arm, which is row `row` of an evaluation, at a target."""
-    angle_error = float(evaluation.angle_error[row, target])
-    return {
-        "target": evaluation.targets[target].tolist(),
-        "q": evaluation.q[row, target, : len(arm.joints)].tolist(),
-        "reached": evaluation.reached[row, target].tolist(),
-        "position_error": float(evaluation.position_error[row, target]),
-        **({"angle_error": angle_error} if evaluation.target_arrays.n_angular[target] else {}),
-        "unreached_reason": unreached_reason(arm, evaluation, row, target) or None,
-        "joint_torques": evaluation.joint_torques[row, target, : len(arm.joints)].tolist(),
-    }
-
-
 def _row(history: History, trial: FinishedTrial) -> dict[str, Any]:
     """Return a trial as a row of trials.csv."""
     params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
-    objectives, violations = _objectives(history, trial.values), _violations(history, trial)
+    objectives, violations = objective_record(history, trial.values), violation_record(history, trial)
     return {"number": trial.number, "source": trial.source, **params, **objectives, **violations}
-
-
-def _violations(history: History, trial: FinishedTrial) -> dict[str, float]:
-    return {c.description: value for c, value in zip(history.problem.constraints, trial.violations, strict=True)}
-
-
-def _objectives(history: History, values: Sequence[float]) -> dict[str, float]:
-    return {o.name: value for o, value in zip(history.problem.objectives, values, strict=True)}

@@ -12,8 +12,8 @@ import numpy as np
 
 from armwright.kinematics.trajectory import PERIOD
 from armwright.runs.cycle_export import DIGITS
+from armwright.runs.design_folders import DESIGNS, design_name
 from armwright.runs.folder import RunFolder
-from armwright.runs.results import DESIGNS, design_name
 from armwright.runs.simulated_run import SimulatedMember
 from armwright.runs.simulation import PASS, mujoco_version
 from armwright.runs.simulation_model import TIMESTEP
