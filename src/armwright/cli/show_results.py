@@ -16,6 +16,7 @@ from armwright.cli.streams import format_point, list_files, plain_table
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.report.style import look
+from armwright.runs.assumptions import assumed_values, count_assumed
 from armwright.runs.history import FrontMember, History
 from armwright.runs.path_report import describe_extremes
 from armwright.runs.results import REPORT, describe_infeasibility
@@ -51,6 +52,7 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
     notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if is_scaled else []
     notes += [problem.space.mass_note, payload_note(problem.task), *unused_parts(problem)]
     console.print("; ".join(filter(None, notes)))
+    _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))
     _show_files(console, run.folder, figures)
 
@@ -80,8 +82,15 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     infeasible = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
     console.print(f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}")
     console.print(run.history.problem.space.mass_note)
+    _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))
     _show_files(console, run.folder, figures)
+
+
+def _show_assumed(console: Console, summary: dict[str, Any]) -> None:
+    """Print how many values of actuators are assumed, if any."""
+    if assumed := summary.get("assumed"):
+        console.print(f"assumed values of actuators: {count_assumed(assumed)} (listed in summary.json)")
 
 
 def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) -> None:
@@ -169,6 +178,8 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
         console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}")
         if along := describe_extremes(history.evaluation([member.number]), 0):
             console.print(f"  worst along its cycle: {along}")
+        if assumed := assumed_values(history.problem, [member.arm]):
+            console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
     first = picked[0].number
     console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
 

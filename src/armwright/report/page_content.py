@@ -24,6 +24,7 @@ from armwright.report.style import EXISTING, FRONT, INFEASIBLE, JOINT, JOINT_LAB
 from armwright.robot.arm import AXES, Arm, Joint, Link
 from armwright.robot.mjcf import to_mjcf
 from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.assumptions import assumed_values
 from armwright.runs.config import FrontMethod, Method, RunConfig
 from armwright.runs.folder import read_config
 from armwright.runs.front_gap import known_front
@@ -269,6 +270,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         ],
         "masses": space.mass_note,
         "is_toy": space.is_toy,
+        "assumed": assumed_values(config.problem),
         "method": describe_method(config),
         "command": repeat_command(config, any(trial.source == REFINE for trial in history), spent),
         "best_known": None if known is None or reference is None else hypervolume(known.values, reference),

@@ -14,6 +14,7 @@ from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import unreached_reason
 from armwright.robot.arm import Arm
 from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.assumptions import assumed_values
 from armwright.runs.cycle_export import cycle_files
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import History
@@ -51,6 +52,7 @@ def _design_records(history: History, evaluation: Evaluation) -> Iterator[dict[s
     """Yield the content of design.json for each design of the front, which was evaluated."""
     for row, member in enumerate(history.front):
         trial = history.trials[member.number]
+        assumed = assumed_values(history.problem, [member.arm])
         yield {
             "number": member.number,
             "source": member.source,
@@ -59,6 +61,7 @@ def _design_records(history: History, evaluation: Evaluation) -> Iterator[dict[s
             "objectives": objective_record(history, member.values),
             **({"violations": violation_record(history, trial)} if trial.violations else {}),
             "masses": history.problem.space.mass_note,
+            **({"assumed": assumed} if assumed else {}),
             **path_record(evaluation, row),
             "targets": [_target_record(evaluation, row, t, member.arm) for t in range(len(evaluation.targets))],
         }

@@ -16,6 +16,7 @@ from armwright.robot.sdf import to_sdf
 from armwright.robot.srdf import to_srdf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.robot.xacro import to_xacro
+from armwright.runs.assumptions import assumed_values, describe_assumed
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.selection import pick
@@ -60,6 +61,8 @@ def _sheet(history: History, member: FrontMember) -> str:
     notes.append(f"Targets are missed by {1e3 * evaluation.position_error.max():.2f} mm{angle} at most.")
     for target in np.flatnonzero(evaluation.unreached[0]):
         notes.append(f"Target {target + 1} is missed by {unreached_reason(member.arm, evaluation, 0, int(target))}.")
+    if assumed := assumed_values(history.problem, [member.arm]):
+        notes.append(f"Assumed values of actuators, defaults of their kind or estimates: {describe_assumed(assumed)}.")
     return sheet_markdown(_name(history, member), member.arm, _rows(history, member), notes)
 
 

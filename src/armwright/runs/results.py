@@ -16,6 +16,7 @@ from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, replace_folder, to_csv
 from armwright.pareto import hypervolume, total_violation
+from armwright.runs.assumptions import assumed_values
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.design_folders import DESIGNS, design_name, objective_record, violation_record, write_designs
@@ -181,8 +182,15 @@ def _common_record(
         "front_gap": None if gap is None else asdict(gap),
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
+        **_assumed_record(history),
         **_recommended_record(history),
     }
+
+
+def _assumed_record(history: History) -> dict[str, Any]:
+    """Return the assumed values of actuators in use in the front; empty without any."""
+    assumed = assumed_values(history.problem, [member.arm for member in history.front])
+    return {"assumed": assumed} if assumed else {}
 
 
 def _recommended_record(history: History) -> dict[str, Any]:

@@ -106,6 +106,7 @@ class _Summary(_Record):
     front_gap: FrontGap | None
     front_size: Count
     verification: _Verification | None
+    assumed: dict[str, dict[str, float]] = {}
     recommended: list[_Recommended] = []
 
 

@@ -92,7 +92,7 @@ export function drawDesign() {
   const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.description).join("; ")}.` : "";
   const lines = head.cycle ? ` Cycle: ${head.cycle}.` : "";
   const cases = head.cases ? ` Objectives are the worst of the nominal task and ${head.cases}; everything else is of the nominal task.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${solids}${lines}${boxes}`;
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${describeAssumed(i)}${solids}${lines}${boxes}`;
 }
 
 // Describes the quantities that constraints bound.
@@ -103,6 +103,15 @@ function describeConstraints(i) {
     return `${c.description}: ${number(has)} ${c.unit}${violations[k] > 0 ? " (violated)" : ""}`;
   });
   return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${values.join("; ")}.`;
+}
+
+// Names the values of its motors that are assumed.
+function describeAssumed(i) {
+  const { assumed } = content.head, chosen = content.chosen(i, "motor");
+  const motors = Object.keys(assumed).filter((motor) => !chosen.length || chosen.includes(motor));
+  const names = (motor) => Object.keys(assumed[motor]).join(", ").replaceAll("_", " ");
+  const byNames = new Map(motors.map((motor) => [names(motor), motors.filter((other) => names(other) === names(motor))]));
+  return [...byNames].map(([list, which]) => ` Assumed of ${which.join(", ")}: ${list}.`).join("");
 }
 
 function drawLinks(arm) {

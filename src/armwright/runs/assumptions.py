@@ -1,0 +1,53 @@
+"""Assumed values of actuators that enter the results of designs.
+
+A value is assumed if it is an estimate or the default of the actuator's kind (`ActuatorRecord.assumed`).
+"""
+
+from collections.abc import Iterable, Mapping
+
+from armwright.problem.problem import Problem
+from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
+from armwright.robot.arm import Arm
+
+STATIC = ("mass", "stall_torque", "peak_torque")
+ALONG_CYCLE = (
+    *STATIC, "voltage", "rated_torque", "speed", "corner_speed", "rotor_inertia", "coulomb_friction",
+    "viscous_friction", "position_gain", "current",
+)  # fmt: skip
+
+Assumed = Mapping[str, Mapping[str, float]]  # assumed values by actuator and name, in the units of UNITS
+
+
+def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None) -> Assumed:
+    """Return the assumed values that enter the results; actuators without any are left out.
+
+    Args:
+        problem: The problem.
+        arms: Arms whose actuators count; None for all actuators of the space.
+    """
+    records = problem.space.actuators
+    if arms is not None:
+        used = {joint.actuator.name for arm in arms for joint in arm.joints if joint.actuator is not None}
+        records = [record for record in records if record.name in used]
+    found = {record.name: _values(problem, record) for record in records}
+    return {name: values for name, values in found.items() if values}
+
+
+def _values(problem: Problem, record: ActuatorRecord) -> Mapping[str, float]:
+    entering = STATIC if problem.task.cycle is None else ALONG_CYCLE
+    completed = record.completed()
+    values = {name: value_of(completed, name) for name in record.assumed if name in entering}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def count_assumed(assumed: Assumed) -> str:
+    """Return how many values of each actuator are assumed: `7 of XM430-W350, 6 of XM540-W270`."""
+    return ", ".join(f"{len(values)} of {name}" for name, values in assumed.items())
+
+
+def describe_assumed(assumed: Assumed) -> str:
+    """Return all assumed values on one line, with units."""
+    return "; ".join(
+        f"{name}: " + ", ".join(f"{key.replace('_', ' ')} {value:.3g} {UNITS[key]}" for key, value in values.items())
+        for name, values in assumed.items()
+    )
