@@ -12,6 +12,7 @@ from armwright.kinematics.forward import joint_positions
 from armwright.report.page import write_report
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
+from armwright.runs.results import read_summary
 from armwright.tasks.task import Task
 from tests.support.browser import Tab
 
@@ -72,6 +73,15 @@ def test_motion_in_time_follows_the_joint_path(run: Path, tab: Tab, history: His
         assert (at["target"], at["step"]) == (target, target + 1)
     off_front = next(n for n in range(len(history)) if n not in {member.number for member in history.front})
     assert tab.ask(f"armwright.during(armwright.content.head, {off_front}, 0)") is None
+
+
+def test_recommended_designs_say_whether_they_are_verified(run: Path, tab: Tab) -> None:
+    summary = read_summary(run)
+    assert summary is not None
+    first = summary["recommended"][0]
+    tab.open(run / "report.html", f"#design={first['design']}")
+    assert f"Recommended ({first['role']}" in tab.text("#design-summary")
+    assert f"): {first['status']}." in tab.text("#design-summary")
 
 
 def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: History) -> None:

@@ -31,10 +31,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_finished_run_states_what_is_verified(run: Path) -> None:
     summary = read_summary(run)
     assert summary is not None
+    verdicts = [one.pop("assumed") for one in summary["recommended"]]
     assert summary["recommended"] == [
         {"role": role, "design": 0, "status": "verified", "demoted": []}
         for role in ("knee", "least peak_torque", "least length")
     ]
+    assert [list(verdict) for verdict in verdicts] == [["verdict", "changes", "broken", "simulated"]] * 3
     assert {file.name for file in (run / "designs" / "0000").iterdir()} >= {"arm.xml", "trajectory.csv"}
 
 
@@ -53,6 +55,7 @@ def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
         *("claimed_rms_torque", "peak_speed", "saturated_fraction"),
     ]
     assert json.loads((run / "simulation.json").read_text()) == content
+    assert "#0, verified; not with rated_torque halved (thermal utilisation" in armwright("simulate", run).stdout
     place = run / "designs" / "0000"
     assert (place / "figures" / "simulation.png").is_file()
     rows = (place / "simulation.csv").read_text().splitlines()

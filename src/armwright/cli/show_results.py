@@ -97,7 +97,8 @@ def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) ->
     """Print the recommended designs of a task with a cycle, and whether they were verified in the simulator."""
     for one in recommended:
         demoted = "".join(f"; #{other['design']} was demoted: {other['reason']}" for other in one["demoted"])
-        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}{demoted}")
+        assumed = "" if one["assumed"] is None else f"; {one['assumed']['verdict']}"
+        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}{assumed}{demoted}")
 
 
 def show_refined(console: Console, refined: RefinedRun) -> None:

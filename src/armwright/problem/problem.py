@@ -259,11 +259,13 @@ class Problem:
             SettingsError: one is not a finite number.
         """
         values = [measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives]
+        names = [f"objective {o.name}" for o in self.objectives]
+        return Outcomes(_finite(values, names, len(evaluation)), self.violations(evaluation))
+
+    def violations(self, evaluation: Evaluation) -> Array:
+        """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number."""
         violations = [constraint(evaluation) for constraint in self.constraints]
-        return Outcomes(
-            _finite(values, [f"objective {o.name}" for o in self.objectives], len(evaluation)),
-            _finite(violations, [f'constraint "{c.description}"' for c in self.constraints], len(evaluation)),
-        )
+        return _finite(violations, [f'constraint "{c.description}"' for c in self.constraints], len(evaluation))
 
     def _evaluate(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
         """Evaluate settled rows, with only the postures of one chunk in memory at a time."""

@@ -308,6 +308,7 @@ def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, An
         "seconds": search.get("seconds", sum(trial.seconds.get("total", 0.0) for trial in history)),
         "evaluations": search.get("evaluations", sum(trial.evaluations for trial in history)),
         "infeasible": search.get("infeasible", int((~history.feasible).sum())),
+        "recommended": parts.get("recommended", []),
         "robust": (parts.get("verification") or {}).get("robust_numbers"),
         "search": search.get("hypervolume_history"),
     }

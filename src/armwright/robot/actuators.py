@@ -5,7 +5,7 @@ and get the default of the actuator's kind.
 """
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
@@ -80,6 +80,17 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         Without a no-load speed or a voltage, the values that depend on it stay missing.
         """
         return self.model_copy(update={"peak_torque": self.peak_torque or self.stall_torque} | self._defaults())
+
+    def scaled(self, names: Iterable[str], factor: float) -> "ActuatorRecord":
+        """Return the completed record with these values multiplied; a corner speed stays within the no-load speed."""
+        record = self.completed()
+        values = {name: factor * value for name in names if (value := value_of(record, name)) is not None}
+        if "stall_torque" in values and self.peak_torque is None:
+            values["peak_torque"] = values["stall_torque"]
+        record = record.model_copy(update=values)
+        if record.corner_speed is None or record.speed is None:
+            return record
+        return record.model_copy(update={"corner_speed": min(record.corner_speed, record.speed)})
 
     def _defaults(self) -> dict[str, float]:
         """Return the defaults of the values that are not stated. The stall torque is a peak torque, if it is stated."""

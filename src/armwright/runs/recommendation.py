@@ -1,9 +1,13 @@
-"""The recommended designs of a front: its knee and its two ends, each verified in the simulator."""
+"""The recommended designs of a front: its knee and its two ends, each verified in the simulator.
+
+For each it is stated whether its verdict holds if assumed values of its actuators are halved or doubled.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armwright.exceptions import MissingExtraError, SettingsError
+from armwright.runs.assumed_changes import AssumedVerdict, vary_assumed
 from armwright.runs.history import History
 from armwright.runs.ranking import knee_first
 from armwright.runs.simulated_run import Simulator
@@ -30,12 +34,14 @@ class Recommendation:
         design: Its number.
         status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`.
         demoted: The designs tried before.
+        assumed: Whether this holds with assumed values halved and doubled; None without assumed values.
     """
 
     role: str
     design: int
     status: str
     demoted: tuple[Demoted, ...] = ()
+    assumed: AssumedVerdict | None = None
 
 
 def candidates(history: History) -> dict[str, list[int]]:
@@ -59,9 +65,12 @@ def recommend(history: History, simulator: Simulator | None = None) -> list[Reco
     """
     try:
         simulator = simulator or Simulator(history)
-        return [_verified(role, numbers, simulator) for role, numbers in candidates(history).items()]
+        chosen = [_verified(role, numbers, simulator) for role, numbers in candidates(history).items()]
     except (MissingExtraError, SettingsError):
-        return [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in candidates(history).items()]
+        chosen = [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in candidates(history).items()]
+    verified = {one.design: one.status == VERIFIED for one in chosen}
+    assumed = vary_assumed(history, verified)
+    return [replace(one, assumed=assumed.get(one.design)) for one in chosen]
 
 
 def _verified(role: str, numbers: Sequence[int], simulator: Simulator) -> Recommendation:

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 from armwright.exceptions import SettingsError
 from armwright.kinematics.trajectory import Trajectory
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm
 from armwright.runs.cycle_export import MODEL, TRAJECTORY, cycle_files, read_trajectory
 from armwright.runs.history import History
 from armwright.runs.simulation import Drive, Limits, SimulatedDesign, mujoco_version, read_limits, simulate_design
@@ -46,13 +49,26 @@ class Simulator:
     def __call__(self, number: int) -> SimulatedMember:
         """Return a simulated design; SettingsError if a duration of its steps is not known."""
         if number not in self.members:
-            self.members[number] = _simulate(self.history, number)
+            arm, evaluation = self.history.member(number).arm, self.history.evaluation([number])
+            self.members[number] = simulate_arm(self.history.problem, arm, evaluation, 0, number)
         return self.members[number]
 
 
-def _simulate(history: History, number: int) -> SimulatedMember:
-    problem, arm = history.problem, history.member(number).arm
-    files = dict(cycle_files(problem, arm, history.evaluation([number]), 0, f"{problem.task.name}-{number}"))
+def simulate_arm(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, number: int) -> SimulatedMember:
+    """Simulate an arm.
+
+    Args:
+        problem: The problem.
+        arm: The arm.
+        evaluation: Physics of some arms.
+        row: Which of them it is.
+        number: Number of its design.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        SettingsError: A duration of its steps is not known.
+    """
+    files = dict(cycle_files(problem, arm, evaluation, row, f"{problem.task.name}-{number}"))
     if not files:
         raise SettingsError(
             f"task {problem.task.name} leaves durations of steps open, and the arms have no actuators with known "

@@ -42,11 +42,25 @@ class _Demoted(_Record):
     reason: str
 
 
+class _Broken(_Record):
+    change: str
+    constraint: str
+    measured: float | None
+
+
+class _AssumedVerdict(_Record):
+    verdict: str
+    changes: Count
+    broken: list[_Broken]
+    simulated: list[str]
+
+
 class _Recommended(_Record):
     role: str
     design: Count
     status: str
     demoted: list[_Demoted]
+    assumed: _AssumedVerdict | None = None
 
 
 class _Age(_Record):

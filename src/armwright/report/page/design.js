@@ -78,7 +78,7 @@ export function drawDesign() {
   const mount = content.param(i, "mount");
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${feasible}${iteration}${motors}`;
+  $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${describeRecommended(i)}${feasible}${iteration}${motors}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;
@@ -103,6 +103,14 @@ function describeConstraints(i) {
     return `${c.description}: ${number(has)} ${c.unit}${violations[k] > 0 ? " (violated)" : ""}`;
   });
   return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${values.join("; ")}.`;
+}
+
+// Says for what it is recommended, and whether its verdict holds.
+function describeRecommended(i) {
+  const found = content.head.result.recommended.filter((one) => one.design === i);
+  if (!found.length) return "";
+  const { status, assumed } = found[0], roles = found.map((one) => one.role).join(", ");
+  return ` Recommended (${roles}): ${status}${assumed ? `; ${assumed.verdict}` : ""}.`;
 }
 
 // Names the values of its motors that are assumed.
