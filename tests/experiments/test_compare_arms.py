@@ -131,6 +131,16 @@ def test_base_search_beats_random_positions_within_the_ranges_of_the_space(compa
     assert compare_arms(TASK, [PANDA], space=SPACE, seed=1).arms[0].base != compared.arms[1].base
 
 
+def test_base_search_prefers_positions_that_meet_the_constraints() -> None:
+    task = TASK.model_copy(update={"constraints": ("manipulability >= 0.05", "clearance >= 0.1")})
+    (light,) = compare_arms(TASK, [UR5], space=SPACE).arms
+    (moved,) = compare_arms(task, [UR5], space=SPACE).arms
+    (placed,) = compare_arms(task, [UR5], space=SPACE, base=light.base).arms
+    assert placed.violated == ("manipulability >= 0.05 (it has 0.00373)",)
+    assert moved.violated == ()
+    assert moved.measures["unreached_targets"] == 0
+
+
 def test_dominance_counts_match_pairwise_comparison(history: History) -> None:
     values = np.array([member.values for member in history.front])
     for point in [
@@ -223,6 +233,22 @@ def test_violated_constraints_exclude_an_arm_from_the_front(tmp_path: Path) -> N
     assert panda.violated == ()
     assert panda.dominates is not None
     assert "unknown whether it meets self_clearance >= 0.01" in panda.notes
+
+
+def test_existing_arm_drives_a_cycle_of_stated_durations() -> None:
+    """A URDF states effort and speed; what else a drive can do is unknown, and so is the fastest cycle."""
+    cycle = {"time": 2.0, "steps": [{"to": 1}, {"to": 2}, {"to": 3}]}
+    task = Task(name="feeder", targets=TASK.targets, payload=0.5, cycle=cycle, objectives=["dynamic_torque", "price"])  # type: ignore[arg-type]
+    space = SPACE.model_copy(update={"actuators": DesignSpace(actuators=["XM540-W270"]).actuators})  # type: ignore[list-item]
+    (ur5,) = compare_arms(task, [UR5], space=space, base=(-0.2, 0.0, 0.0)).arms
+    peak = ur5.measures["peak_torque"]
+    assert peak is not None
+    assert ur5.values[0] > peak  # type: ignore[operator]
+    assert ur5.values[1] is None
+    unknown = ("collision", "dynamic_utilisation", "thermal_utilisation", "voltages")
+    assert {f"unknown whether it meets {name} <= {int(name != 'collision')}" for name in unknown} < set(ur5.notes)
+    fastest = task.model_copy(update={"cycle": task.cycle.model_copy(update={"time": "fastest"})})  # type: ignore[union-attr]
+    assert compare_arms(fastest, [UR5], space=space, base=(-0.2, 0.0, 0.0)).arms[0].values == (None, None)
 
 
 def test_slides_of_existing_arms_use_the_travel_of_the_space(tmp_path: Path) -> None:

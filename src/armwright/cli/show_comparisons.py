@@ -95,8 +95,8 @@ def show_arms(console: Console, comparison: ArmComparison, drawn: Sequence[Path]
     if comparison.positions:
         within = " x ".join(f"[{low:g}, {high:g}]" for low, high in (space.origin_x, space.origin_y, space.origin_z))
         console.print(
-            f"bases: {comparison.positions:,} positions tried for each arm in {within} m, by position error, then "
-            "torque; --base x,y,z fixes it"
+            f"bases: {comparison.positions:,} positions tried for each arm in {within} m, by position error, "
+            "constraints and torque; --base x,y,z fixes it"
         )
     names = ", ".join(objective.name for objective in objectives)
     for arm in comparison.arms:

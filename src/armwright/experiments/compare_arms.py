@@ -1,7 +1,7 @@
 """Compare existing arms on a task with the designs of a run.
 
 The base of an arm is given, or searched within the ranges of the design space: first for the smallest position error,
-then for the smallest torque.
+then for the smallest violation of constraints, then for the smallest torque.
 """
 
 import json
@@ -14,16 +14,14 @@ import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 
 from armwright.exceptions import RunFolderError, SettingsError, TaskError
-from armwright.experiments.base_placement import N_POSITIONS, placed_at, search_base, with_travel
+from armwright.experiments.base_placement import N_POSITIONS, known_values, placed_at, search_base, with_travel
 from armwright.kinematics.arm_arrays import FIXED, stack_arms
 from armwright.pareto import front_indices, knee_index, paper_solution_indices
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
-    CLEARANCE_QUANTITIES,
     PEAK_TORQUE,
     POSITION_ERROR,
-    PRICE,
     TORQUE,
     TORQUE_UTILISATION,
     UNREACHED_TARGETS,
@@ -250,13 +248,8 @@ def _compared(
 
 
 def _value(quantity: Objective, evaluation: Evaluation) -> float | None:
-    """Return a quantity of the arm; None if its URDF lacks what is needed: efforts, prices, or the shape of links."""
-    actuation = evaluation.arms.actuation
-    lacks_efforts = quantity == TORQUE_UTILISATION and actuation is None
-    lacks_prices = quantity == PRICE and (actuation is None or np.isnan(actuation.price).any())
-    if lacks_efforts or lacks_prices or quantity in CLEARANCE_QUANTITIES:
-        return None
-    return float(quantity(evaluation)[0])
+    values = known_values(quantity, evaluation)
+    return None if values is None else float(values[0])
 
 
 def _chosen_designs(history: History) -> list[ComparedArm]:
