@@ -18,6 +18,7 @@ from pathlib import Path
 from playwright.sync_api import Page
 
 from tests.support import browser
+from tests.support.robots import robot
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -94,15 +95,34 @@ def tutorial(folder: Path, page: Page, file: Path) -> None:
     page.screenshot(path=file)
 
 
-def arm_of(task: str, space: str, search: tuple[object, ...], at: str) -> Shot:
-    """Return a picture of the 3D view of an example."""
+def arm_of(task: str, space: str, budget: int, at: str, drag: int = 0, zoom: int = 0) -> Shot:
+    """Return a picture of the 3D view of an example, turned and enlarged by the mouse."""
 
     def shot(folder: Path, page: Page, file: Path) -> None:
-        run = once(folder, f"runs/{task}", search[0], EXAMPLES / task, "--space", EXAMPLES / space, *search[1:])
-        open_report(page, run, (1280, 1290), at)
+        command = ("design", EXAMPLES / task, "--space", EXAMPLES / space, "--budget", budget)
+        open_report(page, once(folder, f"runs/{task}", *command), (1280, 1290), at)
+        box = page.locator("#arm-box canvas").bounding_box()
+        assert box is not None
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + drag, y, steps=5)
+        page.mouse.up()
+        page.mouse.wheel(0, -zoom)
+        page.wait_for_timeout(1000)
         page.locator("#arm-box").screenshot(path=file)
 
     return shot
+
+
+def existing_arms(folder: Path, page: Page, file: Path) -> None:
+    """Show a front with two existing arms."""
+    task, space = (EXAMPLES / f"7-compare-arms-{part}.yaml" for part in ("task", "space"))
+    run = once(folder, "runs/shelves", "design", task, "--space", space, "--budget", 4000)
+    for name, robot_file in (("so101", "so101"), ("ur3", "ur3_robot")):
+        shutil.copy(robot(robot_file), folder / f"{name}.urdf")
+    armwright(folder, "compare-arms", task, "so101.urdf", "ur3.urdf", "--run", run)
+    shutil.copy(run / "figures/front.png", file)
 
 
 def arms(folder: Path, page: Page, file: Path) -> None:
@@ -144,11 +164,10 @@ PICTURES: dict[str, Shot] = {
     "page-live.png": live_report,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(
-        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", ("design", "--budget", 60000), "#design=3&target=9"
+        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=7&target=4", drag=90, zoom=250
     ),
-    "example-obstacles.png": arm_of(
-        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", ("optimize",), "#design=78&target=3"
-    ),
+    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=3&target=3"),
+    "compare-arms.png": existing_arms,
     "dashboard.png": dashboard,
 }
 
