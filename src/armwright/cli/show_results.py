@@ -20,6 +20,7 @@ from armwright.runs.assumptions import assumed_values, count_assumed
 from armwright.runs.history import FrontMember, History
 from armwright.runs.path_report import describe_extremes
 from armwright.runs.results import REPORT, describe_infeasibility
+from armwright.runs.supply_record import supply_of
 from armwright.study.front_run import FrontRun
 from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
@@ -177,8 +178,11 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
         base = format_point([round(value, 3) for value in member.design.origin])
         console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}")
-        if along := describe_extremes(history.evaluation([member.number]), 0):
+        evaluation = history.evaluation([member.number])
+        if along := describe_extremes(evaluation, 0):
             console.print(f"  worst along its cycle: {along}")
+        if supply := supply_of(evaluation, 0):
+            console.print(f"  supply along its cycle: {supply.description}")
         if assumed := assumed_values(history.problem, [member.arm]):
             console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
     first = picked[0].number

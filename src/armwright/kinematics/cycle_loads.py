@@ -49,11 +49,15 @@ class CycleLoads:
     @property
     def rms_torques(self) -> Array:
         """(N, D) root mean square of the torques over the cycle, dwells included [N m], or forces [N]."""
+        return np.sqrt(self.mean(self.torques**2, self.holding**2))
+
+    def mean(self, moving: Array, resting: Array) -> Array:
+        """Return the (N, ...) means over the cycle of (N, M, F, ...) values in motion and (N, M, ...) after motions."""
         weights = np.full(INSTANTS, 1.0 / (INSTANTS - 1))
         weights[[0, -1]] /= 2.0
-        moving = np.einsum("nm,f,nmfd->nd", self.durations, weights, self.torques**2)
-        resting = np.einsum("m,nmd->nd", self.dwells, self.holding**2)
-        return np.sqrt((moving + resting) / self.cycle_time[:, None])
+        total = np.einsum("nm,f,nmf...->n...", self.durations, weights, moving)
+        total += np.einsum("m,nm...->n...", self.dwells, resting)
+        return (total.T / self.cycle_time).T
 
 
 def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> Array:

@@ -16,6 +16,7 @@ from armwright.kinematics.cycle_path import CyclePaths, find_paths
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.jacobian import jacobians
+from armwright.kinematics.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
 from armwright.robot.arm import Arm
 from armwright.tasks.motions import CyclePlan
@@ -103,6 +104,11 @@ class Evaluation(Scene):
     def loads(self) -> CycleLoads:
         """Durations, torques and speeds along the cycle; SettingsError if a duration is not known."""
         return cycle_loads(self.paths, self.torque_terms)
+
+    @cached_property
+    def supply(self) -> SupplyCurrents | None:
+        """Currents along the cycle, None without actuators; SettingsError if a duration is not known."""
+        return None if self.arms.actuation is None else supply_currents(self.loads, self.arms.actuation)
 
     def worst_torques(self, measure: Callable[[Array], Array]) -> Array:
         """Return (N, T) a measure of holding torques, the largest of a target's posture and of the motions to it.

@@ -6,9 +6,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, did_you_mean
-from armwright.kinematics.actuation import Actuation
 from armwright.kinematics.arm_arrays import FIXED
-from armwright.kinematics.drive_limits import torque_speed_utilisation
+from armwright.problem import drive_quantities as drives
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.tasks.targets import REACHED
@@ -21,59 +20,6 @@ MAX_OBJECTIVES = 5  # the hypervolume of more takes long
 
 def _torque_norm(evaluation: Evaluation) -> Array:
     return np.linalg.norm(evaluation.motor_torques, axis=-1)
-
-
-def _actuation(evaluation: Evaluation, quantity: str, *ratings: str) -> Actuation:
-    """Return the actuation of the arms, with these ratings known."""
-    actuation = evaluation.arms.actuation
-    if actuation is None:
-        raise SettingsError(f"objective {quantity} needs actuators: name some in the space file (actuators: [...])")
-    for rating in ratings:
-        if np.isnan(getattr(actuation, rating)).any():
-            key = {"no_load_speed": "speed"}.get(rating, rating)
-            raise SettingsError(f"objective {quantity} needs the {key} of every actuator; the space names one without")
-    return actuation
-
-
-def _motor_peak(evaluation: Evaluation, quantity: str) -> Array:
-    """Return (N, 1, J) peak torques of the motors [N m], divided by the safety factor."""
-    actuation = _actuation(evaluation, quantity, "peak")
-    return (actuation.peak * evaluation.arms.travel / actuation.safety_factor[:, None])[:, None]
-
-
-def _torque_utilisation(evaluation: Evaluation) -> Array:
-    peak = _motor_peak(evaluation, "torque_utilisation")
-    return evaluation.worst_torques(lambda torques: np.abs(torques / peak).max(axis=-1))
-
-
-def _dynamic_utilisation(evaluation: Evaluation) -> Array:
-    drives = _actuation(evaluation, "dynamic_utilisation", "peak", "corner_speed", "no_load_speed")
-    return evaluation.worst_loads(
-        lambda torques, speeds: torque_speed_utilisation(torques, speeds, drives).max(axis=-1)
-    )
-
-
-def _speed_utilisation(evaluation: Evaluation) -> Array:
-    speed = _actuation(evaluation, "speed_utilisation", "no_load_speed").no_load_speed[:, None]
-    return evaluation.worst_loads(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
-
-
-def _dynamic_torque(evaluation: Evaluation) -> Array:
-    travel = evaluation.arms.travel[:, None]
-    return evaluation.worst_loads(lambda torques, _: np.abs(torques * travel).max(axis=-1))
-
-
-def _thermal_utilisation(evaluation: Evaluation) -> Array:
-    drives = _actuation(evaluation, "thermal_utilisation", "continuous")
-    share = evaluation.loads.rms_torques / drives.continuous
-    return drives.safety_factor * share.max(axis=1)
-
-
-def _voltages(evaluation: Evaluation) -> Array:
-    """Return the (N,) number of different voltages; fixed joints have 0 V."""
-    voltage = np.sort(_actuation(evaluation, "voltages", "voltage").voltage, axis=1)
-    first = np.diff(voltage, axis=1, prepend=0.0) > 0.0
-    return first.sum(axis=1).astype(np.float64)
 
 
 POSITION_ERROR = Objective(
@@ -153,14 +99,14 @@ TORQUE_UTILISATION = Objective(
     symbol="E_util",
     description="the largest share of its actuator's peak torque that any joint needs to hold the kept posture up "
     "against gravity, times the safety factor; above 1 the arm does not hold it with this factor",
-    each=_torque_utilisation,
+    each=drives.torque_utilisation,
     over="max",
 )
 PRICE = Objective(
     name="price",
     unit="USD",
     description="the price of all actuators",
-    each=lambda e: _actuation(e, "price", "price").price,
+    each=drives.price,
     over="arm",
 )
 JOINTS = Objective(
@@ -249,7 +195,7 @@ DYNAMIC_TORQUE = Objective(
     unit="N m",
     symbol="E_dynamic",
     description="the largest absolute torque of any motor on the way to the target, gravity and inertia included",
-    each=_dynamic_torque,
+    each=drives.dynamic_torque,
     over="max",
 )
 DYNAMIC_UTILISATION = Objective(
@@ -258,7 +204,7 @@ DYNAMIC_UTILISATION = Objective(
     symbol="E_dynutil",
     description="the largest factor by which any actuator's torque, times the safety factor, and speed together exceed "
     "its torque-speed limit on the way to the target; above 1 it cannot",
-    each=_dynamic_utilisation,
+    each=drives.dynamic_utilisation,
     over="max",
 )
 SPEED_UTILISATION = Objective(
@@ -266,7 +212,7 @@ SPEED_UTILISATION = Objective(
     unit="of allowed",
     symbol="E_speed",
     description="the largest share of any actuator's no-load speed on the way to the target; above 1 it cannot",
-    each=_speed_utilisation,
+    each=drives.speed_utilisation,
     over="max",
 )
 THERMAL_UTILISATION = Objective(
@@ -275,7 +221,23 @@ THERMAL_UTILISATION = Objective(
     symbol="E_thermal",
     description="the largest share of any actuator's continuous torque that its torque takes, as a root mean square "
     "over the cycle with its dwells, times the safety factor; above 1 it overheats",
-    each=_thermal_utilisation,
+    each=drives.thermal_utilisation,
+    over="arm",
+)
+PEAK_CURRENT = Objective(
+    name="peak_current",
+    unit="A",
+    symbol="I_peak",
+    description="the largest current that all actuators together draw from the supply along the cycle",
+    each=drives.peak_current,
+    over="arm",
+)
+MEAN_CURRENT = Objective(
+    name="mean_current",
+    unit="A",
+    symbol="I_mean",
+    description="the mean current that all actuators together draw from the supply over the cycle with its dwells",
+    each=drives.mean_current,
     over="arm",
 )
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)
@@ -283,7 +245,7 @@ _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, RMS_TORQUE, TORQUE_UTILISATION, MASS, LENGTH,
     PRICE, JOINTS, ORIENTATION_ERROR, WORST_ANGLE, COLLISION, CLEARANCE_SHORTFALL, PATH_ERROR, PATH_ANGLE,
     JUMPS, CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION,
-    UNCOVERED_FRACTION, ANISOTROPY,
+    PEAK_CURRENT, MEAN_CURRENT, UNCOVERED_FRACTION, ANISOTROPY,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 RENAMED = {
@@ -328,7 +290,7 @@ VOLTAGES = Objective(
     name="voltages",
     unit="voltages",
     description="the number of different supply voltages of the actuators",
-    each=_voltages,
+    each=drives.voltages,
     over="arm",
 )
 # What constraints can bound. Of clearances and manipulability more is better, so they are no objectives.
@@ -338,7 +300,9 @@ QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*CLE
 ORIENTATION_QUANTITIES = (ORIENTATION_ERROR, WORST_ANGLE)
 CLEARANCE_QUANTITIES = (COLLISION, CLEARANCE_SHORTFALL, *CLEARANCES)
 PATH_QUANTITIES = (*CLEARANCE_QUANTITIES, PEAK_TORQUE, TORQUE_UTILISATION)  # the worst of targets and motions counts
-TIMED_QUANTITIES = (CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION)
+TIMED_QUANTITIES = (
+    CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION, PEAK_CURRENT, MEAN_CURRENT,
+)  # fmt: skip
 MOTION_QUANTITIES = (*PATH_QUANTITIES, PATH_ERROR, PATH_ANGLE, JUMPS, *TIMED_QUANTITIES)
 
 

@@ -8,6 +8,7 @@ from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.kinematics.motion_path import MotionPath
 from armwright.problem.evaluation import Evaluation
+from armwright.runs.supply_record import supply_of
 from armwright.tasks.task import Task
 
 LINE_POINTS = (2, 3, 5, 9)  # of a line, between which the page interpolates: as few as are near enough
@@ -36,11 +37,13 @@ def cycle_of_design(evaluation: Evaluation, row: int, joints: int) -> dict[str, 
         joints: Its number of joints.
 
     Returns:
-        seconds: the duration of each motion; q: its joint values at equal shares.
+        seconds: the duration of each motion; q: its joint values at equal shares; supply: its currents in words.
     """
     _, paths = evaluation.paths.of_arm(row)
     q = [_rounded(_points(path)[:, :joints]) for path in paths]
-    return {"seconds": _rounded(_durations(evaluation)[row]), "q": q}
+    supply = supply_of(evaluation, row)
+    currents = "" if supply is None else supply.description
+    return {"seconds": _rounded(_durations(evaluation)[row]), "q": q, "supply": currents}
 
 
 def _points(path: MotionPath) -> Array:

@@ -8,6 +8,7 @@ designs/NNNN/arm.xml, trajectory.csv  with a cycle: its model for MuJoCo, and it
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from armwright.problem.evaluation import Evaluation
@@ -19,6 +20,7 @@ from armwright.runs.cycle_export import cycle_files
 from armwright.runs.folder import RunFolder
 from armwright.runs.history import History
 from armwright.runs.path_report import path_record
+from armwright.runs.supply_record import supply_of
 from armwright.runs.trial import FinishedTrial
 
 DESIGNS = "designs"
@@ -52,7 +54,7 @@ def _design_records(history: History, evaluation: Evaluation) -> Iterator[dict[s
     """Yield the content of design.json for each design of the front, which was evaluated."""
     for row, member in enumerate(history.front):
         trial = history.trials[member.number]
-        assumed = assumed_values(history.problem, [member.arm])
+        assumed, supply = assumed_values(history.problem, [member.arm]), supply_of(evaluation, row)
         yield {
             "number": member.number,
             "source": member.source,
@@ -63,6 +65,7 @@ def _design_records(history: History, evaluation: Evaluation) -> Iterator[dict[s
             "masses": history.problem.space.mass_note,
             **({"assumed": assumed} if assumed else {}),
             **path_record(evaluation, row),
+            **({} if supply is None else {"supply": asdict(supply)}),
             "targets": [_target_record(evaluation, row, t, member.arm) for t in range(len(evaluation.targets))],
         }
 

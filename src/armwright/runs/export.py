@@ -20,6 +20,7 @@ from armwright.runs.assumptions import assumed_values, describe_assumed
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.selection import pick
+from armwright.runs.supply_record import supply_of
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
 
@@ -61,6 +62,8 @@ def _sheet(history: History, member: FrontMember) -> str:
     notes.append(f"Targets are missed by {1e3 * evaluation.position_error.max():.2f} mm{angle} at most.")
     for target in np.flatnonzero(evaluation.unreached[0]):
         notes.append(f"Target {target + 1} is missed by {unreached_reason(member.arm, evaluation, 0, int(target))}.")
+    if supply := supply_of(evaluation, 0):
+        notes.append(f"Along the cycle the actuators draw {supply.description}; standby current comes on top.")
     if assumed := assumed_values(history.problem, [member.arm]):
         notes.append(f"Assumed values of actuators, defaults of their kind or estimates: {describe_assumed(assumed)}.")
     return sheet_markdown(_name(history, member), member.arm, _rows(history, member), notes)

@@ -1,0 +1,90 @@
+"""Quantities of arms that depend on their actuators."""
+
+from typing import cast
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.exceptions import SettingsError
+from armwright.kinematics.actuation import Actuation
+from armwright.kinematics.drive_limits import torque_speed_utilisation
+from armwright.kinematics.supply import SupplyCurrents
+from armwright.problem.evaluation import Evaluation
+
+
+def _actuation(evaluation: Evaluation, quantity: str, *ratings: str) -> Actuation:
+    """Return the actuation of the arms, with these ratings known."""
+    actuation = evaluation.arms.actuation
+    if actuation is None:
+        raise SettingsError(f"objective {quantity} needs actuators: name some in the space file (actuators: [...])")
+    for rating in ratings:
+        if np.isnan(getattr(actuation, rating)).any():
+            key = {"no_load_speed": "speed"}.get(rating, rating)
+            raise SettingsError(f"objective {quantity} needs the {key} of every actuator; the space names one without")
+    return actuation
+
+
+def _motor_peak(evaluation: Evaluation, quantity: str) -> Array:
+    """Return (N, 1, J) peak torques of the motors [N m], divided by the safety factor."""
+    actuation = _actuation(evaluation, quantity, "peak")
+    return (actuation.peak * evaluation.arms.travel / actuation.safety_factor[:, None])[:, None]
+
+
+def torque_utilisation(evaluation: Evaluation) -> Array:
+    """Return (N, T) the largest share of its peak torque that a motor needs at rest, times the safety factor."""
+    peak = _motor_peak(evaluation, "torque_utilisation")
+    return evaluation.worst_torques(lambda torques: np.abs(torques / peak).max(axis=-1))
+
+
+def dynamic_utilisation(evaluation: Evaluation) -> Array:
+    """Return (N, T) the largest torque-speed utilisation on the way to each target."""
+    drives = _actuation(evaluation, "dynamic_utilisation", "peak", "corner_speed", "no_load_speed")
+    return evaluation.worst_loads(
+        lambda torques, speeds: torque_speed_utilisation(torques, speeds, drives).max(axis=-1)
+    )
+
+
+def speed_utilisation(evaluation: Evaluation) -> Array:
+    """Return (N, T) the largest share of its no-load speed that a motor needs on the way to each target."""
+    speed = _actuation(evaluation, "speed_utilisation", "no_load_speed").no_load_speed[:, None]
+    return evaluation.worst_loads(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
+
+
+def dynamic_torque(evaluation: Evaluation) -> Array:
+    """Return (N, T) the largest torque of a motor on the way to each target [N m]."""
+    travel = evaluation.arms.travel[:, None]
+    return evaluation.worst_loads(lambda torques, _: np.abs(torques * travel).max(axis=-1))
+
+
+def thermal_utilisation(evaluation: Evaluation) -> Array:
+    """Return the (N,) largest share of its continuous torque that a motor needs, times the safety factor."""
+    drives = _actuation(evaluation, "thermal_utilisation", "continuous")
+    share = evaluation.loads.rms_torques / drives.continuous
+    return drives.safety_factor * share.max(axis=1)
+
+
+def voltages(evaluation: Evaluation) -> Array:
+    """Return the (N,) number of different voltages; fixed joints have 0 V."""
+    voltage = np.sort(_actuation(evaluation, "voltages", "voltage").voltage, axis=1)
+    first = np.diff(voltage, axis=1, prepend=0.0) > 0.0
+    return first.sum(axis=1).astype(np.float64)
+
+
+def price(evaluation: Evaluation) -> Array:
+    """Return the (N,) prices of all actuators [USD]."""
+    return _actuation(evaluation, "price", "price").price
+
+
+def peak_current(evaluation: Evaluation) -> Array:
+    """Return the (N,) largest currents from the supply along the cycle [A]."""
+    return _currents(evaluation, "peak_current").peak
+
+
+def mean_current(evaluation: Evaluation) -> Array:
+    """Return the (N,) mean currents from the supply over the cycle [A]."""
+    return _currents(evaluation, "mean_current").mean
+
+
+def _currents(evaluation: Evaluation, quantity: str) -> SupplyCurrents:
+    _actuation(evaluation, quantity, "peak", "voltage", "current")
+    return cast("SupplyCurrents", evaluation.supply)
