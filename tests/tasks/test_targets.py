@@ -90,7 +90,8 @@ def test_target_with_only_a_position_is_a_point() -> None:
         ("{position: [0, 0, 1], angle_tolerance: 0.1}", "target 2: angle_tolerance needs an axis"),
         ("{position: [0, 0, 1], weight: -1}", "target 2: weight"),
         ("{position: [0, 0, 1001]}", "target 2 = .* is more than 1000 m away"),
-        ("[0, 0]", r"targets\[1\]"),
+        ("[0, 0]", r"target 2: expected three numbers x, y, z \[m\], got 2"),
+        ("{position: [0, 0,4, 1]}", "target 2: position: expected three numbers .*, got 4: .*0.4, not 0,4"),
     ],
 )
 def test_mistakes_are_reported(target: str, words: str) -> None:

@@ -4,11 +4,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, GetJsonSchemaHandler, model_serializer, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    GetJsonSchemaHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)  # fmt: skip
 
 from armwright.arrays import Array
 from armwright.rotations import rotation_from_rpy, rotation_to_axis
@@ -81,6 +88,11 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     angle_tolerance: float = Field(default=ALIGNED, gt=0.0, le=math.pi)
     weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)
 
+    @field_validator("position", mode="before")
+    @classmethod
+    def _check_length(cls, value: Any) -> Any:
+        return check_length(value)
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.axis is not None and self.orientation is not None:
@@ -132,6 +144,15 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         parts += [f"angle tolerance {math.degrees(self.angle_tolerance):.4g}°"] * (self.angle_tolerance != ALIGNED)
         parts += [f"weight {self.weight:g}"] * (self.weight != 1.0)
         return ", ".join(parts)
+
+
+def check_length(value: Any) -> Any:
+    """Return the value of a position; ValueError for a list of more or fewer than three."""
+    if isinstance(value, (list, tuple)) and len(cast("list[Any]", value)) != 3:
+        numbers = cast("list[Any]", value)
+        hint = "; write decimals with a point: 0.4, not 0,4" if len(numbers) > 3 else ""
+        raise ValueError(f"expected three numbers x, y, z [m], got {len(numbers)}: {numbers!s:.80}{hint}")
+    return cast("Any", value)
 
 
 def describe_targets(specs: Sequence[Point | Target]) -> list[str]:

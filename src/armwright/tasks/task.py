@@ -29,6 +29,7 @@ from armwright.tasks.targets import (
     Point,
     Target,
     TargetArrays,
+    check_length,
     position_targets,
     stack_targets,
 )
@@ -292,4 +293,8 @@ def _read_target(entry: Any, number: int) -> Target | None:
     """Return the target of a record; None for anything else, such as a plain point."""
     if isinstance(entry, dict):
         return check_document(cast("dict[Any, Any]", entry), Target, ValueError, f"target {number}")
+    try:
+        check_length(entry)
+    except ValueError as fault:
+        raise ValueError(f"target {number}: {fault}") from None
     return entry if isinstance(entry, Target) else None
