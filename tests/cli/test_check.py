@@ -1,4 +1,4 @@
-"""`armwright check`: what a task and a space mean, and warnings from geometry."""
+"""`armwright check`: what a task and a space mean, and what is wrong with them."""
 
 import json
 from pathlib import Path
@@ -6,24 +6,15 @@ from pathlib import Path
 import pytest
 import yaml
 
-from armwright.cli.check import contains, free_parameters, geometry_warnings
-from armwright.problem.problem import Problem
-from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.tasks.task import Task
+from armwright.cli.check import free_parameters
+from armwright.spaces.design_space import DesignSpace
 from tests.support.command_line import armwright, refused
 
 BOX = {"kind": "box", "center": [0.2, 0.0, 0.1], "size": [0.1, 0.2, 0.3], "yaw": 0.5}
-SPHERE = {"kind": "sphere", "center": [0.0, 0.0, 0.5], "radius": 0.1}
-CYLINDER = {"kind": "cylinder", "center": [0.0, 0.4, 0.1], "radius": 0.1, "height": 0.4, "axis": "x"}
-GROUND = {"kind": "ground", "z": -0.1}
-
-
-def task_of(targets: list[list[float]], **keys: object) -> Task:
-    return Task.model_validate({"name": "checked", "targets": targets, **keys})
 
 
 def test_check_describes_a_builtin_task_and_the_default_space() -> None:
-    done = armwright("check", "target-1")
+    done = armwright("check", "target-1", "--no-picture")
     assert done.returncode == 0, done.stderr
     for text in ("8 targets", "position_error [m]", "reference point: (5, 5)", "11 free parameters", "a toy"):
         assert text in done.stdout
@@ -35,11 +26,15 @@ def test_check_prints_json(in_folder: Path) -> None:
         yaml.safe_dump({"name": "far", "targets": [[0.2, 0.0, 0.1], [9.0, 0.0, 0.0]], "obstacles": [BOX]})
     )
     (in_folder / "space.yaml").write_text("joints: 3\nrestrict: {joint_1: Y}\ntie: {link_3: link_2}\n")
-    record = json.loads(armwright("check", "task.yaml", "--space", "space.yaml", "--json").stdout)
+    done = armwright("check", "task.yaml", "--space", "space.yaml", "--json")
+    record = json.loads(done.stdout)
+    assert done.returncode == 2
     assert record["space"]["free_parameters"] == 7  # three of the base, two joint types, two links
     assert record["space"]["parameters"]["joint_1"] == "Y"
     assert [objective["name"] for objective in record["objectives"]] == ["position_error", "torque"]
-    assert [line.split(" (")[0] for line in record["warnings"]] == ["target 1", "target 2"]
+    found = [(one["message"].split(" (")[0], one["evidence"]) for one in record["findings"]]
+    assert found == [("target 2", "proven"), ("target 1", "suspected"), ("target 2", "suspected")]
+    assert (in_folder / record["picture"]).is_file()
     assert "obstacles" in record["unused"][0]
 
 
@@ -54,29 +49,6 @@ def test_check_prints_json(in_folder: Path) -> None:
 def test_check_reports_an_invalid_task_in_one_line(in_folder: Path, text: str, reason: str) -> None:
     (in_folder / "bad.yaml").write_text(text)
     assert reason in refused(2, "check", "bad.yaml")
-
-
-def test_targets_beyond_the_longest_arm_are_warned_of() -> None:
-    space = paper_space(joints=4)  # bases within 1 m of the origin along each axis, arms up to 1.2 m
-    task = task_of([[2.19, 0.0, 0.0], [2.21, 0.0, 0.0], [0.0, 0.0, -2.3]])
-    assert [line.split(" (")[0] for line in geometry_warnings(Problem(task, space))] == ["target 2", "target 3"]
-
-
-@pytest.mark.parametrize(
-    ("obstacle", "inside", "outside"),
-    [
-        (BOX, (0.2, 0.0, 0.2), (0.25, 0.09, 0.1)),  # the corner leaves the turned box
-        (SPHERE, (0.0, 0.05, 0.55), (0.08, 0.08, 0.5)),
-        (CYLINDER, (0.15, 0.4, 0.1), (0.0, 0.4, 0.25)),
-        (GROUND, (3.0, 3.0, -0.2), (0.0, 0.0, 0.0)),
-    ],
-)
-def test_obstacle_contains_points_inside_it(
-    obstacle: dict[str, object], inside: tuple[float, float, float], outside: tuple[float, float, float]
-) -> None:
-    (read,) = task_of([[0.0, 0.0, 0.0]], obstacles=[obstacle]).obstacles
-    assert contains(read, inside)
-    assert not contains(read, outside)
 
 
 def test_fixed_and_tied_parameters_are_not_free() -> None:
@@ -100,8 +72,114 @@ def test_cycle_is_shown_with_its_durations_and_constraints(in_folder: Path) -> N
     assert "cycle: bin (pick), by a line to 2 (place), by a joint motion back to bin" in shown
     assert "durations: 2.5 s, 1.5 s; 0.2 s at rest after each pick and place" in shown
     assert f"constraints of the cycle: {', '.join(bounds)}\n" in shown
-    checked = armwright("check", "task.yaml", "--space", "space.yaml")
+    checked = armwright("check", "task.yaml", "--space", "space.yaml", "--no-picture")
     assert checked.returncode == 0, checked.stderr
+    assert not list(in_folder.glob("*.png"))
+    assert "1. start at bin" in checked.stdout
+    assert "2. to 2 by a line, in 2.5 s, place" in checked.stdout
+    assert "3. back to bin by a joint motion, in 1.5 s, pick" in checked.stdout
     assert f"constraints of the cycle: {', '.join([*bounds, *drives])}\n" in checked.stdout
     record = json.loads(armwright("check", "task.yaml", "--space", "space.yaml", "--json").stdout)
     assert record["constraints"] == ["clearance >= 0.01", *bounds, *drives]
+
+
+def write(folder: Path, **keys: object) -> str:
+    """Write a task file and return its name."""
+    (folder / "task.yaml").write_text(yaml.safe_dump({"name": "mine", **keys}))
+    return "task.yaml"
+
+
+# What an engineer's trial found to be accepted in silence
+
+HERE = [0.4, 0.2, 0.3]
+SHELF = {"kind": "box", "name": "shelf", "center": [0.4, -0.2, 0.3], "size": [0.2, 0.2, 0.2]}
+NONSENSE = [
+    ({"targets": [[450, 0, 100], [450, 200, 300]]}, ("all 2 targets are out of reach", "in metres", "0.45 for 450 mm")),
+    ({"targets": [HERE, [5, 0, 0.3]]}, ("target 2 (5, 0, 0.3) m is 4 m from the nearest", "reaches 1.2 m")),
+    ({"targets": [HERE, [0, 4, 0.1]]}, ("target 2 (0, 4, 0.1) m", "if 0,4 was meant as one number, write 0.4")),
+    (
+        {
+            "targets": [HERE, [0.4, -0.2, 0.3]],
+            "obstacles": [SHELF],
+            "constraints": ["collision <= 0", "worst_error <= 0.01"],
+        },
+        ("target 2 (0.4, -0.2, 0.3) m is 100 mm inside an obstacle: shelf",),
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["check", "design", "optimize"])
+@pytest.mark.parametrize(("keys", "texts"), NONSENSE)
+def test_nonsense_that_is_proven_stops_every_command(
+    in_folder: Path, command: str, keys: dict[str, object], texts: tuple[str, ...]
+) -> None:
+    line = refused(2, command, write(in_folder, **keys))
+    for text in (*texts, "(proven)"):
+        assert text in line
+    assert not (in_folder / "runs").exists()
+
+
+def test_every_proven_fault_is_reported_in_a_line_of_its_own(in_folder: Path) -> None:
+    task = write(in_folder, targets=[HERE], constraints=["worst_error <= -1", "clearance >= 2"])
+    done = armwright("check", task, "--no-picture")
+    assert done.returncode == 2
+    first, second = sorted(done.stderr.splitlines())
+    assert first.startswith('armwright: constraints: no design satisfies "clearance >= 2": clearance is at most 1 m')
+    assert second.startswith('armwright: constraints: no design satisfies "worst_error <= -1"')
+
+
+def test_decimal_comma_is_warned_of_where_the_target_is_in_reach(in_folder: Path) -> None:
+    (in_folder / "task.yaml").write_text("name: mine\ntargets:\n  - [0,1, 0.4]\n  - [0.4, 0.2, 0.3]\n")
+    done = armwright("check", "task.yaml", "--no-picture")
+    assert done.returncode == 0, done.stderr
+    assert "warning: task.yaml, line 3: [0,1, 0.4] is a list of 3 numbers; if 0,1 was meant as one" in done.stdout
+    assert done.stdout.endswith("warnings: 1\n")
+
+
+def test_decimal_comma_that_makes_four_numbers_is_refused(in_folder: Path) -> None:
+    (in_folder / "task.yaml").write_text("name: mine\ntargets:\n  - [0,4, 0.1, 0.2]\n")
+    line = refused(2, "check", "task.yaml")
+    assert "target 1: expected three numbers x, y, z [m], got 4: [0, 4, 0.1, 0.2]; write decimals with a point" in line
+
+
+def test_search_warns_of_a_payload_that_dwarfs_the_arm_and_goes_on(in_folder: Path) -> None:
+    task = write(in_folder, targets=[HERE], payload=500)
+    done = armwright("optimize", task, "--n-init", "2", "--n-total", "1", "--proposer", "none", "--no-figures")
+    assert done.returncode == 0, done.stderr
+    assert "warning: payload: 500 kg are 34,435 times the mass of the heaviest arm" in done.stdout
+    assert "a toy" in done.stdout
+
+
+def test_search_samples_the_constraints_once(in_folder: Path) -> None:
+    task = write(in_folder, targets=[HERE], constraints=["worst_error >= 50"])
+    options = ("--n-init", "2", "--n-total", "1", "--proposer", "none", "--no-figures", "--out", "run")
+    done = armwright("optimize", task, *options)
+    assert done.returncode == 0, done.stderr
+    assert 'warning: no random design satisfies "worst_error >= 50"' in done.stdout
+    assert " samples)" in done.stdout
+    again = armwright("optimize", task, *options)
+    assert "worst_error >= 50" not in again.stdout.partition("violates")[0]
+
+
+def test_deep_check_samples_the_constraints(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armwright.cli.check.DEEP_SECONDS", 0.0)
+    task = write(in_folder, targets=[HERE], constraints=["worst_error >= 50", "mass <= 1"])
+    shallow = armwright("check", task, "--no-picture")
+    assert "warnings: none" in shallow.stdout
+    done = armwright("check", task, "--deep", "--no-picture")
+    assert done.returncode == 0, done.stderr
+    assert 'warning: no random design satisfies "worst_error >= 50"; the best has' in done.stdout
+    assert "(none of 1,0" in done.stdout
+    assert "mass <= 1" not in done.stdout.partition("warning:")[2]
+
+
+def test_picture_has_a_known_format(in_folder: Path) -> None:
+    task = write(
+        in_folder,
+        targets=[HERE],
+        obstacles=[SHELF, {"kind": "ground"}],
+        workspace={"low": [0, 0, 0], "high": [0.5, 0.5, 0.5]},
+    )
+    assert armwright("check", task, "--out", "mine.svg").returncode == 0
+    assert (in_folder / "mine.svg").read_text().startswith("<?xml")
+    assert "expected a name that ends in .png, .pdf, .svg" in refused(2, "check", task, "--out", "mine.doc")

@@ -1,4 +1,4 @@
-"""Problems whose tasks have a cycle: implied constraints, quantities of motions, variations and reach."""
+"""Problems whose tasks have a cycle: implied constraints, quantities of motions, variations."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from armwright.problem.evaluation import evaluate_arrays
 from armwright.problem.objectives import MOTION_QUANTITIES, OBJECTIVES, PATH_QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.runs.verification import verify
-from armwright.spaces.design_space import DesignSpace, load_space
+from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.tolerance import TOLERANCE, perturbed
 from armwright.tasks.task import Task
 
@@ -179,29 +179,6 @@ def test_feasible_designs_exist_and_stay_within_what_is_implied() -> None:
     assert not physics.paths.jumps[feasible].any()
     assert not physics.unreached[feasible].any()
     assert physics.clearance[feasible].min() >= 0.0
-
-
-# Reach
-
-
-def test_cycles_with_a_target_out_of_reach_are_refused() -> None:
-    far = [*TARGETS[:2], {"name": "home", "position": [1.7, 0.0, 0.05], "axis": DOWN}]
-    message = (
-        "step 3: target home is 1.6 m from the nearest allowed base, but the longest arm with its tool reaches 1.5 m"
-    )
-    with pytest.raises(SettingsError) as error:
-        Problem(task(targets=far), BARE)
-    assert message in str(error.value)
-    assert Problem(task(targets=far, tool={"tip": [0.0, 0.0, 0.101]}), BARE).max_reach == pytest.approx(1.601)
-    visited = {"steps": [{"to": 1}, {"to": 2}]}
-    assert Problem(task(targets=far, cycle=visited), BARE).constraints
-    assert Problem(task(targets=far).model_copy(update={"cycle": None}), BARE).objectives
-
-
-@pytest.mark.parametrize("space", [BARE, load_space("slideopt"), load_space("paper")])
-def test_no_design_reaches_further_than_the_longest_arm(space: DesignSpace) -> None:
-    problem = Problem(task().model_copy(update={"cycle": None}), space)
-    assert max(problem.arm(design).reach for design in space.sample(200, 0)) <= problem.max_reach + 1e-12
 
 
 # Build tolerance

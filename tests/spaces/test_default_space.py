@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from armwright.cli.check import geometry_warnings
 from armwright.cli.notes import space_note, unused_parts
 from armwright.cli.options import load_problem
+from armwright.problem.checks.instant import check_instantly
 from armwright.report.repeat_command import repeat_command
 from armwright.runs.config import FrontMethod
 from armwright.spaces.design_space import builtin_spaces, default_space, load_space, paper_space
@@ -91,7 +91,7 @@ def test_tasks_with_a_space_are_jobs_with_tool_motors_and_obstacles(name: str) -
     assert len(task.reference_point or ()) == len(problem.objectives)
     assert all(record.price and record.speed for record in space.actuators)
     assert len({record.voltage for record in space.actuators}) == 1
-    assert not geometry_warnings(problem)
+    assert not check_instantly(problem)
     assert not unused_parts(problem)
 
 

@@ -261,7 +261,8 @@ def test_front_run_finds_a_missing_reference_point() -> None:
 
 def test_front_run_ends_at_a_stall() -> None:
     narrow = paper_space(1).model_copy(update={f"origin_{axis}": (0.0, 0.0) for axis in "xyz"})
-    run = find_front(Problem(OPEN, narrow), budget="1e6", seed=0)
+    near = Task(name="near", targets=((0.2, 0.0, 0.2), (0.1, 0.1, 0.2)))
+    run = find_front(Problem(near, narrow), budget="1e6", seed=0)
     assert run.summary["search"]["ended_by"] == "stall"
     assert run.summary["search"]["evaluations"] < 100_000
 

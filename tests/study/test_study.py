@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,14 @@ import optuna
 import pytest
 from optuna.samplers import BaseSampler, NSGAIISampler, QMCSampler, RandomSampler
 
-from armwright.exceptions import ProposalError, RunConflictError, RunFolderError, SettingsError
+from armwright.exceptions import ProposalError, RunConflictError, RunFolderError, SettingsError, TaskError
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposal, Proposer
 from armwright.runs.folder import read_run
 from armwright.runs.history import History
 from armwright.search.samplers import SamplerFactory
 from armwright.spaces.parameters import Design
+from armwright.study.front_run import find_front
 from armwright.study.progress import Progress, StudyResult
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
@@ -357,7 +359,8 @@ def test_settings_out_of_range_are_refused(settings: dict[str, int]) -> None:
 
 
 def test_front_outside_reference_box_has_no_hypervolume() -> None:
-    problem = Problem(Task(name="far", targets=((9.0, 0.0, 0.0),), reference_point=(1.0, 1.0)))
+    far = {"position": [9.0, 0.0, 0.0], "tolerance": 8.0}
+    problem = Problem(Task.model_validate({"name": "far", "targets": [far], "reference_point": [1.0, 1.0]}))
     run = short(problem=problem)
     assert run.hypervolume.tolist() == [0.0] * 8
     assert run.front
@@ -373,3 +376,11 @@ def test_study_runs_with_one_and_eight_joints() -> None:
 def test_history_reevaluates_trials_to_equal_values() -> None:
     history = short().history
     assert PROBLEM.outcomes(history.evaluation(range(13))).values.tolist() == [list(trial.values) for trial in history]
+
+
+@pytest.mark.parametrize("search", [optimize, find_front])
+def test_searches_stop_at_what_is_proven(search: Callable[..., object], tmp_path: Path) -> None:
+    problem = Problem(Task(name="far", targets=((9.0, 0.0, 0.0),)))
+    with pytest.raises(TaskError, match=r"target 1 \(9, 0, 0\) m is 8 m from the nearest allowed base"):
+        search(problem, out=tmp_path / "run")
+    assert not (tmp_path / "run").exists()

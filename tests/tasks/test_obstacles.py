@@ -243,3 +243,44 @@ def test_page_draws_obstacles_in_place(tmp_path: Path, browser: Browser) -> None
         across = np.hypot(x, y)
         assert np.all((np.abs(across - 1.0) < 1e-5) | (across < 1e-5))
         assert np.abs(z) == pytest.approx(1.0, abs=1e-5)
+
+
+BRICK = {"kind": "box", "center": [0.2, 0.0, 0.1], "size": [0.1, 0.2, 0.3], "yaw": np.pi / 2}
+PIPE = {"kind": "cylinder", "center": [0.0, 0.4, 0.1], "radius": 0.1, "height": 0.4, "axis": "x"}
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "point", "distance"),
+    [
+        (BRICK, (0.2, 0.0, 0.2), -0.05),
+        (BRICK, (0.2, 0.08, 0.29), 0.05),
+        ({"kind": "sphere", "center": [0.0, 0.0, 0.5], "radius": 0.1}, (0.0, 0.03, 0.54), -0.05),
+        (PIPE, (0.17, 0.4, 0.1), -0.03),
+        (PIPE, (0.23, 0.54, 0.1), 0.05),
+        ({"kind": "ground", "z": -0.1}, (3.0, 3.0, -0.3), -0.2),
+    ],
+)  # fmt: skip
+def test_signed_distance_of_a_point(
+    obstacle: dict[str, object], point: tuple[float, float, float], distance: float
+) -> None:
+    (read,) = Task.model_validate({"name": "one", "targets": [[0, 0, 0]], "obstacles": [obstacle]}).obstacles
+    assert read.solid.signed_distance(np.array([point])) == pytest.approx([distance])
+    assert read.solid.contains(np.array([point])) == [distance < 0.0]
+    assert not read.solid.contains(np.array([point]), depth=0.21)
+
+
+def test_signed_distances_are_those_of_the_kernels() -> None:
+    """The end of a link at a target is as far from an obstacle as its clearance says, for a link that points at it."""
+    boxes = [
+        {"kind": "box", "center": [0.4, 0.1, 0.5], "size": [0.3, 0.2, 0.1], "rpy": [0.3, 0.5, -0.4]},
+        {"kind": "cylinder", "center": [0.4, 0.1, 0.5], "radius": 0.1, "height": 0.3, "axis": [1, 2, 1]},
+        {"kind": "sphere", "center": [0.4, 0.1, 0.5], "radius": 0.2},
+    ]
+    for obstacle in boxes:
+        task = Task.model_validate({"name": "one", "targets": [[0.4, 0.1, 0.3]], "obstacles": [obstacle]})
+        problem = Problem(task)
+        physics = problem.physics(problem.space.sample(200, 0))
+        at_tip = task.obstacles[0].solid.signed_distance(physics.reached[:, 0])
+        bound = at_tip - problem.space.link_radius
+        assert (physics.obstacle_clearance[:, 0] <= bound + 1e-5).all()
+        assert np.isclose(physics.obstacle_clearance[:, 0], bound, atol=1e-5).sum() > 10  # where the tip is nearest

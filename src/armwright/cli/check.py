@@ -1,29 +1,81 @@
-"""Describe what a task and a design space mean, and warn of what cannot work."""
+"""Check a task and a design space: what they mean, what cannot work, and what was hardly meant."""
 
-import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 
 from armwright.cli.notes import unused_parts
-from armwright.cli.show_inputs import show_task
-from armwright.cli.streams import format_point
+from armwright.cli.show_inputs import show_cycle, show_target_table, show_task
+from armwright.cli.streams import print_json
+from armwright.problem.checks.finding import SUSPECTED, Finding
+from armwright.problem.checks.instant import check_instantly, stop_if_proven
+from armwright.problem.checks.reach import longest_reach
+from armwright.problem.checks.sampling import check_by_sampling
 from armwright.problem.problem import Problem
 from armwright.runs.config import record_objectives
-from armwright.spaces.design_space import DesignSpace
+from armwright.runs.folder import CONFIG
+from armwright.spaces.design_space import DesignSpace, builtin_spaces
 from armwright.spaces.parameters import CategoricalParameter, Parameter
-from armwright.tasks.obstacles import Obstacle
-from armwright.tasks.targets import Point
+from armwright.tasks.catalogue import builtin_names
+from armwright.tasks.decimal_commas import find_decimal_commas
+
+FIRST_SECONDS = 1.0  # [s] of samples before a search
+DEEP_SECONDS, DEEP_SAMPLES = 10.0, 1000  # [s] of a deep check, and the samples that it takes at least
 
 
-def check_problem(problem: Problem) -> dict[str, Any]:
-    """Return what a task and a space mean, for JSON.
+def check_files(task: str, space: Path | None) -> list[Finding]:
+    """Return what is suspicious in the text of a task file and a space file; nothing for built-in ones."""
+    findings: list[Finding] = []
+    for name, known in ((task, builtin_names()), (None if space is None else str(space), builtin_spaces())):
+        if name is not None and name not in known and os.path.isfile(name):
+            text = Path(name).read_text(encoding="utf-8")
+            findings += [Finding(f"{name}, {message}", SUSPECTED) for message in find_decimal_commas(text)]
+    return findings
+
+
+def check_before_search(console: Console, problem: Problem, written: Sequence[Finding], folder: Path) -> None:
+    """Print warnings about a problem; stop at what is proven.
+
+    Constraints are sampled for a second, unless the run folder already holds a run.
+
+    Args:
+        console: The console.
+        problem: The problem.
+        written: Findings about the files, of `check_files`.
+        folder: The run folder of the search.
 
     Raises:
-        ArmwrightError: Task and space do not go together; found by evaluating one design.
+        TaskError: It is proven that no design can serve the task.
     """
-    problem.evaluate(problem.space.sample(1, seed=0))
+    findings = [*written, *check_instantly(problem)]
+    show_warnings(console, findings)
+    stop_if_proven(findings)
+    if not (folder / CONFIG).exists():
+        show_warnings(console, check_by_sampling(problem, FIRST_SECONDS)[0])
+
+
+def show_warnings(console: Console, findings: Sequence[Finding]) -> int:
+    """Print the findings that are not proven, and return their number."""
+    warnings = [finding for finding in findings if not finding.is_proven]
+    for finding in warnings:
+        console.print(f"warning: {finding}")
+    return len(warnings)
+
+
+def find_faults(problem: Problem, written: Sequence[Finding], deep: bool) -> tuple[list[Finding], int]:
+    """Return all findings, and the number of samples: of a deep check, if nothing is proven."""
+    findings = [*written, *check_instantly(problem)]
+    if not deep or any(finding.is_proven for finding in findings):
+        return findings, 0
+    sampled, n_samples = check_by_sampling(problem, DEEP_SECONDS, DEEP_SAMPLES)
+    return [*findings, *sampled], n_samples
+
+
+def record_check(problem: Problem, findings: Sequence[Finding], n_samples: int) -> dict[str, Any]:
+    """Return what a task and a space mean and what is wrong with them, for JSON."""
     space = problem.space
     return {
         "task": problem.task.model_dump(mode="json"),
@@ -33,7 +85,7 @@ def check_problem(problem: Problem) -> dict[str, Any]:
         "space": {
             "name": space.name,
             "joints": [space.min_joints, space.max_joints],
-            "max_reach": problem.max_reach,
+            "max_reach": longest_reach(problem),
             "free_parameters": len(free_parameters(space)),
             "parameters": {parameter.name: _describe_range(parameter) for parameter in space.parameters},
             "tie": dict(space.tie),
@@ -42,72 +94,72 @@ def check_problem(problem: Problem) -> dict[str, Any]:
             "actuators": [record.name for record in space.actuators],
         },
         "unused": unused_parts(problem),
-        "warnings": geometry_warnings(problem),
+        "samples": n_samples,
+        "findings": [{"message": finding.message, "evidence": finding.evidence} for finding in findings],
     }
 
 
 def show_check(console: Console, problem: Problem) -> None:
     """Print what a task and a space mean."""
-    record = check_problem(problem)
-    show_task(console, problem.task, has_drives=problem.has_drives)
+    show_task(console, problem.task, has_drives=problem.has_drives, is_brief=True)
+    show_target_table(console, problem)
+    show_cycle(console, problem.task)
     minimised = ", ".join(f"{objective.name} [{objective.unit}]" for objective in problem.objectives)
     console.print(f"  minimised: {minimised}")
-    space = record["space"]
-    low, high = space["joints"]
+    space, tie = problem.space, dict(problem.space.tie)
+    low, high = space.min_joints, space.max_joints
     console.print(
-        f"space {space['name']}: {low if low == high else f'{low} to {high}'} joints, reach at most "
-        f"{space['max_reach']:.3g} m, {space['free_parameters']} free parameters"
+        f"space {space.name}: {low if low == high else f'{low} to {high}'} joints, reach at most "
+        f"{longest_reach(problem):.3g} m, {len(free_parameters(space))} free parameters"
     )
-    for name, described in space["parameters"].items():
-        tied = f", always equal to {space['tie'][name]}" if name in space["tie"] else ""
-        console.print(f"  {name}: {described}{tied}")
-    console.print(f"  {space['masses']}")
-    for note in record["unused"]:
+    for parameter in space.parameters:
+        tied = f", always equal to {tie[parameter.name]}" if parameter.name in tie else ""
+        console.print(f"  {parameter.name}: {_describe_range(parameter)}{tied}")
+    console.print(f"  {space.mass_note}")
+    for note in unused_parts(problem):
         console.print(f"note: {note}")
-    for warning in record["warnings"]:
-        console.print(f"warning: {warning}")
-    console.print(f"task and space are valid; warnings: {len(record['warnings']) or 'none'}")
+
+
+def run_check(
+    console: Console, problem: Problem, written: Sequence[Finding], deep: bool, picture: Path | None, json_: bool
+) -> None:
+    """Print what a task and a space mean and what is wrong with them, and draw them.
+
+    Args:
+        console: The console.
+        problem: The problem.
+        written: Findings about the files, of `check_files`.
+        deep: Whether random designs are evaluated.
+        picture: File of the picture; None for none.
+        json_: Whether to print JSON instead.
+
+    Raises:
+        TaskError: It is proven that no design can serve the task.
+    """
+    if not json_:
+        show_check(console, problem)
+    findings, n_samples = find_faults(problem, written, deep)
+    if picture is not None:
+        from armwright.report.task_figure import write_task_figure
+
+        write_task_figure(problem, picture)
+    if json_:
+        print_json({**record_check(problem, findings, n_samples), "picture": picture})
+        stop_if_proven(findings)
+        return
+    n_warnings = show_warnings(console, findings)
+    if n_samples:
+        console.print(f"random designs evaluated: {n_samples:,}")
+    if picture is not None:
+        console.print(f"picture: {picture}")
+    stop_if_proven(findings)
+    console.print(f"task and space are valid; warnings: {n_warnings or 'none'}")
 
 
 def free_parameters(space: DesignSpace) -> list[Parameter]:
     """Return the parameters that are neither fixed nor tied to another one."""
     tied = dict(space.tie)
     return [parameter for parameter in space.parameters if parameter.name not in tied and not _is_fixed(parameter)]
-
-
-def geometry_warnings(problem: Problem) -> list[str]:
-    """Return a line for each target that no arm can reach, or that lies inside an obstacle."""
-    reach = problem.max_reach
-    warnings: list[str] = []
-    for number, target in enumerate(problem.task.targets, start=1):
-        distance = problem.distance_to_bases(target)
-        if distance > reach:
-            warnings.append(
-                f"target {number} {format_point(target)} m is {distance:.3g} m from the nearest allowed base, and the "
-                f"longest arm reaches {reach:.3g} m; widen origin_x, origin_y, origin_z or link in the space"
-            )
-        warnings += [
-            f"target {number} {format_point(target)} m is inside an obstacle: {obstacle.describe()}"
-            for obstacle in problem.task.obstacles
-            if contains(obstacle, target)
-        ]
-    return warnings
-
-
-def contains(obstacle: Obstacle, point: Point) -> bool:
-    """Return whether a point [m] is inside an obstacle."""
-    solid = obstacle.solid
-    local = solid.rotation.T @ (np.array(point) - solid.centre)
-    radius, half_height = solid.half[0], solid.half[2]
-    match solid.shape:
-        case "box":
-            return bool(np.all(np.abs(local) < solid.half))
-        case "sphere":
-            return math.hypot(*local) < radius
-        case "cylinder":
-            return math.hypot(*local[:2]) < radius and abs(local[2]) < half_height
-        case "ground":
-            return bool(local[2] < 0.0)
 
 
 def _is_fixed(parameter: Parameter) -> bool:

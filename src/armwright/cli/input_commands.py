@@ -60,16 +60,23 @@ def check(
     task: TaskName,
     space: SpaceFile = None,
     objectives: Objectives = None,
+    deep: Annotated[
+        bool, typer.Option("--deep", help="Also look for constraints that none of 1,000 random designs satisfies.")
+    ] = False,
+    picture: Annotated[
+        bool, typer.Option("--picture/--no-picture", help="Draw targets, bases, obstacles and the cycle's lines.")
+    ] = True,
+    out: Annotated[
+        Path | None, typer.Option(help="The picture: a PNG, PDF or SVG file.", show_default="NAME-check.png")
+    ] = None,
     json_: Json = False,
 ) -> None:
-    """Validate TASK and a design space, and describe what they mean."""
-    from armwright.cli.check import check_problem, show_check
+    """Check TASK and a design space: what they mean, what cannot work, and what was hardly meant."""
+    from armwright.cli.check import check_files, run_check
 
     problem = load_problem(task, space, objectives=objectives)
-    if json_:
-        print_json(check_problem(problem))
-    else:
-        show_check(open_console(), problem)
+    drawn = (out or Path(f"{problem.task.name}-check.png")) if picture else None
+    run_check(open_console(), problem, check_files(task, space), deep, drawn, json_)
 
 
 def tasks(

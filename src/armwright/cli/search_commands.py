@@ -57,6 +57,7 @@ def design(
 
     The same command with a larger --budget continues the search.
     """
+    from armwright.cli.check import check_before_search, check_files
     from armwright.cli.notes import space_note
     from armwright.cli.progress import search_progress
     from armwright.cli.show_results import show_search
@@ -75,6 +76,7 @@ def design(
             raise SettingsError(f"--proposer {proposer} proposes no initial designs; leave it out")
         console.print(choice.reason)
     folder = out or Path("runs") / f"{problem.task.name}-design-seed{seed}"
+    check_before_search(console, problem, check_files(task, space), folder)
     try:
         with search_progress(console) as watch:
             run = find_front(
@@ -174,6 +176,7 @@ def optimize(
 
     The same command resumes or shows the run; a larger --n-total extends it.
     """
+    from armwright.cli.check import check_before_search, check_files
     from armwright.cli.notes import space_note
     from armwright.cli.progress import study_progress
     from armwright.cli.show_results import show_result
@@ -191,6 +194,7 @@ def optimize(
     choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
+    check_before_search(console, problem, check_files(task, space), folder)
     if live:
         from armwright.report.live_server import start_server
 

@@ -1,5 +1,6 @@
 """Print tasks, actuators and drafts."""
 
+import math
 import shlex
 import textwrap
 from collections.abc import Sequence
@@ -11,11 +12,15 @@ from rich.text import Text
 from armwright.cli.streams import format_point, plain_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.llm.draft import Draft
+from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import cycle_constraints
+from armwright.problem.problem import Problem
 from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
 from armwright.tasks.payload import Payload
-from armwright.tasks.targets import describe_targets
+from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
+
+MAX_ROWS = 40  # of a table of targets
 
 
 def show_tasks(console: Console, tasks: Sequence[DesignTask]) -> None:
@@ -79,6 +84,7 @@ def show_task(
     best_known: float | None = None,
     stored: Sequence[Baseline] = (),
     has_drives: bool = False,
+    is_brief: bool = False,
 ) -> None:
     """Print a task.
 
@@ -88,12 +94,15 @@ def show_task(
         best_known: Its best known hypervolume, if any.
         stored: Its baselines.
         has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
+        is_brief: Leave out the targets and the steps of the cycle.
     """
     reference = task.reference_point
     console.print(Text(task.name, style="bold") + Text(f": {task.description}"))
-    console.print(f"  {len(task.targets)} targets [m]: " + " ".join(format_point(target) for target in task.targets))
-    for line in describe_targets(task.target_specs):
-        console.print(f"  {line}")
+    if not is_brief:
+        points = " ".join(format_point(target) for target in task.targets)
+        console.print(f"  {len(task.targets)} targets [m]: {points}")
+        for line in describe_targets(task.target_specs):
+            console.print(f"  {line}")
     if task.restarts:
         console.print(f"  {task.restarts + 1} initial postures of the inverse kinematics per target")
     for name, value in (
@@ -103,8 +112,8 @@ def show_task(
         ("payload", _describe_payload(task)),
         ("evaluated by the worst case, also", task.cases_description),
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
-        ("cycle", task.cycle_description),
-        ("durations", task.cycle.describe_times() if task.cycle else ""),
+        ("cycle", "" if is_brief else task.cycle_description),
+        ("durations", task.cycle.describe_times() if task.cycle and not is_brief else ""),
         ("constraints of the cycle", ", ".join(cycle_constraints(task, has_drives))),
         *(("workspace", region.describe()) for region in task.workspace),
         ("reference point", "chosen from the first random trials" if reference is None else format_point(reference)),
@@ -118,6 +127,61 @@ def show_task(
             f"  {baseline.method}, {baseline.runs} runs of 200 counted trials: E_hv {baseline.e_hv:.2f} (σ_hv "
             f"{baseline.sigma_hv:.2f}), final {baseline.final:.2f}, {baseline.share:.1%} of the best known"
         )
+
+
+def show_target_table(console: Console, problem: Problem) -> None:
+    """Print a table of the targets of a task and their distances from the bases that a space allows."""
+    task, arrays = problem.task, problem.task.target_arrays
+    heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", "from base [m]")
+    table = plain_table("  target", *heads, "tool direction", right=heads)
+    distances = distance_to_bases(problem.space, task.target_positions)
+    for i, point in enumerate(task.targets[:MAX_ROWS]):
+        numbers = (*point, 1e3 * arrays.tolerance[i], task.payloads[i], distances[i])
+        table.add_row(
+            f"  {task.target_names[i]}", *(f"{value:.4g}" for value in numbers), Text(_tool_direction(arrays, i))
+        )
+    console.print(f"  {len(task.targets)} targets:")
+    console.print(table)
+    if len(task.targets) > MAX_ROWS:
+        console.print(f"  … and {len(task.targets) - MAX_ROWS} more")
+
+
+def _tool_direction(arrays: TargetArrays, index: int) -> str:
+    """Return the direction of the tool at a target, and the target's weight if it has one."""
+    parts: list[str] = []
+    if arrays.n_angular[index]:
+        axes = (2,) if arrays.n_angular[index] == AXIS else (2, 0)
+        parts += [
+            f"{'xyz'[k]} along {format_point((arrays.rotation[index, :, k].round(3) + 0.0).tolist())}" for k in axes
+        ]
+        parts.append(f"within {math.degrees(arrays.angle_tolerance[index]):.3g}°")
+    parts += [f"weight {arrays.weight[index]:g}"] * bool(arrays.weight[index] != 1.0)
+    return ", ".join(parts) or "any"
+
+
+def show_cycle(console: Console, task: DesignTask) -> None:
+    """Print the steps of a cycle, one a line; nothing without a cycle."""
+    if task.cycle is None:
+        return
+    cycle, plan = task.cycle, task.plan(task.target_positions)
+    names = [task.target_names[target] for target in plan.targets]
+    acts = {"pick": ", pick", "place": ", place", None: ""}
+    carried = cycle.carried() if task.payloads.any() else (False,) * len(names)
+    console.print(f"  cycle, {'closed' if cycle.closed else 'open'}, at rest at each target:")
+    console.print(f"    1. start at {names[0]}" + ("" if cycle.closed else acts[cycle.steps[0].do]))
+    for number in range(1, len(names) + cycle.closed):
+        step, time = cycle.steps[number % len(names)], plan.times[number % len(names)]
+        way = "a line" if step.by == "line" else "a joint motion"
+        back = "back " if number == len(names) else ""
+        load = " with the payload" if carried[number % len(names)] else ""
+        duration = "as fast as possible" if time is None else f"in {time:g} s"
+        console.print(
+            f"    {number + 1}. {back}to {names[number % len(names)]} by {way}{load}, {duration}{acts[step.do]}"
+        )
+    if cycle.approach is not None:
+        console.print(f"    lines of {1e3 * cycle.approach:g} mm along the tool before and after each pick and place")
+    if cycle.dwell:
+        console.print(f"    {cycle.dwell:g} s at rest after each pick and place")
 
 
 def _describe_payload(task: DesignTask) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
+from armwright.kinematics.actuation import Actuation
 from armwright.kinematics.arm_arrays import ArmArrays
 from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.drive_limits import MotionLoad, least_time, motion_load
@@ -124,21 +125,31 @@ def _instants(samples: int) -> tuple[Array, Array, Array]:
     return weights, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
+def check_durations(drives: Actuation | None, plan: CyclePlan) -> Actuation | None:
+    """Return the drives if their torques and speeds are known, else None.
+
+    Raises:
+        SettingsError: They are not known, and a step should be as fast as possible.
+    """
+    if drives is not None and not np.isnan(drives.peak + drives.no_load_speed + drives.corner_speed).any():
+        return drives
+    if any(plan.times[motion.step] is None for motion in plan.motions):
+        raise SettingsError(
+            "cycle_time and other quantities of time need the duration of each step, or actuators with known torques "
+            "and speeds; try cycle: {time: 1.5, ...}"
+        )
+    return None
+
+
 def _durations(arms: ArmArrays, plan: CyclePlan, loads: Sequence[MotionLoad]) -> Array:
     """Return the (N, M) durations: the least for torques and speeds, scaled to a step's own time if it states one.
 
     Without known torques and speeds, the motions of a step share its time by the largest travel of a joint.
     """
-    drives = arms.actuation
-    unknown = drives is None or bool(np.isnan(drives.peak + drives.no_load_speed + drives.corner_speed).any())
-    if unknown and any(plan.times[motion.step] is None for motion in plan.motions):
-        raise SettingsError(
-            "cycle_time and other quantities of time need the duration of each step, or actuators with known torques "
-            "and speeds; try cycle: {time: 1.5, ...}"
-        )
+    drives = check_durations(arms.actuation, plan)
     travel = np.stack([np.abs(load.velocity).max(axis=(1, 2)) for load in loads], axis=1)  # (N, M)
     durations = travel + 1e-9
-    if drives is not None and not unknown:
+    if drives is not None:
         least = np.stack([least_time(load, drives) for load in loads], axis=1)
         durations = np.clip(np.where(np.isfinite(least), ROUNDING * least, MAX_TIME), MIN_TIME, MAX_TIME)
     for step in {motion.step for motion in plan.motions}:

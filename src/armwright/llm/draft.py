@@ -35,6 +35,7 @@ from armwright.llm.model_options import ModelOptions
 from armwright.llm.prompt import estimated_tokens
 from armwright.llm.session import LlmSession
 from armwright.llm.transcript import Transcript
+from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
 from armwright.runs.summary import ProposerSummary
 from armwright.spaces.design_space import DesignSpace, paper_space
@@ -179,6 +180,7 @@ class Drafter(LlmSession):
         if not task.provenance.strip():
             raise TaskError("task: provenance is missing; state what the targets were made from and what was assumed")
         problem = Problem(task, space or paper_space())
+        stop_if_proven(check_instantly(problem))
         problem.evaluate(problem.space.sample(N_TRIED, 0))
         assumptions, questions = (_lines(content.get(key)) for key in ("assumptions", "questions"))
         return Draft(task, space, assumptions, questions, task_yaml, space_yaml, self._by(), self.summary())

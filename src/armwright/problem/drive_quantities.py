@@ -1,5 +1,6 @@
 """Quantities of arms that depend on their actuators."""
 
+from collections.abc import Mapping
 from typing import cast
 
 import numpy as np
@@ -11,13 +12,24 @@ from armwright.kinematics.drive_limits import torque_speed_utilisation
 from armwright.kinematics.supply import SupplyCurrents
 from armwright.problem.evaluation import Evaluation
 
+# Ratings of actuators that a quantity needs, by its name.
+RATINGS: Mapping[str, tuple[str, ...]] = {
+    "price": ("price",),
+    "torque_utilisation": ("peak",),
+    "dynamic_utilisation": ("peak", "corner_speed", "no_load_speed"),
+    "speed_utilisation": ("no_load_speed",),
+    "thermal_utilisation": ("continuous",),
+    "voltages": ("voltage",),
+    "peak_current": ("peak", "voltage", "current"),
+    "mean_current": ("peak", "voltage", "current"),
+}
 
-def _actuation(evaluation: Evaluation, quantity: str, *ratings: str) -> Actuation:
-    """Return the actuation of the arms, with these ratings known."""
-    actuation = evaluation.arms.actuation
+
+def require_ratings(actuation: Actuation | None, quantity: str) -> Actuation:
+    """Return the actuation of arms; SettingsError if it lacks what a quantity of this name needs."""
     if actuation is None:
         raise SettingsError(f"objective {quantity} needs actuators: name some in the space file (actuators: [...])")
-    for rating in ratings:
+    for rating in RATINGS[quantity]:
         if np.isnan(getattr(actuation, rating)).any():
             key = {"no_load_speed": "speed"}.get(rating, rating)
             raise SettingsError(f"objective {quantity} needs the {key} of every actuator; the space names one without")
@@ -26,7 +38,7 @@ def _actuation(evaluation: Evaluation, quantity: str, *ratings: str) -> Actuatio
 
 def _motor_peak(evaluation: Evaluation, quantity: str) -> Array:
     """Return (N, 1, J) peak torques of the motors [N m], divided by the safety factor."""
-    actuation = _actuation(evaluation, quantity, "peak")
+    actuation = require_ratings(evaluation.arms.actuation, quantity)
     return (actuation.peak * evaluation.arms.travel / actuation.safety_factor[:, None])[:, None]
 
 
@@ -38,7 +50,7 @@ def torque_utilisation(evaluation: Evaluation) -> Array:
 
 def dynamic_utilisation(evaluation: Evaluation) -> Array:
     """Return (N, T) the largest torque-speed utilisation on the way to each target."""
-    drives = _actuation(evaluation, "dynamic_utilisation", "peak", "corner_speed", "no_load_speed")
+    drives = require_ratings(evaluation.arms.actuation, "dynamic_utilisation")
     return evaluation.worst_loads(
         lambda torques, speeds: torque_speed_utilisation(torques, speeds, drives).max(axis=-1)
     )
@@ -46,7 +58,7 @@ def dynamic_utilisation(evaluation: Evaluation) -> Array:
 
 def speed_utilisation(evaluation: Evaluation) -> Array:
     """Return (N, T) the largest share of its no-load speed that a motor needs on the way to each target."""
-    speed = _actuation(evaluation, "speed_utilisation", "no_load_speed").no_load_speed[:, None]
+    speed = require_ratings(evaluation.arms.actuation, "speed_utilisation").no_load_speed[:, None]
     return evaluation.worst_loads(lambda _, speeds: np.abs(speeds / speed).max(axis=-1))
 
 
@@ -58,21 +70,21 @@ def dynamic_torque(evaluation: Evaluation) -> Array:
 
 def thermal_utilisation(evaluation: Evaluation) -> Array:
     """Return the (N,) largest share of its continuous torque that a motor needs, times the safety factor."""
-    drives = _actuation(evaluation, "thermal_utilisation", "continuous")
+    drives = require_ratings(evaluation.arms.actuation, "thermal_utilisation")
     share = evaluation.loads.rms_torques / drives.continuous
     return drives.safety_factor * share.max(axis=1)
 
 
 def voltages(evaluation: Evaluation) -> Array:
     """Return the (N,) number of different voltages; fixed joints have 0 V."""
-    voltage = np.sort(_actuation(evaluation, "voltages", "voltage").voltage, axis=1)
+    voltage = np.sort(require_ratings(evaluation.arms.actuation, "voltages").voltage, axis=1)
     first = np.diff(voltage, axis=1, prepend=0.0) > 0.0
     return first.sum(axis=1).astype(np.float64)
 
 
 def price(evaluation: Evaluation) -> Array:
     """Return the (N,) prices of all actuators [USD]."""
-    return _actuation(evaluation, "price", "price").price
+    return require_ratings(evaluation.arms.actuation, "price").price
 
 
 def peak_current(evaluation: Evaluation) -> Array:
@@ -86,5 +98,5 @@ def mean_current(evaluation: Evaluation) -> Array:
 
 
 def _currents(evaluation: Evaluation, quantity: str) -> SupplyCurrents:
-    _actuation(evaluation, quantity, "peak", "voltage", "current")
+    require_ratings(evaluation.arms.actuation, quantity)
     return cast("SupplyCurrents", evaluation.supply)

@@ -25,6 +25,11 @@ from armwright.tasks.payload import POINT_LOAD, LoadShape
 from armwright.tasks.targets import TargetArrays, position_targets
 from armwright.tasks.workspace import Region, sample_regions
 
+NO_CYCLE = "path_error, cycle_time and other quantities of motions need a cycle in the task; try cycle: in_order"
+NO_WORKSPACE = (
+    "uncovered_fraction needs a workspace in the task; try workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
+)
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -90,9 +95,7 @@ class Evaluation(Scene):
     def paths(self) -> CyclePaths:
         """The arms along the motions of the cycle; SettingsError if the task has none."""
         if self.cycle_paths is None:
-            raise SettingsError(
-                "path_error, cycle_time and other quantities of motions need a cycle in the task; try cycle: in_order"
-            )
+            raise SettingsError(NO_CYCLE)
         return self.cycle_paths
 
     @cached_property
@@ -166,10 +169,7 @@ class Evaluation(Scene):
     def workspace_error(self) -> Array:
         """(N, W) distance of the tip from each point of the workspace [m]; SettingsError where there is none."""
         if not self.workspace:
-            raise SettingsError(
-                "uncovered_fraction needs a workspace in the task; "
-                "try workspace: {low: [0.2, -0.3, 0], high: [0.6, 0.3, 0.4]}"
-            )
+            raise SettingsError(NO_WORKSPACE)
         points = sample_regions(self.workspace)
         reached = solve_postures(self.arms, points, precision=self.arms.precision, device=self.device).reached
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)

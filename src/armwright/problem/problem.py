@@ -1,6 +1,5 @@
 """The problem: a design space, a task, and the objectives to minimise."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,9 +20,8 @@ from armwright.problem.objectives import ORIENTATION_ERROR, ORIENTATION_QUANTITI
 from armwright.robot.arm import Arm
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
-from armwright.spaces.parameters import Design, FloatParameter
+from armwright.spaces.parameters import Design
 from armwright.spaces.tolerance import perturbed
-from armwright.tasks.targets import Point
 from armwright.tasks.task import Task
 
 POSTURES_AT_ONCE: dict[Device, int] = {"cpu": 2**17, "cuda": 2**20}  # arms x targets; enough to keep a device busy
@@ -139,7 +137,6 @@ class Problem:
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
         self._check_reference_point()
-        self._check_reach()
 
     @property
     def has_drives(self) -> bool:
@@ -161,18 +158,6 @@ class Problem:
                 f"task {self.task.name}: reference_point: expected {len(names)} values ({', '.join(names)}), got "
                 f"{len(point)}; without reference_point it is found from the first random trials"
             )
-
-    def _check_reach(self) -> None:
-        """Raise SettingsError for a cycle with a target that no arm of the space reaches from any base."""
-        plan = self.scenes[0].plan
-        for step, target in enumerate(() if plan is None else plan.targets, start=1):
-            distance = self.distance_to_bases(self.task.targets[target])
-            if distance - self.task.target_arrays.tolerance[target] > self.max_reach:
-                raise SettingsError(
-                    f"step {step}: target {self.task.target_names[target]} is {distance:.3g} m from the nearest "
-                    f"allowed base, but the longest arm with its tool reaches {self.max_reach:.3g} m; widen origin_x, "
-                    "origin_y, origin_z or link in the space"
-                )
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:
@@ -196,12 +181,6 @@ class Problem:
     def max_reach(self) -> float:
         """The length of the longest possible arm, with its tool and all slides extended [m]."""
         return self.space.max_reach + self.task.tool.length
-
-    def distance_to_bases(self, point: Point) -> float:
-        """Return the distance of a point from the box of allowed bases [m]."""
-        ranges = {p.name: (p.low, p.high) for p in self.space.parameters if isinstance(p, FloatParameter)}
-        low, high = np.array([ranges[f"origin_{axis}"] for axis in "xyz"]).T
-        return math.dist(point, np.clip(point, low, high))
 
     def evaluate(self, designs: Sequence[Design]) -> Outcomes:
         """Evaluate N designs: objectives and constraint violations, the worst of all cases and tolerances.

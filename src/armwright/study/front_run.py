@@ -19,6 +19,7 @@ from armwright.arrays import Array
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.kinematics.ik import MANY_ARMS
 from armwright.pareto import PENALTY
+from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import FrontMethod, RunConfig
@@ -65,6 +66,9 @@ def find_front(
         out: run folder; a second call resumes.
         watch: called with the progress.
 
+    Raises:
+        TaskError: it is proven that no design of the space can serve the task.
+
     Examples:
         >>> import armwright as aw
         >>> problem = aw.Problem(aw.load_task("target-2"))
@@ -74,6 +78,7 @@ def find_front(
         True
     """
     budget = budget if isinstance(budget, SearchBudget) else SearchBudget.parse(str(budget))
+    stop_if_proven(check_instantly(problem))
     matrix, origin = _initial_matrix(problem, initial_designs)  # before a folder is made
     config = run_config(problem, FrontMethod(initial_designs=origin), seed)
     if config.reference_point is None:

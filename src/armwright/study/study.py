@@ -14,6 +14,7 @@ from typing import Any
 
 from armwright.exceptions import ModelError, StoppedError
 from armwright.pareto import FrontTracker
+from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Outcome, Problem
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
@@ -76,6 +77,9 @@ def optimize(
         out: run folder, which keeps every trial; a second call resumes.
         watch: called with the progress.
 
+    Raises:
+        TaskError: it is proven that no design of the space can serve the task.
+
     Examples:
         >>> import armwright as aw
         >>> problem = aw.Problem(aw.load_task("target-1"))
@@ -91,6 +95,7 @@ def optimize(
     proposer = check_proposer(proposer)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     check_settings(problem, method, workers, on_model_failure)
+    stop_if_proven(check_instantly(problem))
     config = run_config(problem, method, seed)
     with ExitStack() as stack:
         folder = None

@@ -43,17 +43,21 @@ class Solid:
 
     def contains(self, points: NDArray[np.float64], depth: float = 0.0) -> NDArray[np.bool_]:
         """Return (N,) True for the points (N, 3) [m] that are deeper than `depth` [m] below the surface."""
-        local = np.abs((points - self.centre) @ self.rotation)
+        return self.signed_distance(points) < -depth
+
+    def signed_distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the (N,) distances of points (N, 3) from the surface [m]; inside, minus the depth."""
+        local, half = (points - self.centre) @ self.rotation, np.array(self.half)
         match self.shape:
             case "ground":
-                return points[:, 2] < self.centre[2] - depth
+                return local[:, 2]
             case "sphere":
-                return np.linalg.norm(local, axis=1) < self.half[0] - depth
+                return np.linalg.norm(local, axis=1) - half[0]
             case "cylinder":
-                across = np.hypot(local[:, 0], local[:, 1])
-                return (across < self.half[0] - depth) & (local[:, 2] < self.half[2] - depth)
+                excess = np.column_stack([np.hypot(local[:, 0], local[:, 1]), np.abs(local[:, 2])]) - half[1:]
             case "box":
-                return np.all(local < np.array(self.half) - depth, axis=1)
+                excess = np.abs(local) - half
+        return np.minimum(excess.max(axis=1), 0.0) + np.linalg.norm(np.maximum(excess, 0.0), axis=1)
 
 
 class Record(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):

@@ -1,0 +1,156 @@
+"""Constraints that no design can satisfy, by intervals of what they bound.
+
+Price, mass, length and number of joints have an interval for each number of modules. Constraints contradict each other
+if every number of modules violates at least one.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+from armwright.problem.checks.finding import PROVEN, Finding
+from armwright.problem.constraints import Constraint
+from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Actuator
+from armwright.spaces.design_space import DesignSpace
+from armwright.spaces.joint_modules import MODULES, JointType
+from armwright.spaces.parameters import CategoricalParameter, FloatParameter
+
+ROUNDING = 1e-5  # relative, of quantities in single precision
+COUNTED = ("joints", "targets", "voltages")  # units that their quantity names already
+
+
+@dataclass(frozen=True)
+class Interval:
+    """The smallest and the largest value that a quantity can have."""
+
+    low: float
+    high: float = math.inf
+
+    def __add__(self, other: "Interval") -> "Interval":
+        return Interval(self.low + other.low, self.high + other.high)
+
+    def excludes(self, constraint: Constraint) -> bool:
+        """Return whether no value satisfies a constraint."""
+        slack = ROUNDING * max(constraint.scale, abs(constraint.bound))
+        if constraint.relation == "<=":
+            return self.low * (1.0 - ROUNDING) > constraint.bound + slack
+        return self.high * (1.0 + ROUNDING) < constraint.bound - slack
+
+
+NOTHING = Interval(0.0, 0.0)
+
+
+def check_constraints(problem: Problem) -> list[Finding]:
+    """Find constraints that no design satisfies, alone or together."""
+    fixed = _intervals_of_task(problem)
+    findings: list[Finding] = []
+    for constraint in problem.constraints:
+        interval = fixed.get(constraint.quantity.name)
+        if interval is not None and interval.excludes(constraint):
+            findings.append(Finding(_describe(constraint, interval), PROVEN))
+    by_size = intervals_by_modules(problem)
+    violated = {
+        n: [c for c in problem.constraints if c.quantity.name in known and known[c.quantity.name].excludes(c)]
+        for n, known in by_size.items()
+    }
+    if not all(violated.values()):
+        return findings
+    always = [c for c in problem.constraints if all(c in broken for broken in violated.values())]
+    for constraint in always:
+        each = [known[constraint.quantity.name] for known in by_size.values()]
+        interval = Interval(min(i.low for i in each), max(i.high for i in each))
+        findings.append(
+            Finding(f"{_describe(constraint, interval)} in this space; loosen it, or widen the space", PROVEN)
+        )
+    if not always:
+        together = [
+            f'"{c.description}"' for c in problem.constraints if any(c in broken for broken in violated.values())
+        ]
+        why = [
+            f"with {n} modules, {_limit(broken[0], by_size[n][broken[0].quantity.name])}"
+            for n, broken in violated.items()
+        ]
+        findings.append(
+            Finding(f"constraints: no design satisfies {' and '.join(together)} together: {'; '.join(why)}", PROVEN)
+        )
+    return findings
+
+
+def intervals_by_modules(problem: Problem) -> dict[int, dict[str, Interval]]:
+    """Return the intervals of price [USD], mass [kg], length [m] and joints, for each number of modules."""
+    space, actuators = problem.space, {actuator.name: actuator for actuator in problem.space.arm_actuators}
+    known = {parameter.name: parameter for parameter in space.parameters}
+    totals = {"joints": NOTHING, "length": NOTHING, "price": NOTHING, "mass": NOTHING}
+    totals["mass"] = Interval(problem.task.tool.mass, problem.task.tool.mass)
+    found: dict[int, dict[str, Interval]] = {}
+    for module in range(1, space.max_joints + 1):
+        letters = cast("CategoricalParameter", known[f"joint_{module}"]).choices
+        link = cast("FloatParameter", known[f"link_{module}"])
+        motors = known.get(f"motor_{module}")
+        names = motors.choices if isinstance(motors, CategoricalParameter) else tuple(actuators)[:1]
+        stroke = known.get(f"stroke_{module}")
+        strokes = (
+            (stroke.low, stroke.high) if isinstance(stroke, FloatParameter) else (space.min_stroke, space.min_stroke)
+        )
+        choices = [_of_letter(space, cast("JointType", x), [actuators[name] for name in names], strokes)
+                   for x in letters]  # fmt: skip
+        own = {name: _hull([choice[name] for choice in choices]) for name in ("joints", "price", "mass")}
+        own["length"] = Interval(link.low, link.high)
+        own["mass"] += Interval(space.mass.mass(link.low), space.mass.mass(link.high))
+        totals = {name: totals[name] + own[name] for name in totals}
+        if module >= space.min_joints:
+            found[module] = totals
+    if not actuators or any(actuator.price is None for actuator in actuators.values()):
+        found = {n: {name: i for name, i in one.items() if name != "price"} for n, one in found.items()}
+    return found
+
+
+def _of_letter(
+    space: DesignSpace, letter: JointType, motors: list[Actuator], strokes: tuple[float, float]
+) -> dict[str, Interval]:
+    """Return the intervals of a module of this type, without its link."""
+    module = MODULES[letter]
+    n = len(module.joints) if module.is_actuated else 0
+    prices = [n * (motor.price or 0.0) for motor in motors] or [0.0]
+    masses = [n * motor.mass for motor in motors] or [0.0]
+    rail = [space.mass.mass(stroke) if module.is_prismatic else 0.0 for stroke in strokes]
+    return {
+        "joints": Interval(n, n),
+        "price": Interval(min(prices), max(prices)),
+        "mass": Interval(min(masses) + rail[0], max(masses) + rail[1]),
+    }
+
+
+def _hull(intervals: list[Interval]) -> Interval:
+    return Interval(min(i.low for i in intervals), max(i.high for i in intervals))
+
+
+def _intervals_of_task(problem: Problem) -> Mapping[str, Interval]:
+    """Return the intervals of quantities that do not depend on the space."""
+    intervals = dict.fromkeys((name for name in OBJECTIVES), Interval(0.0))
+    n = float(len(problem.task.targets))
+    intervals |= {"unreached_targets": Interval(0.0, n), "jumps": Interval(0.0, n), "manipulability": Interval(0.0)}
+    intervals |= dict.fromkeys(("uncovered_fraction", "anisotropy"), Interval(0.0, 1.0))
+    intervals |= {quantity.name: Interval(-math.inf, FAR) for quantity in CLEARANCES}
+    voltages = {actuator.voltage for actuator in problem.space.arm_actuators}
+    intervals["voltages"] = Interval(0.0, float(len(voltages)))
+    plan = problem.scenes[0].plan
+    if plan is not None:
+        stated = {motion.step: plan.times[motion.step] or 0.0 for motion in plan.motions}
+        intervals["cycle_time"] = Interval(sum(stated.values()) + sum(plan.dwells))
+    return intervals
+
+
+def _describe(constraint: Constraint, interval: Interval) -> str:
+    """Return that an interval excludes a constraint, and why."""
+    return f'constraints: no design satisfies "{constraint.description}": {_limit(constraint, interval)}'
+
+
+def _limit(constraint: Constraint, interval: Interval) -> str:
+    """Return the bound of an interval that excludes a constraint."""
+    side, value = ("least", interval.low) if constraint.relation == "<=" else ("most", interval.high)
+    unit = "" if constraint.quantity.unit in COUNTED else f" {constraint.quantity.unit}"
+    return f"{constraint.quantity.name} is at {side} {value:.4g}{unit}"

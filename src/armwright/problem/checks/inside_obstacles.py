@@ -1,0 +1,78 @@
+"""Targets inside obstacles, or too close to them."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armwright.arrays import Array
+from armwright.problem.checks.finding import PROVEN, SUSPECTED, Finding, describe_point, describe_targets
+from armwright.problem.checks.reach import ROUNDING, allowed_errors
+from armwright.problem.objectives import COMFORTABLE
+from armwright.problem.problem import Problem
+from armwright.tasks.obstacles import Obstacle
+
+
+def check_obstacles(problem: Problem) -> list[Finding]:
+    """Find targets in obstacles.
+
+    The end of the last link is within the tool's length of the tip, and the tip of an arm that reaches a target is
+    within its tolerance. Clearances ignore the tool. If the constraints demand both to reach a target and a clearance
+    that the end of the last link cannot have there, it is proven that no design is feasible.
+    """
+    task, findings = problem.task, list[Finding]()
+    error, clearance = allowed_errors(problem), required_clearance(problem)
+    slack = ROUNDING * (1.0 + np.abs(task.target_positions).max())
+    # A first link stands on what it is mounted on, and is measured from above its foot.
+    has_other_links = problem.space.min_joints > 1
+    for obstacle in task.obstacles:
+        distance = obstacle.solid.signed_distance(task.target_positions)
+        nearest = distance + error + task.tool.length - problem.space.link_radius  # of the last link
+        impossible = nearest + slack < clearance if has_other_links else np.zeros(len(distance), dtype=np.bool_)
+        inside = (distance < -task.target_arrays.tolerance) & ~impossible
+        for found, evidence in ((impossible, PROVEN), (inside, SUSPECTED)):
+            if found.any():
+                findings.append(_finding(problem, obstacle, distance, found, evidence))
+    return findings
+
+
+def required_clearance(problem: Problem) -> float:
+    """Return the clearance that the constraints demand of every posture at a target [m]; -inf for none."""
+    required = -math.inf
+    for constraint in problem.constraints:
+        match constraint.quantity.name, constraint.relation:
+            case "clearance" | "obstacle_clearance", ">=":
+                required = max(required, constraint.bound)
+            case "collision", "<=":
+                required = max(required, -constraint.bound)
+            case "clearance_shortfall", "<=":
+                required = max(required, COMFORTABLE - constraint.bound)
+            case _:
+                pass
+    return required
+
+
+def _finding(problem: Problem, obstacle: Obstacle, distance: Array, found: NDArray[np.bool_], evidence: str) -> Finding:
+    task, numbers = problem.task, np.flatnonzero(found)
+    deepest = numbers[np.argmin(distance[numbers])]
+    who = describe_targets([task.target_names[i] for i in numbers], len(distance))
+    if len(numbers) > 1:
+        who += f", the deepest at {describe_point(task.target_positions[deepest])},"
+    else:
+        who += f" {describe_point(task.target_positions[deepest])}"
+    verb = "is" if len(numbers) == 1 else "are"
+    depth = -1e3 * float(distance[deepest])
+    where = f"{depth:.3g} mm inside" if depth > 0.0 else f"{-depth:.3g} mm from"
+    if evidence == SUSPECTED:
+        return Finding(
+            f"{who} {verb} {where} an obstacle: {obstacle.describe()}; an arm that reaches it passes through its "
+            "surface",
+            evidence,
+        )
+    radius, tool = 1e3 * problem.space.link_radius, 1e3 * task.tool.length
+    remedy = "move the target or the obstacle" + ("" if depth > 0.0 else ", or state a longer tool")
+    return Finding(
+        f"{who} {verb} {where} an obstacle: {obstacle.describe()}; the last link, of radius {radius:g} mm and with a "
+        f"tool of {tool:g} mm, cannot keep the clearance that the constraints demand; {remedy}",
+        evidence,
+    )

@@ -1,0 +1,33 @@
+"""What the objectives and constraints of a problem require of its task and space, found without evaluating a design."""
+
+from armwright.exceptions import SettingsError
+from armwright.kinematics.cycle_loads import check_durations
+from armwright.problem.drive_quantities import RATINGS, require_ratings
+from armwright.problem.evaluation import NO_CYCLE, NO_WORKSPACE
+from armwright.problem.objectives import (
+    JUMPS,
+    PATH_ANGLE,
+    PATH_ERROR,
+    QUANTITIES,
+    TIMED_QUANTITIES,
+    UNCOVERED_FRACTION,
+)
+from armwright.problem.problem import Problem
+
+N_SAMPLES = 64  # designs whose motors are looked at
+
+
+def check_requirements(problem: Problem) -> None:
+    """Raise SettingsError if a quantity needs actuators, a cycle or a workspace that the problem lacks."""
+    quantities = [*problem.objectives, *(constraint.quantity for constraint in problem.constraints)]
+    actuation = problem.arms(problem.space.matrix(problem.space.sample(N_SAMPLES, seed=0))).actuation
+    plan = problem.scenes[0].plan
+    for quantity in quantities:
+        if quantity.name in RATINGS and quantity is QUANTITIES[quantity.name]:
+            require_ratings(actuation, quantity.name)
+        if quantity in (JUMPS, PATH_ANGLE, PATH_ERROR, *TIMED_QUANTITIES) and plan is None:
+            raise SettingsError(NO_CYCLE)
+        if quantity in TIMED_QUANTITIES and plan is not None:
+            check_durations(actuation, plan)
+        if quantity == UNCOVERED_FRACTION and not problem.task.workspace:
+            raise SettingsError(NO_WORKSPACE)

@@ -1,0 +1,74 @@
+"""Constraints that no random design satisfies."""
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.problem.checks.finding import Finding
+from armwright.problem.problem import Problem
+
+FIRST = 16  # designs of the first batches; kernels are loaded before the time counts
+MAX_BATCH = 4096
+MAX_SAMPLES = 1_000_000
+ENOUGH = 300  # samples, below which it means little that none satisfies a constraint
+SEED = 20  # of the samples alone: searches have random numbers of their own
+
+
+def check_by_sampling(
+    problem: Problem, seconds: float, at_least: int = 0, clock: Callable[[], float] = time.perf_counter
+) -> tuple[list[Finding], int]:
+    """Evaluate random designs for about this time, without the loading of kernels.
+
+    Constraints count in the task's first case, for exact arms: a design that violates one there violates it anyway.
+
+    Args:
+        problem: The problem.
+        seconds: The time [s]; less if it is too short for enough samples.
+        at_least: Number of samples that are evaluated even if they take longer.
+        clock: A clock [s].
+
+    Returns:
+        A finding for each constraint that none satisfies, and the number of samples; 0 without constraints.
+    """
+    if not problem.constraints:
+        return [], 0
+    rng = np.random.default_rng(SEED)
+    best = violations(problem, random_designs(problem, FIRST, rng)).min(axis=0)
+    n, size, started = FIRST, FIRST, clock()
+    while n < MAX_SAMPLES:
+        best = np.minimum(best, violations(problem, random_designs(problem, size, rng)).min(axis=0))
+        n += size
+        spent = max(1e-9, clock() - started)
+        rate = (n - FIRST) / spent
+        left = max(rate * (seconds - spent), at_least - n)  # samples
+        if left <= 0.0 or n + left < ENOUGH:
+            break
+        size = max(1, min(MAX_BATCH, math.ceil(left / 2)))
+    if n < ENOUGH:
+        return [], n
+    evidence = f"none of {n:,} samples"
+    return [
+        Finding(
+            f'no random design satisfies "{constraint.description}"; the best has {constraint.measured(value):.4g} '
+            f"{constraint.quantity.unit}",
+            evidence,
+        )
+        for constraint, value in zip(problem.constraints, best.tolist(), strict=True)
+        if value > 0.0
+    ], n
+
+
+def random_designs(problem: Problem, n: int, rng: np.random.Generator) -> Array:
+    """Return the (n, P) matrix of designs that are uniform in every parameter."""
+    parameters = problem.space.parameters
+    rows = [[parameter.sample(rng) for parameter in parameters] for _ in range(n)]
+    return problem.space.normalised(np.array(rows, dtype=np.float64))
+
+
+def violations(problem: Problem, matrix: Array) -> Array:
+    """Return the (N, C) violations of designs (N, P) in the task's first case; satisfied at <= 0."""
+    evaluation = problem.physics(matrix)
+    return np.column_stack([constraint(evaluation) for constraint in problem.constraints])

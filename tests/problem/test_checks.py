@@ -1,0 +1,347 @@
+"""Checks before a search: nothing true is refused, and nothing is called proven that a design disproves."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.exceptions import SettingsError, TaskError
+from armwright.problem.checks.bounds import intervals_by_modules
+from armwright.problem.checks.finding import PROVEN, SUSPECTED
+from armwright.problem.checks.instant import check_instantly, stop_if_proven
+from armwright.problem.checks.reach import longest_reach
+from armwright.problem.checks.sampling import SEED, check_by_sampling, random_designs, violations
+from armwright.problem.problem import Problem
+from armwright.spaces.design_space import DesignSpace, default_space, load_space, paper_space
+from armwright.tasks.catalogue import builtin_names, load_task
+from armwright.tasks.task import Task
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DOWN = [0, 0, -1]
+HERE = [0.4, 0.2, 0.3]
+TABLE = {"kind": "ground", "name": "table"}
+MOTORS = ["XL430-W250", "XM430-W350", "XM540-W270"]
+SPACES = {
+    "paper": {},
+    "motors": {"joints": [2, 5], "joint_types": ["R", "O", "S", "F"], "actuators": MOTORS, "stroke": [0.1, 0.4]},
+    "restricted": {"joints": 3, "restrict": {"link_1": [0.1, 0.2], "joint_2": ["O"], "motor_3": ["XL430-W250"]},
+                   "joint_types": ["R", "O", "X"], "actuators": MOTORS,
+                   "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002}},
+    "slides": {"joints": [1, 4], "joint_types": ["X", "T", "S"], "stroke": 0.5, "grid": {"link": 0.02},
+               "mass": {"kind": "per_link", "kg": 0.3}},
+}  # fmt: skip
+
+
+def space(**keys: Any) -> DesignSpace:
+    return DesignSpace.model_validate({"name": "mine", **keys})
+
+
+def problem(targets: Any = (HERE,), of: DesignSpace | None = None, **keys: Any) -> Problem:
+    return Problem(Task.model_validate({"name": "mine", "targets": list(targets), **keys}), of or paper_space())
+
+
+def found(checked: Problem) -> list[tuple[str, str]]:
+    return [(finding.evidence, finding.message) for finding in check_instantly(checked)]
+
+
+def only(checked: Problem) -> tuple[str, str]:
+    """Return evidence and message of the only finding."""
+    (finding,) = found(checked)
+    return finding
+
+
+# Nothing to find
+
+
+def example_problems() -> Iterator[Problem]:
+    for file in sorted(EXAMPLES.glob("*.yaml")):
+        if "space" not in file.name:
+            own = file.with_name(f"{file.stem.removesuffix('-task')}-space.yaml")
+            yield Problem(load_task(file), load_space(own) if own.exists() else paper_space())
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_builtin_tasks_have_no_findings(name: str) -> None:
+    assert found(Problem(load_task(name), default_space(name))) == []
+
+
+def test_examples_have_no_findings() -> None:
+    checked = list(example_problems())
+    assert len(checked) == 7
+    assert [found(one) for one in checked] == [[]] * 7
+
+
+def test_random_tasks_have_no_findings() -> None:
+    assert [seed for seed in range(201) if found(Problem(load_task(f"random-{seed}")))] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in builtin_names() if load_task(name).cycle])
+def test_samples_satisfy_each_constraint_of_builtin_tasks(name: str) -> None:
+    checked = Problem(load_task(name), default_space(name))
+    found = violations(checked, random_designs(checked, 120, np.random.default_rng(SEED)))
+    assert (found.min(axis=0) <= 0.0).all()
+
+
+# Reach
+
+
+@pytest.mark.parametrize("keys", SPACES.values(), ids=SPACES)
+def test_no_design_reaches_further_than_the_longest_arm(keys: dict[str, Any]) -> None:
+    checked = problem(of=space(**keys), tool={"tip": [0.0, 0.03, 0.1]})
+    longest = longest_reach(checked)
+    reaches = [checked.arm(design).reach for design in checked.space.sample(300, 0)]
+    assert max(reaches) <= longest + 1e-12
+    assert longest <= checked.max_reach + 1e-12
+
+
+def test_targets_beyond_the_longest_arm_are_proven() -> None:
+    # bases within 1 m of the origin along each axis, arms up to 1.2 m
+    assert found(problem([[2.19, 0.0, 0.0]])) == []
+    evidence, message = only(problem([[2.19, 0.0, 0.0], [2.21, 0.0, 0.0], [0.0, 0.0, -2.3]]))
+    assert evidence == PROVEN
+    assert message.startswith("2 of 3 targets (2, 3) are out of reach: the farthest, (0, 0, -2.3) m, is 1.3 m from")
+
+
+def test_targets_of_cycles_are_named_and_tools_extend_the_arm() -> None:
+    arm = space(joints=5, link=[0.1, 0.3], origin_x=[-0.1, 0.1], origin_y=[-0.1, 0.1], origin_z=[0.0, 0.1])
+    targets = [{"name": "bin", "position": [0.3, 0.0, 0.1]}, {"name": "home", "position": [1.7, 0.0, 0.05]}]
+    cycle = {"steps": [{"to": "bin"}, {"to": "home"}], "time": 2.0}
+    evidence, message = only(problem(targets, arm, cycle=cycle))
+    assert evidence == PROVEN
+    assert message.startswith(
+        "target home (1.7, 0, 0.05) m is 1.6 m from the nearest allowed base, but the longest arm"
+    )
+    assert "reaches 1.5 m; move it, or widen" in message
+    assert found(problem(targets, arm, cycle=cycle, tool={"tip": [0.0, 0.0, 0.101]})) == []
+
+
+def test_targets_within_what_the_task_allows_are_not_refused() -> None:
+    near = [2.25, 0.0, 0.0]
+    assert len(found(problem([near]))) == 1
+    assert found(problem([{"position": near, "tolerance": 0.06}])) == []
+    assert found(problem([near], constraints=["worst_error <= 0.06"])) == []
+    assert found(problem([near], constraints=["position_error <= 0.06"])) == []
+    assert len(found(problem([near], constraints=["worst_error <= 0.04"]))) == 1
+
+
+def test_restricted_links_shorten_the_longest_arm() -> None:
+    short = space(restrict={f"link_{j}": 0.1 for j in range(1, 5)})
+    assert only(problem([[1.5, 0.0, 0.0]], short))[0] == PROVEN
+
+
+# Obstacles
+
+
+def test_target_in_an_obstacle_is_suspected_unless_the_constraints_exclude_it() -> None:
+    box = {"kind": "box", "name": "shelf", "center": HERE, "size": [0.2, 0.2, 0.06]}
+    bounds = ["collision <= 0", "worst_error <= 0.003"]
+    evidence, message = only(problem(obstacles=[box]))
+    assert evidence == SUSPECTED
+    assert "target 1 (0.4, 0.2, 0.3) m is 30 mm inside an obstacle: shelf: box" in message
+    for one in bounds:
+        assert only(problem(obstacles=[box], constraints=[one]))[0] == SUSPECTED
+    assert only(problem(obstacles=[box], constraints=bounds))[0] == PROVEN
+    # a tool longer than the depth reaches in from outside
+    assert only(problem(obstacles=[box], constraints=bounds, tool={"tip": [0, 0, 0.1]}))[0] == SUSPECTED
+
+
+@pytest.mark.parametrize(
+    "target", [[0.4, 0.2, 0.0], [0.4, 0.2, -0.0009], {"position": [*HERE[:2], -0.01], "tolerance": 0.02}]
+)
+def test_target_on_a_surface_or_within_its_tolerance_is_fine(target: Any) -> None:
+    assert found(problem([target], obstacles=[TABLE])) == []
+    bounds = ["collision <= 0", "unreached_targets <= 0"]
+    assert found(problem([target], obstacles=[TABLE], constraints=bounds, tool={"tip": [0, 0, 0.1]})) == []
+
+
+@pytest.mark.parametrize(
+    ("height", "bounds", "is_proven"),
+    [
+        (0.013, ["collision <= 0", "unreached_targets <= 0"], True),  # a link of 15 mm radius, 1 mm of tolerance
+        (0.0145, ["collision <= 0", "unreached_targets <= 0"], False),
+        (0.0145, ["collision <= 0", "worst_error <= 1e-5"], True),
+        (0.0145, ["collision <= 0.002", "worst_error <= 1e-5"], False),
+        (0.03, ["clearance >= 0.02", "worst_error <= 0.001"], True),
+        (0.03, ["obstacle_clearance >= 0.01", "worst_error <= 0.001"], False),
+        (0.03, ["clearance_shortfall <= 0.05", "position_error <= 0.001"], True),
+        (0.03, ["self_clearance >= 0.5", "worst_error <= 0.001"], False),
+    ],
+)
+def test_proven_obstacles_leave_no_feasible_design(height: float, bounds: list[str], is_proven: bool) -> None:
+    arm = space(joints=5, origin_z=[0.1, 0.6])
+    checked = problem([[0.3, 0.1, height]], arm, obstacles=[TABLE], constraints=bounds)
+    assert [evidence for evidence, _ in found(checked)] == [PROVEN] * is_proven
+    if is_proven:
+        sampled = violations(checked, random_designs(checked, 3000, np.random.default_rng(0)))
+        assert (sampled.max(axis=1) > 0.0).all()
+        assert (sampled <= 0.0).any(axis=0).all()  # each alone can be satisfied
+
+
+def test_arm_of_one_link_stands_on_its_foot() -> None:
+    low = {"obstacles": [TABLE], "constraints": ["collision <= 0", "worst_error <= 0.001"]}
+    assert found(problem([[0.2, 0.0, 0.005]], space(joints=1), **low)) == []
+    assert only(problem([[0.2, 0.0, 0.005]], space(joints=2), **low))[0] == PROVEN
+
+
+# Constraints
+
+
+@pytest.mark.parametrize("keys", SPACES.values(), ids=SPACES)
+def test_designs_lie_within_the_intervals_of_their_size(keys: dict[str, Any]) -> None:
+    checked = problem(of=space(**keys), tool={"mass": 0.2})
+    designs = checked.space.sample(400, 1)
+    arms = checked.arms(checked.space.matrix(designs))
+    measured = {
+        "mass": arms.mass.sum(axis=1, dtype=np.float64) + arms.base_mass,
+        "length": arms.length,
+        "joints": (arms.motion < 6).sum(axis=1),
+        **({} if arms.actuation is None else {"price": arms.actuation.price}),
+    }
+    known = intervals_by_modules(checked)
+    for row, design in enumerate(designs):
+        intervals = known[len(design.joints)]
+        assert set(intervals) == set(measured)
+        for name, values in measured.items():
+            assert intervals[name].low * (1 - 1e-6) <= values[row] <= intervals[name].high * (1 + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "texts"),
+    [
+        (["price <= 80"], ['"price <= 80": price is at least 82.5 USD in this space']),
+        (["mass >= 100"], ["mass is at most"]),
+        (["length <= 0.05"], ["length is at least 0.09 m"]),
+        (["joints >= 6"], ["joints is at most 5"]),
+        (
+            ["price <= 100", "joints >= 4"],
+            ['"price <= 100" and "joints >= 4" together: with 3 modules, joints is at most 3; with 4 modules, price'],
+        ),
+        (["worst_error <= -0.001"], ["worst_error is at least 0 m"]),
+        (["clearance >= 1.5"], ["clearance is at most 1 m"]),
+        (["unreached_targets >= 2"], ["unreached_targets is at most 1"]),
+        (["voltages >= 3"], ["voltages is at most 2"]),
+    ],
+)
+def test_constraints_beyond_their_interval_are_proven(bounds: list[str], texts: list[str]) -> None:
+    arm = space(joints=[3, 5], actuators=MOTORS)
+    evidence, message = only(problem(of=arm, constraints=bounds))
+    assert evidence == PROVEN
+    for text in texts:
+        assert text in message
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [["worst_error <= 0.003"], ["worst_error <= 0"], ["price <= 82.5"], ["price <= 110", "joints >= 4"],
+     ["joints >= 5"], ["clearance >= 0.1", "mass <= 1"]],
+)  # fmt: skip
+def test_constraints_that_designs_can_satisfy_are_not_refused(bounds: list[str]) -> None:
+    assert found(problem(of=space(joints=[3, 5], actuators=MOTORS), constraints=bounds)) == []
+
+
+def test_stated_durations_bound_the_time_of_a_cycle() -> None:
+    cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5, "dwell": 0.5}
+    targets = [HERE, [0.4, -0.2, 0.3]]
+    assert found(problem(targets, cycle=cycle, constraints=["cycle_time <= 4"])) == []
+    evidence, message = only(problem(targets, cycle=cycle, constraints=["cycle_time <= 3.9"]))
+    assert (evidence, "cycle_time is at least 4 s" in message) == (PROVEN, True)
+
+
+def test_proven_findings_stop_and_others_do_not() -> None:
+    stop_if_proven(check_instantly(problem(payload=500)))
+    with pytest.raises(TaskError, match="clearance is at most 1 m") as error:
+        stop_if_proven(check_instantly(problem(constraints=["clearance >= 2", "anisotropy >= 2"])))
+    (note,) = error.value.__notes__
+    assert note.startswith('armwright: constraints: no design satisfies "anisotropy >= 2"')
+
+
+# Magnitudes and strength
+
+
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ({"targets": [HERE, [0.3, 0.1, 8.0]], "tool": {"tip": [0, 0, 7]}}, "tool: its tip is 7 m from the flange"),
+        ({"targets": [{"position": HERE, "tolerance": 2.0}]}, "its tolerance of 2 m exceeds the reach"),
+        ({"targets": [{"position": HERE, "axis": DOWN, "angle_tolerance": 3}]}, "write 0.0524 for 3°"),
+        ({"targets": [[0.05, 0.02, 0.03], [0.04, 0.03, 0.9]]}, "its z = 0.9 m is 18 times the largest other"),
+        ({"obstacles": [{"kind": "sphere", "center": [500, 0, 0], "radius": 100}]}, "obstacle 1 is 200 m long"),
+        ({"payload": {"mass": 0.5, "size": [60, 40, 40]}}, "payload: a side of 60 m exceeds any arm"),
+        ({"of": space(link=[30, 300])}, "space: the longest arm reaches 1.2e+03 m"),
+        ({"payload": 500}, "500 kg are 34,435 times the mass of the heaviest arm of the space, 0.0145 kg"),
+        (
+            {"targets": [HERE, [0.4, -0.6, 0.3]], "payload": 50, "of": space(actuators=MOTORS)},
+            "payload: 50 kg take 98.1 N m about a horizontal axis at 0.2 m",
+        ),
+    ],
+)  # fmt: skip
+def test_numbers_of_a_strange_size_are_suspected(keys: dict[str, Any], text: str) -> None:
+    evidences, messages = zip(*found(problem(**keys)), strict=True)
+    assert SUSPECTED in evidences
+    assert text in " ".join(messages)
+
+
+def test_approach_in_millimetres_is_suspected() -> None:
+    targets = [{"position": point, "axis": DOWN} for point in (HERE, [0.4, -0.2, 0.3])]
+    cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5, "approach": 60}
+    evidence, message = only(problem(targets, cycle=cycle))
+    assert (evidence, "approach = 60 m exceeds" in message) == (SUSPECTED, True)
+
+
+# Requirements
+
+
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ({"objectives": ["price"]}, "objective price needs actuators"),
+        ({"constraints": ["thermal_utilisation <= 1"]}, "objective thermal_utilisation needs actuators"),
+        ({"objectives": ["path_error"]}, "need a cycle"),
+        ({"objectives": ["uncovered_fraction"]}, "needs a workspace"),
+        (
+            {"objectives": ["cycle_time"], "targets": [HERE, [0.4, 0, 0]], "cycle": "in_order"},
+            "need the duration of each step",
+        ),
+    ],
+)
+def test_missing_parts_are_named_as_an_evaluation_names_them(keys: dict[str, Any], text: str) -> None:
+    checked = problem(**keys)
+    with pytest.raises(SettingsError, match=text) as instantly:
+        check_instantly(checked)
+    with pytest.raises(SettingsError) as evaluated:
+        checked.evaluate(checked.space.sample(1, seed=0))
+    assert str(instantly.value) == str(evaluated.value)
+
+
+# Samples
+
+
+def test_samples_name_the_constraints_that_none_satisfies() -> None:
+    checked = problem(constraints=["worst_error >= 50", "mass <= 1"])
+    findings, n = check_by_sampling(checked, 0.0, at_least=500)
+    (finding,) = findings
+    assert 500 <= n < 1000
+    assert finding.evidence == f"none of {n} samples"
+    assert not finding.is_proven
+    assert finding.message.startswith('no random design satisfies "worst_error >= 50"; the best has ')
+
+
+def test_few_samples_are_no_evidence() -> None:
+    checked = problem(constraints=["worst_error >= 50"])
+    ticks = iter(np.arange(0.0, 100.0, 0.9))
+    findings, n = check_by_sampling(checked, 1.0, clock=lambda: float(next(ticks)))
+    assert not findings
+    assert n < 100
+
+
+def test_tasks_without_constraints_are_not_sampled() -> None:
+    assert check_by_sampling(problem(), 1.0) == ([], 0)
+
+
+def test_samples_are_those_of_the_space() -> None:
+    checked = Problem(load_task("screwing"), default_space("screwing"))
+    matrix = random_designs(checked, 40, np.random.default_rng(3))
+    assert (matrix == checked.space.matrix(checked.space.sample(40, seed=3))).all()
