@@ -90,8 +90,8 @@ def tutorial(folder: Path, page: Page, file: Path) -> None:
     for name, key in (("feeder.yaml", "name: feeder"), ("space.yaml", "name: servo-arm")):
         block = next(b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if b.startswith(key))
         (folder / name).write_text(block)
-    command = ["design", "feeder.yaml", "--space", "space.yaml", "--robust", "--budget", 10000]
-    open_report(page, once(folder, "runs/robust", *command), (1280, 760), "#design=1&target=1")
+    command = ["design", "feeder.yaml", "--space", "space.yaml", "--budget", 8000]
+    open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=1&target=3")
     page.screenshot(path=file)
 
 
