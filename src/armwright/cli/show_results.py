@@ -18,8 +18,9 @@ from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.report.style import look
 from armwright.runs.assumptions import assumed_values, count_assumed
 from armwright.runs.history import FrontMember, History
+from armwright.runs.infeasibility import describe_infeasibility
 from armwright.runs.path_report import describe_extremes
-from armwright.runs.results import REPORT, describe_infeasibility
+from armwright.runs.results import REPORT
 from armwright.runs.supply_record import supply_of
 from armwright.study.front_run import FrontRun
 from armwright.study.progress import StudyResult
@@ -121,7 +122,7 @@ def _show_hypervolume(console: Console, history: History, summary: dict[str, Any
     reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
     console.print(f"hypervolume {volume['final']:.3f} ({mean}reference point {reference})")
     if len(history) and not history.feasible.any():
-        reason = describe_infeasibility(history)
+        reason = describe_infeasibility(history, summary["feasibility"]["conflict"])
         console.print(f"{reason[0].upper()}{reason[1:]}. Use {remedy} or looser constraints.")
     elif volume["final"] == 0.0:
         console.print(

@@ -15,7 +15,7 @@ from typing import Any
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, replace_folder, to_csv
-from armwright.pareto import hypervolume, total_violation
+from armwright.pareto import hypervolume
 from armwright.runs.assumptions import assumed_values
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.config import FrontMethod, RunConfig
@@ -23,7 +23,7 @@ from armwright.runs.design_folders import DESIGNS, design_name, objective_record
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.front_gap import front_gap
 from armwright.runs.history import History
-from armwright.runs.path_report import describe_faults, path_record
+from armwright.runs.infeasibility import ViolationTally, feasibility_record
 from armwright.runs.proposer_bias import proposer_bias
 from armwright.runs.recommendation import recommend
 from armwright.runs.summary import ProposerSummary, parse_summary
@@ -143,7 +143,12 @@ def summarize(
 
 
 def summarize_front(
-    history: History, config: RunConfig, found: Array, search: Mapping[str, Any], verification: Verification | None
+    history: History,
+    config: RunConfig,
+    found: Array,
+    search: Mapping[str, Any],
+    verification: Verification | None,
+    tally: ViolationTally | None = None,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a direct search.
 
@@ -153,10 +158,11 @@ def summarize_front(
         found: (N, M) objective values of the whole front.
         search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
         verification: Verification of the front; None if it was not verified.
+        tally: All evaluated designs by the constraints that they satisfy.
     """
     volume = {"final": hypervolume(found, history.reference_point or ())}
     return {
-        **_common_record(history, config, found, volume, verification),
+        **_common_record(history, config, found, volume, verification, tally),
         "search": dict(search),
         "versions": dict(config.versions),
     }
@@ -168,6 +174,7 @@ def _common_record(
     found: Array,
     volume: Mapping[str, Any],
     verification: Verification | None,
+    tally: ViolationTally | None = None,
 ) -> dict[str, Any]:
     """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
     reference = history.reference_point
@@ -177,7 +184,7 @@ def _common_record(
         "seed": config.seed,
         "n_trials": len(history),
         "by_source": dict(Counter(trial.source for trial in history)),
-        **_feasibility_record(history),
+        **feasibility_record(history, tally),
         "hypervolume": {"reference_point": list(reference or ()), **volume},
         "front_gap": None if gap is None else asdict(gap),
         "front_size": len(history.front),
@@ -198,49 +205,6 @@ def _recommended_record(history: History) -> dict[str, Any]:
     if history.problem.task.cycle is None:
         return {}
     return {"recommended": [asdict(one) for one in recommend(history)]}
-
-
-def describe_infeasibility(history: History) -> str:
-    """Describe the nearest design of a history without feasible designs, and the constraints that it violates."""
-    (number,) = history.nearest(1)
-    pairs = zip(history.problem.constraints, history.violations[number].tolist(), strict=True)
-    worst_first = sorted(pairs, key=lambda pair: -pair[1])
-    violated = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in worst_first if v > 0.0]
-    others = f", and {', '.join(violated[1:])}" if len(violated) > 1 else ""
-    faults = describe_faults(history.evaluation([number]), 0)
-    along = f"; along its cycle: {faults}" if faults else ""
-    return f"no design meets all constraints yet; the nearest, #{number}, violates {violated[0]} most{others}{along}"
-
-
-def _feasibility_record(history: History) -> dict[str, Any]:
-    """Return how many designs violate each constraint; empty for a task without constraints.
-
-    nearest: If no design is feasible, the one with the smallest violation, the quantities that constraints bound, and
-        where along its cycle it is worst.
-    """
-    constraints = history.problem.constraints
-    if not constraints:
-        return {}
-    names = [constraint.description for constraint in constraints]
-    nearest = None
-    if len(history) and not history.feasible.any():
-        (number,) = history.nearest(1)
-        violations = history.violations[number]
-        measured = [constraint.measured(value) for constraint, value in zip(constraints, violations, strict=True)]
-        nearest = {
-            "number": number,
-            "violation": float(total_violation(violations[None])[0]),
-            "measured": dict(zip(names, measured, strict=True)),
-            **path_record(history.evaluation([number]), 0),
-        }
-    counts = (history.violations > 0.0).sum(axis=0).tolist()
-    return {
-        "feasibility": {
-            "infeasible": int((~history.feasible).sum()),
-            "violated_by": dict(zip(names, counts, strict=True)),
-            "nearest": nearest,
-        }
-    }
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:

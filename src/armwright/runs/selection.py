@@ -10,8 +10,9 @@ import numpy as np
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
+from armwright.runs.infeasibility import describe_infeasibility
 from armwright.runs.ranking import knee_first
-from armwright.runs.results import describe_infeasibility, read_summary
+from armwright.runs.results import read_summary
 from armwright.spaces.parameters import FloatParameter
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")

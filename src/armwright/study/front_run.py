@@ -25,6 +25,7 @@ from armwright.proposers.proposer import Proposer
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import PROPOSALS, SEARCH, RunFolder, read_run
 from armwright.runs.history import FRONT_SEARCH, History, found_reference_point
+from armwright.runs.infeasibility import ViolationTally
 from armwright.runs.results import complete_summary, discard_results, summarize_front, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
@@ -117,6 +118,7 @@ class _DirectSearch:
         self.search = FrontSearch(problem.space.parameters, self._evaluate, config.reference_point, config.seed, matrix)
         self.seconds = 0.0  # of all sessions
         self.infeasible = 0  # designs of all sessions
+        self.tally = ViolationTally(len(problem.constraints))  # of all sessions
         if folder is not None:
             self._restore(folder)
 
@@ -137,7 +139,8 @@ class _DirectSearch:
                 self.search.step()
                 now = time.monotonic()
                 self.seconds = before + now - started
-                state = {"seconds": self.seconds, "infeasible": self.infeasible, **self.search.state()}
+                state = {"seconds": self.seconds, "infeasible": self.infeasible, **self.tally.state()}
+                state |= self.search.state()
                 if now - saved >= SAVE_SECONDS:
                     self._save(state)
                     saved = now
@@ -172,6 +175,7 @@ class _DirectSearch:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
                 self.infeasible = int(state["infeasible"])
+                self.tally.restore(state)
         except Exception as fault:  # numpy, zipfile, zlib and tokenize raise different ones
             raise RunFolderError(
                 f"{path} is damaged ({fault}); delete it to start a new search from the front in {folder.path}"
@@ -179,7 +183,9 @@ class _DirectSearch:
 
     def _evaluate(self, matrix: Array) -> Array:
         """Return the (N, M) objective values of designs; penalties for infeasible ones."""
-        values = self.problem.evaluate_matrix(matrix).penalised
+        outcomes = self.problem.evaluate_matrix(matrix)
+        values = outcomes.penalised
+        self.tally.add(outcomes.violations)
         self.infeasible += int(np.any(values >= PENALTY, axis=1).sum())
         return values
 
@@ -195,13 +201,13 @@ class _DirectSearch:
         }
         values = self.search.values
         if self.folder is None:
-            summary = summarize_front(history, self.config, values, statistics, None)
+            summary = summarize_front(history, self.config, values, statistics, None, self.tally)
             return FrontRun(history, self.config, summary, None, resumed)
         summary = complete_summary(self.folder.path, history)
         if summary is None or summary.get("search", {}).get("ended_by") != ended:
             self.folder.replace_trials(trials)
             verification = verify_front(history)
-            summary = summarize_front(history, self.config, values, statistics, verification)
+            summary = summarize_front(history, self.config, values, statistics, verification, self.tally)
             write_results(self.folder, history, summary, verification)
         return FrontRun(history, self.config, summary, self.folder.path, resumed)
 

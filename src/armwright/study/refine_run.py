@@ -10,7 +10,8 @@ import numpy as np
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.runs.folder import RunFolder, read_run
 from armwright.runs.history import REFINE, FrontMember, History
-from armwright.runs.results import describe_infeasibility, discard_results, read_summary, rewrite_results
+from armwright.runs.infeasibility import describe_infeasibility
+from armwright.runs.results import discard_results, read_summary, rewrite_results
 from armwright.runs.trial import FinishedTrial
 from armwright.search.cma_es import POPULATION, Refined
 from armwright.search.refine import EVALUATIONS, refine_members, worth_refining
