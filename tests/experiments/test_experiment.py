@@ -259,6 +259,18 @@ def test_experiment_command_runs_resumes_and_writes_tables(in_folder: Path) -> N
     assert json.loads(more.stdout)["cells"] == 6
 
 
+def test_tasks_are_checked_once_before_any_cell_runs(in_folder: Path) -> None:
+    (in_folder / "heavy.yaml").write_text("name: heavy\ntargets: [[0.3, 0.0, 0.3]]\npayload: 500\n")
+    (in_folder / "far.yaml").write_text("name: far\ntargets: [[5, 0, 0.3]]\n")
+    result = run_here(file_of(in_folder, tasks=["heavy.yaml"], seeds=1, n_total=1, n_init=2))
+    assert result.exit_code == 0, result.output
+    assert result.output.count("warning: task heavy: payload: 500 kg") == 1
+    stopped = run_here(file_of(in_folder, tasks=["target-1", "far.yaml"], name="other"))
+    assert isinstance(stopped.exception, TaskError)
+    assert str(stopped.exception).startswith("task far: target 1 (5, 0, 0.3) m is 4 m from the nearest allowed base")
+    assert not list(in_folder.glob("experiments/other/runs/*"))
+
+
 @pytest.mark.slow
 def test_changed_method_does_not_reuse_an_existing_run(in_folder: Path) -> None:
     assert run_here(file_of(in_folder, seeds=1, tasks=["random-3"])).exit_code == 0

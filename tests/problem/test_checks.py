@@ -13,6 +13,7 @@ from armwright.problem.checks.finding import PROVEN, SUSPECTED
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.reach import longest_reach
 from armwright.problem.checks.sampling import SEED, check_by_sampling, random_designs, violations
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace, default_space, load_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
@@ -284,11 +285,22 @@ def test_numbers_of_a_strange_size_are_suspected(keys: dict[str, Any], text: str
     assert text in " ".join(messages)
 
 
-def test_approach_in_millimetres_is_suspected() -> None:
-    targets = [{"position": point, "axis": DOWN} for point in (HERE, [0.4, -0.2, 0.3])]
-    cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5, "approach": 60}
-    evidence, message = only(problem(targets, cycle=cycle))
-    assert (evidence, "approach = 60 m exceeds" in message) == (SUSPECTED, True)
+def test_approach_beyond_reach_is_proven() -> None:
+    targets = [
+        {"name": name, "position": point, "axis": DOWN} for name, point in (("bin", HERE), ("tray", [0.4, -0.2, 0.3]))
+    ]
+    cycle = {"steps": [{"to": 1, "do": "pick"}, {"to": 2, "do": "place"}], "time": 1.5}
+    arm = space(joints=5, origin_z=[0.0, 0.1])
+    assert found(problem(targets, arm, cycle={**cycle, "approach": 1.2})) == []  # 1.4 m above the highest base
+    (evidence, message), second = found(problem(targets, arm, cycle={**cycle, "approach": 60}))
+    assert evidence == PROVEN
+    assert message.startswith("cycle: the approach of target bin begins at (0.4, 0.2, 60.3) m, 60.2 m from")
+    assert (second[0], "approach = 60 m exceeds" in second[1]) == (SUSPECTED, True)
+    checked = problem(targets, arm, cycle={**cycle, "approach": 1.4})
+    assert only(checked)[0] == PROVEN
+    sampled = violations(checked, random_designs(checked, 30, np.random.default_rng(0)))
+    names = [constraint.quantity.name for constraint in checked.constraints]
+    assert (sampled[:, names.index("path_error")] > 0.0).all()
 
 
 # Requirements
@@ -345,3 +357,45 @@ def test_samples_are_those_of_the_space() -> None:
     checked = Problem(load_task("screwing"), default_space("screwing"))
     matrix = random_designs(checked, 40, np.random.default_rng(3))
     assert (matrix == checked.space.matrix(checked.space.sample(40, seed=3))).all()
+
+
+# Soundness
+
+
+def scattered(seed: int) -> tuple[Problem, np.random.Generator]:
+    """Return a problem whose targets lie in and around obstacles and the reach of its arms."""
+    rng = np.random.default_rng(seed)
+    keys = list(SPACES.values())[seed % len(SPACES)]
+    size = float(rng.uniform(0.2, 2.0))
+    points = rng.uniform(-1.0, 1.0, (3, 3)) * size
+    shapes = [
+        {"kind": "box", "center": points[0].tolist(), "size": rng.uniform(0.02, 0.4, 3).tolist(), "yaw": 0.3},
+        {"kind": "sphere", "center": points[1].tolist(), "radius": 0.1},
+        {"kind": "cylinder", "center": points[2].tolist(), "radius": 0.05, "height": 0.3, "axis": "x"},
+        {"kind": "ground", "z": float(points[:, 2].min()) + 0.01},
+    ]
+    chosen = [shape for shape in shapes if rng.uniform() < 0.5]
+    tool = {"tip": [0.0, 0.0, float(rng.choice([0.0, 0.05]))], "mass": float(rng.choice([0.0, 0.3]))}
+    targets = [{"position": point, "weight": float(rng.choice([0.5, 1.0, 2.0]))} for point in points.tolist()]
+    return problem(targets, space(**keys), obstacles=chosen, tool=tool), rng
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_constraints_that_a_design_satisfies_are_never_proven_impossible(seed: int) -> None:
+    """Bounds are what one design has, so that this design is feasible."""
+    bare, rng = scattered(seed)
+    design = bare.space.sample(1, seed)[0]
+    if seed % 2:  # the tip is at its targets, so that bounds are sharp
+        reached = bare.physics([design]).reached[0].tolist()
+        bare = problem(reached, bare.space, obstacles=bare.task.obstacles, tool=bare.task.tool)
+    evaluation = bare.physics([design])
+    names = ["worst_error", "position_error", "collision", "clearance_shortfall", "clearance", "obstacle_clearance"]
+    names += ["mass", "length", "joints", "torque", "anisotropy", "manipulability", "unreached_targets"]
+    names += ["price", "voltages"] if bare.space.actuators else []
+    bounds = [f"worst_error <= {float(QUANTITIES['worst_error'](evaluation)[0])!r}"]
+    for name in names[1:]:
+        value = float(QUANTITIES[name](evaluation)[0])
+        bounds += [f"{name} {relation} {value!r}" for relation in ("<=", ">=") if rng.uniform() < 0.7]
+    checked = Problem(bare.task.model_copy(update={"constraints": tuple(bounds)}), bare.space)
+    assert (checked.evaluate([design]).violations <= 0.0).all()
+    assert [message for evidence, message in found(checked) if evidence == PROVEN] == []

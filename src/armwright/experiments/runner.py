@@ -4,7 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
@@ -12,6 +12,7 @@ from armwright.exceptions import ArmwrightError
 from armwright.experiments.cells import Cell
 from armwright.extras import missing_packages
 from armwright.kinematics.devices import cores, resolve_device
+from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Problem
 from armwright.runs.config import check_same_run
 from armwright.runs.folder import read_config
@@ -116,6 +117,19 @@ def _check_extras(cells: Sequence[Cell]) -> None:
             import_module("armwright.llm.client")
 
 
+def _check_tasks(cells: Sequence[Cell], notify: Callable[[str], None]) -> None:
+    """Report what is suspicious about each task and space, once; raise UsageError for what cannot work."""
+    for cell in {(cell.task, cell.space): cell for cell in cells}.values():
+        findings = [
+            replace(finding, message=f"task {cell.task_name}: {finding.message}")
+            for finding in check_instantly(_problem(cell))
+        ]
+        for finding in findings:
+            if not finding.is_proven:
+                notify(f"warning: {finding}")
+        stop_if_proven(findings)
+
+
 def run_cells(cells: Sequence[Cell], workers: Workers | None, notify: Callable[[str], None]) -> Iterator[CellOutcome]:
     """Run cells, and return the outcome of each as it ends.
 
@@ -128,8 +142,10 @@ def run_cells(cells: Sequence[Cell], workers: Workers | None, notify: Callable[[
 
     Raises:
         ClusterError: The workers did not start, or the scheduler was lost.
+        UsageError: No design of the space can serve a task.
     """
     _check_extras(cells)
+    _check_tasks(cells, notify)
     if workers is None or not cells:
         return map(run_cell, cells)
     return _run_on(workers, cells, notify)

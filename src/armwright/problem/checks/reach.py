@@ -27,7 +27,7 @@ def check_reach(problem: Problem) -> list[Finding]:
     reach, distance = longest_reach(problem), distance_to_bases(problem.space, positions)
     beyond = np.flatnonzero(distance - error > reach * (1.0 + ROUNDING))
     if not len(beyond):
-        return []
+        return _check_approaches(problem, reach)
     worst = beyond[np.argmax(distance[beyond])]
     who = describe_targets([task.target_names[i] for i in beyond], len(positions))
     point = describe_point(positions[worst])
@@ -42,6 +42,27 @@ def check_reach(problem: Problem) -> list[Finding]:
             PROVEN,
         )
     ]
+
+
+def _check_approaches(problem: Problem, reach: float) -> list[Finding]:
+    """Find points of approach that no arm reaches as nearly as path_error has to be."""
+    plan, n_targets = problem.scenes[0].plan, len(problem.task.targets)
+    bounds = [c.bound for c in problem.constraints if (c.quantity.name, c.relation) == ("path_error", "<=")]
+    if plan is None or not bounds:
+        return []
+    distance = distance_to_bases(problem.space, plan.poses.position)
+    for motion in plan.motions:
+        if motion.end >= n_targets > motion.start and distance[motion.end] - bounds[0] > reach * (1.0 + ROUNDING):
+            name, point = problem.task.target_names[motion.start], describe_point(plan.poses.position[motion.end])
+            return [
+                Finding(
+                    f"cycle: the approach of target {name} begins at {point}, {distance[motion.end]:.3g} m from the "
+                    f"nearest allowed base, but the longest arm with its tool reaches {reach:.3g} m; shorten approach, "
+                    f"{plan.cycle.approach:g} m",
+                    PROVEN,
+                )
+            ]
+    return []
 
 
 def longest_reach(problem: Problem) -> float:
