@@ -7,7 +7,11 @@ import pytest
 import yaml
 
 from armwright.cli.check import free_parameters
+from armwright.problem.problem import Problem
+from armwright.runs.folder import read_run
 from armwright.spaces.design_space import DesignSpace
+from armwright.study.study import optimize
+from armwright.tasks.catalogue import load_task
 from tests.support.command_line import armwright, refused
 
 BOX = {"kind": "box", "center": [0.2, 0.0, 0.1], "size": [0.1, 0.2, 0.3], "yaw": 0.5}
@@ -183,3 +187,13 @@ def test_picture_has_a_known_format(in_folder: Path) -> None:
     assert armwright("check", task, "--out", "mine.svg").returncode == 0
     assert (in_folder / "mine.svg").read_text().startswith("<?xml")
     assert "expected a name that ends in .png, .pdf, .svg" in refused(2, "check", task, "--out", "mine.doc")
+
+
+def test_samples_before_a_search_do_not_change_it(in_folder: Path) -> None:
+    task = write(in_folder, targets=[HERE], constraints=["worst_error <= 0.5"])
+    options = ("--n-init", "4", "--n-total", "6", "--proposer", "rules", "--seed", "3", "--no-figures")
+    armwright("optimize", task, *options, "--out", "sampled")
+    problem = Problem(load_task(in_folder / task))
+    run = optimize(problem, proposer="rules", n_init=4, n_total=6, seed=3)
+    _, sampled = read_run(in_folder / "sampled")
+    assert [(trial.design, trial.values) for trial in sampled] == [(trial.design, trial.values) for trial in run.trials]

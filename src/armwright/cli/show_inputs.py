@@ -132,7 +132,7 @@ def show_task(
 def show_target_table(console: Console, problem: Problem) -> None:
     """Print a table of the targets of a task and their distances from the bases that a space allows."""
     task, arrays = problem.task, problem.task.target_arrays
-    heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", "from base [m]")
+    heads = ("x [m]", "y [m]", "z [m]", "tolerance [mm]", "payload [kg]", "nearest base [m]")
     table = plain_table("  target", *heads, "tool direction", right=heads)
     distances = distance_to_bases(problem.space, task.target_positions)
     for i, point in enumerate(task.targets[:MAX_ROWS]):

@@ -170,7 +170,10 @@ def _check_joint_ranges(space: SpaceSchema) -> None:
     if high - low < MIN_JOINT_RANGE:
         raise ValueError(f"joint_range = [{low:g}, {high:g}] rad is narrower than 3 degrees")
     if max(-low, high) > MAX_ANGLE:
-        raise ValueError(f"joint_range = [{low:g}, {high:g}] rad exceeds ±2π")
+        raise ValueError(
+            f"joint_range = [{low:g}, {high:g}] rad exceeds ±2π; angles are in radians: write "
+            f"{math.radians(high):.4f} for {high:g}°"
+        )
     if not low <= 0.0 <= high:
         raise ValueError(f"joint_range = [{low:g}, {high:g}] rad must contain 0, where the inverse kinematics starts")
     if space.limit is not None and not MIN_JOINT_RANGE / 2 <= space.limit[0] <= space.limit[1] <= MAX_ANGLE:
