@@ -22,6 +22,7 @@ from armwright.report.drawing import (
     several_panels,
     write_drawn,
 )
+from armwright.report.point_labels import PointLabel, place_labels
 from armwright.report.style import BEST_KNOWN, EXISTING, FRONT, INFEASIBLE, Look, look
 from armwright.runs.attribution import front_by_source, gained_by_source
 from armwright.runs.config import FrontMethod
@@ -32,7 +33,6 @@ from armwright.runs.results import FIGURES, read_summary
 
 SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 and 200 of 200, as in the paper
 SHOWN = 1.35  # drawn part of the plane, as a multiple of the reference point
-HIGHEST_LABEL, LOWEST_LABEL = 0.8, 0.3  # positions of the labels of existing arms, as shares of the panel height
 
 
 def write_figures(folder: str | Path) -> list[Path]:
@@ -176,56 +176,40 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
     for member in history.front:
         style = look(member.source)
         axes.scatter(*member.values[:2], **style.points | {"s": 1.6 * style.size}, zorder=4)
-    near = 0  # labels of neighbouring points are stacked
-    before = np.full(2, np.inf)
-    for title, member in chosen_members(history):
-        place = np.array(member.values[:2]) / np.array(reference[:2])
-        if np.any(place > SHOWN):
-            continue
-        near = near + 1 if np.abs(place - before).max() < 0.15 else 0
-        before = place
-        text = f"{title.split(':')[0].split(',')[0]}\n#{member.number}  {member.design.joints}"
-        offset = (10, -34 if place[1] > 0.9 * SHOWN else 10 + 40 * near)
-        _annotate(axes, text, member.values[:2], "#AAAAAA", xytext=offset, textcoords="offset points")
-    shown = _draw_existing(axes, reference, existing)
-    axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if shown else [])], loc="upper right")
+    labels = [
+        PointLabel(
+            f"{title.split(':')[0].split(',')[0]}\n#{m.number}  {m.design.joints}",
+            (m.values[0], m.values[1]),
+            "#AAAAAA",
+        )
+        for title, m in chosen_members(history)
+        if np.all(np.array(m.values[:2]) <= SHOWN * np.array(reference[:2]))
+    ]
+    arms = _draw_existing(axes, reference, existing)
+    axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if arms else [])], loc="upper right")
     area = hypervolume(history.masked_objectives, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
+    marks = [(reference[0], reference[1]), *((m.values[0], m.values[1]) for m in history.front)]
+    place_labels(axes, labels + arms, marks)
     return figure
 
 
-def _annotate(axes: Any, text: str, at: Any, colour: str, **placement: Any) -> None:
-    """Draw a boxed label, with a line to its point."""
-    axes.annotate(
-        text,
-        at,
-        fontsize=8,
-        zorder=5,
-        bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": colour, "alpha": 0.9},
-        arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.8},
-        **placement,
-    )
-
-
-def _draw_existing(axes: Any, reference: Sequence[float], existing: Sequence[ComparedArm]) -> int:
-    """Draw existing arms in the plane of the first two objectives and return how many were drawn.
+def _draw_existing(axes: Any, reference: Sequence[float], existing: Sequence[ComparedArm]) -> list[PointLabel]:
+    """Draw existing arms in the plane of the first two objectives and return their labels.
 
     An arm outside the drawn part is placed at its edge, with its values in the label.
     """
     edge = SHOWN * np.array(reference[:2])
-    places = [(arm, np.array(arm.values[:2], dtype=float)) for arm in existing if None not in arm.values[:2]]
-    height = HIGHEST_LABEL  # labels keep clear of the front's and of each other, from the top down
-    for arm, place in sorted(places, key=lambda known: -known[1][1]):
-        at = np.minimum(place, edge)
+    labels: list[PointLabel] = []
+    for arm in existing:
+        if None in arm.values[:2]:
+            continue
+        place = np.array(arm.values[:2], dtype=float)
+        x, y = np.minimum(place, edge).tolist()
         beyond = "" if np.all(place <= edge) else f"\nbeyond, at {_short(place[0])}, {_short(place[1])}"
-        axes.scatter(*at, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
-        column, row = at / edge
-        height = min(height, max(row, LOWEST_LABEL))
-        side, align = (0.33, "left") if column < 0.5 else (-0.33, "right")
-        position = {"xytext": (column + side, height), "textcoords": "axes fraction", "ha": align, "va": "center"}
-        _annotate(axes, f"{arm.name}{beyond}", at, EXISTING.colour, **position)
-        height -= 0.11 if beyond else 0.08
-    return len(places)
+        axes.scatter(x, y, **EXISTING.points | {"edgecolors": FRONT}, zorder=6, clip_on=False)
+        labels.append(PointLabel(f"{arm.name}{beyond}", (x, y), EXISTING.colour))
+    return labels
 
 
 def _short(value: float) -> str:

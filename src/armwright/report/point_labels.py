@@ -1,0 +1,81 @@
+"""Boxed labels of points in a panel, placed clear of points, legend and each other."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+DISTANCES = (14.0, 36.0, 60.0, 90.0, 120.0)  # of a label from its point [pt]
+DIRECTIONS = ((1, 1), (-1, 1), (1, 0), (-1, 0), (1, -1), (-1, -1), (0, 1), (0, -1))
+ALIGNMENTS = {-1: ("right", "top"), 0: ("center", "center"), 1: ("left", "bottom")}
+POINT = 5.0  # half the size of a point [px]
+
+
+@dataclass(frozen=True)
+class PointLabel:
+    """A text beside a point, in the coordinates of the data."""
+
+    text: str
+    at: tuple[float, float]
+    colour: str
+
+
+def place_labels(axes: Any, labels: Sequence[PointLabel], points: Sequence[tuple[float, float]]) -> None:
+    """Label points of a finished panel.
+
+    Args:
+        axes: the panel, with its legend.
+        labels: in the order in which they choose their place.
+        points: that labels should not hide.
+    """
+    axes.figure.draw_without_rendering()  # places the panel
+    centers = axes.transData.transform([*points, *(label.at for label in labels)])
+    taken = [Bbox.from_extents(x - POINT, y - POINT, x + POINT, y + POINT) for x, y in centers]
+    legend = axes.get_legend()
+    taken += [legend.get_window_extent()] if legend else []
+    for label in labels:
+        taken.append(_place(axes, label, taken))
+
+
+def _place(axes: Any, label: PointLabel, taken: Sequence[Bbox]) -> Bbox:
+    """Draw a label at its first place that is free, or the one that hides least, and return its box."""
+    best: tuple[float, Any, Bbox] | None = None
+    for drawn in _candidates(axes, label):
+        drawn.set_in_layout(False)
+        drawn.get_window_extent()  # moves the text to its place
+        box = Text.get_window_extent(drawn).padded(4.0)  # without the line to its point
+        hidden = sum(_area(Bbox.intersection(box, other)) for other in taken)
+        outside = _area(box) - _area(Bbox.intersection(box, axes.bbox))
+        if best is None or hidden + outside < best[0]:
+            if best is not None:
+                best[1].remove()
+            best = hidden + outside, drawn, box
+        else:
+            drawn.remove()
+        if best[0] <= 0.0:
+            break
+    assert best is not None
+    return best[2]
+
+
+def _candidates(axes: Any, label: PointLabel) -> Iterator[Any]:
+    for distance in DISTANCES:
+        for x, y in DIRECTIONS:
+            yield axes.annotate(
+                label.text,
+                label.at,
+                xytext=(distance * x, distance * y),
+                textcoords="offset points",
+                ha=ALIGNMENTS[x][0],
+                va=ALIGNMENTS[y][1],
+                fontsize=8,
+                zorder=5,
+                bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": label.colour, "alpha": 0.9},
+                arrowprops={"arrowstyle": "-", "color": label.colour, "linewidth": 0.8},
+            )
+
+
+def _area(box: Bbox | None) -> float:
+    return 0.0 if box is None else float(box.width * box.height)
