@@ -51,7 +51,7 @@ def check(folder: Path) -> list[str]:
             mujoco.mj_setConst(model, data)
             data.qpos[:], data.qvel[:] = state
         for s in range(substeps):
-            now = (s + 0.5) / substeps
+            now = (s + 0.5) / substeps if rows[i + 1]["payload"] == row["payload"] else 0.0
             data.ctrl[servo], data.ctrl[forward] = ((1.0 - now) * x[i] + now * x[i + 1] for x in (q, tau))
             mujoco.mj_step(model, data)
             saturated += np.abs(data.qfrc_actuator) >= (1.0 - 1e-6) * limit

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from armwright.kinematics.cycle_loads import INSTANTS, CycleLoads, cycle_loads
+from armwright.kinematics.cycle_loads import BETWEEN, INSTANTS, SHARP, CycleLoads, cycle_loads
 from armwright.kinematics.motion_path import MotionPath
 from armwright.kinematics.torque_terms import torque_terms
 from armwright.robot.arm import Actuator, Arm
@@ -43,6 +43,15 @@ def case(dof: int, kind: str, driven: bool = False, time: float = 1.5) -> Case:
 
 def loads(found: Case) -> CycleLoads:
     return cycle_loads(found.paths, torque_terms(found.paths, found.task.payloads.max()))
+
+
+def is_sharp(found: Case, row: int) -> bool:
+    """Whether the largest values around each instant are kept, because the path may pass through a short peak."""
+    return any(group.refinement >= SHARP for group in found.paths.groups if row in group.index)
+
+
+def smooth_rows(found: Case) -> list[int]:
+    return [row for row in range(len(found.arms)) if not is_sharp(found, row)]
 
 
 def carrying_peer(arm: Arm, payload: Any, carries: bool) -> Peer:
@@ -107,8 +116,9 @@ def test_torques_in_motion_agree_with_mujoco(dof: int, kind: str) -> None:
     """
     found = case(dof, kind, driven=True)
     of_cycle, tau = loads(found), np.linspace(0.0, 1.0, INSTANTS)
-    left_out: list[float] = []
-    for row, arm in enumerate(found.arms):
+    left_out = [0.0]
+    for row in smooth_rows(found):
+        arm = found.arms[row]
         own = [joint for _, joint in moving(arm)]
         travel = np.array([joint.travel for joint in own])
         model = mujoco.MjModel.from_xml_string(to_mjcf(arm))
@@ -143,8 +153,7 @@ def test_speeds_integrate_to_the_motion_from_rest_to_rest(dof: int, kind: str) -
     found = case(dof, kind)
     of_cycle = loads(found)
     assert not of_cycle.speeds[:, :, [0, -1]].any()
-    good = np.flatnonzero(tolerated(found.paths))
-    assert len(good)
+    good = np.intersect1d(np.flatnonzero(tolerated(found.paths)), smooth_rows(found))
     for row in good:
         for i, path in enumerate(found.paths.of_arm(row)[1]):
             moved = np.trapezoid(of_cycle.speeds[row, i], dx=of_cycle.durations[row, i] / (INSTANTS - 1), axis=0)
@@ -166,7 +175,10 @@ def test_torques_of_motion_grow_with_the_square_of_speed() -> None:
     slow, fast = loads(case(6, "axis", time=3.0)), loads(case(6, "axis", time=1.5))
     holding = loads(case(6, "axis", time=1e4)).torques
     assert fast.durations * 2.0 == pytest.approx(slow.durations)
-    assert fast.torques - holding == pytest.approx(4.0 * (slow.torques - holding), rel=1e-4, abs=1e-4)
+    rows = smooth_rows(case(6, "axis"))
+    assert rows
+    moving = [one.torques[rows] - holding[rows] for one in (fast, slow)]
+    assert moving[0] == pytest.approx(4.0 * moving[1], rel=1e-4, abs=1e-4)
     assert fast.speeds == pytest.approx(2.0 * slow.speeds)
 
 
@@ -176,7 +188,8 @@ def test_drives_add_inertia_and_friction_at_the_joint() -> None:
     of_drives, without = loads(found), loads(bare)
     assert of_drives.durations == pytest.approx(without.durations)
     half, signs = INSTANTS // 2, set[float]()
-    for row, arm in enumerate(found.arms):
+    for row in smooth_rows(found):
+        arm = found.arms[row]
         scale = own_joints(arm, found.arrays.travel[[row]])
         for i, path in enumerate(found.paths.of_arm(row)[1]):
             if path.q.shape[1] % 2 == 0:  # interpolated half way
@@ -211,9 +224,10 @@ def test_rms_torques_agree_with_fine_integration(dof: int, kind: str) -> None:
                 rest = carrying_peer(arm, found.task.payload, after.motion.carries)
                 total += of_cycle.dwells[i] * rest.gravity(own_joints(arm, after.q[0])[0]) ** 2
         expected = np.sqrt(total / of_cycle.cycle_time[row])
-        assert own_joints(arm, of_cycle.rms_torques[[row]])[0] == pytest.approx(
-            expected, rel=0.01, abs=0.002 * expected.max()
-        )
+        mine = own_joints(arm, of_cycle.rms_torques[[row]])[0]
+        largest = 1.5 if is_sharp(found, row) else 1.01  # the largest values around each instant count
+        assert (mine >= 0.99 * expected - 0.002 * expected.max()).all()
+        assert (mine <= largest * expected + 0.002 * expected.max()).all()
 
 
 def test_dwells_hold_what_was_picked() -> None:
@@ -248,10 +262,36 @@ def test_speeds_of_joint_motions_follow_the_profile_exactly() -> None:
     for key in CASES:
         found = case(*key)
         of_cycle = loads(found)
-        for row in range(len(found.arms)):
+        for row in smooth_rows(found):
             for i, path in enumerate(found.paths.of_arm(row)[1]):
                 if path.motion.by == "joint":
                     expected = rate[:, None] * (path.q[0, -1] - path.q[0, 0]) / of_cycle.durations[row, i]
                     assert of_cycle.speeds[row, i] == pytest.approx(expected, rel=1e-9, abs=1e-12)
                     seen += 1
+    assert seen
+
+
+def test_most_cases_are_smooth_and_can_be_followed() -> None:
+    good = [tolerated(case(*key).paths)[smooth_rows(case(*key))].any() for key in CASES]
+    assert sum(good) >= len(CASES) - 1
+
+
+def test_short_peaks_of_torque_and_speed_count() -> None:
+    """Of paths past a singularity, against Pinocchio at 16 times as many instants."""
+    tau, seen = np.linspace(0.0, 1.0, BETWEEN * (INSTANTS - 1) + 1), 0
+    for key in CASES:
+        found = case(*key)
+        of_cycle = loads(found)
+        for row, arm in enumerate(found.arms):
+            if not is_sharp(found, row) or not tolerated(found.paths)[row]:
+                continue
+            for i, path in enumerate(found.paths.of_arm(row)[1]):
+                peer = carrying_peer(arm, found.task.payload, path.motion.carries)
+                q, v, a = states(arm, path, tau, of_cycle.durations[row, i])
+                torques = own_joints(arm, np.abs(of_cycle.torques[row, i]).max(axis=0)[None])[0]
+                speeds = own_joints(arm, np.abs(of_cycle.speeds[row, i]).max(axis=0)[None])[0]
+                theirs = np.abs(rnea(peer, q, v, a)).max(axis=0)
+                assert torques == pytest.approx(theirs, rel=0.05, abs=0.02 * theirs.max())
+                assert speeds == pytest.approx(np.abs(v).max(axis=0), rel=0.05, abs=1e-3)
+                seen += 1
     assert seen

@@ -9,24 +9,29 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.kinematics.actuation import Actuation
 from armwright.kinematics.arm_arrays import ArmArrays
-from armwright.kinematics.cycle_path import CyclePaths
+from armwright.kinematics.cycle_path import CycleGroup, CyclePaths
 from armwright.kinematics.drive_limits import MotionLoad, least_time, motion_load
 from armwright.kinematics.torque_terms import TorqueTerms
 from armwright.tasks.motions import CyclePlan
 
 INSTANTS = 33  # of a motion, equally spaced in time
 ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
-MIN_TIME, MAX_TIME = 1e-3, 1e3  # [s] of a motion that is as fast as possible
+MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
+SHARP = 8  # refinement of a path from which on joints may pass through a short peak of speed
+BETWEEN = 16  # as many instants of such a path, of which the largest values count
 
 
 @dataclass(frozen=True)
 class CycleLoads:
     """N arms along the M motions of a cycle, at F instants of each, equally spaced in time.
+
+    Where a path passes through a short peak of speed, the largest values around each instant are kept.
 
     Attributes:
         durations: (N, M) [s].
@@ -65,8 +70,9 @@ def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]])
     """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
     torques = np.empty((len(paths.jumps), len(paths.plan.motions), INSTANTS, paths.groups[0].arms.dof))
     for group, of_motions in zip(paths.groups, terms, strict=True):
+        density = _density(group)
         for i, part in enumerate(of_motions):
-            torques[group.index, i] = _instants(part.gravity.shape[1])[0] @ part.gravity
+            torques[group.index, i] = _thinned(_instants(part.gravity.shape[1], density)[0] @ part.gravity, density)
     return torques
 
 
@@ -85,21 +91,39 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
     durations, holding = np.empty((n, m)), np.empty((n, m, dof))
     torques, speeds = np.empty((2, n, m, INSTANTS, dof))
     for group, of_motions in zip(paths.groups, terms, strict=True):
-        loads = [_load(part, group.arms) for part in of_motions]
+        density = _density(group)
+        loads = [_load(part, group.arms, density) for part in of_motions]
         times = _durations(group.arms, plan, loads)
         durations[group.index] = times
         for i, load in enumerate(loads):
-            torques[group.index, i] = load.torque(times[:, i])
-            speeds[group.index, i] = load.velocity / times[:, i, None, None]
+            torques[group.index, i] = _thinned(load.torque(times[:, i]), density)
+            speeds[group.index, i] = _thinned(load.velocity / times[:, i, None, None], density)
             holding[group.index, i - 1] = of_motions[i].gravity[:, 0]
         if not plan.cycle.closed:
             holding[group.index, -1] = of_motions[-1].gravity[:, -1]
     return CycleLoads(durations, np.array(plan.dwells), torques, speeds, holding)
 
 
-def _load(terms: TorqueTerms, arms: ArmArrays) -> MotionLoad:
-    """Return the load of a motion at F instants; the drives' own inertia and friction count where they are known."""
-    weights, s_t, s_tt = _instants(terms.gravity.shape[1])
+def _density(group: CycleGroup) -> int:
+    """Return how many times as many instants are evaluated as are kept."""
+    return BETWEEN if group.refinement >= SHARP else 1
+
+
+def _thinned(values: Array, density: int) -> Array:
+    """Return (n, F, D) of values (n, density (F - 1) + 1, D): the largest in magnitude from instant to instant.
+
+    The first and the last one, at rest, stay as they are.
+    """
+    if density == 1:
+        return values
+    nearby = sliding_window_view(values, 2 * density + 1, axis=1)[:, ::density]  # (n, F - 2, D, 2 density + 1)
+    largest = np.abs(nearby).argmax(axis=-1)[..., None]
+    return np.concatenate([values[:, :1], np.take_along_axis(nearby, largest, axis=-1)[..., 0], values[:, -1:]], axis=1)
+
+
+def _load(terms: TorqueTerms, arms: ArmArrays, density: int) -> MotionLoad:
+    """Return the load of a motion; the drives' own inertia and friction count where they are known."""
+    weights, s_t, s_tt = _instants(terms.gravity.shape[1], density)
     q_s, q_ss, drag, push = (weights @ values for values in (terms.q_s, terms.q_ss, terms.drag, terms.push))
     rate, change = s_t[:, None], s_tt[:, None]
     gravity, inertial, velocity = weights @ terms.gravity, drag * rate**2 + push * change, q_s * rate
@@ -112,14 +136,14 @@ def _load(terms: TorqueTerms, arms: ArmArrays) -> MotionLoad:
 
 
 @cache
-def _instants(samples: int) -> tuple[Array, Array, Array]:
-    """Return (F, R) weights that interpolate between R samples at the F instants, and s_τ and s_ττ there (F,)."""
-    t = np.linspace(0.0, 1.0, INSTANTS)
+def _instants(samples: int, density: int) -> tuple[Array, Array, Array]:
+    """Return (F, R) weights that interpolate between R samples at F instants, and s_τ and s_ττ there (F,)."""
+    t = np.linspace(0.0, 1.0, density * (INSTANTS - 1) + 1)
     s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
     at = s * (samples - 1)
     before = np.minimum(at.astype(np.intp), samples - 2)
-    weights = np.zeros((INSTANTS, samples))
-    rows = np.arange(INSTANTS)
+    weights = np.zeros((len(t), samples))
+    rows = np.arange(len(t))
     weights[rows, before] = 1.0 - (at - before)
     weights[rows, before + 1] += at - before
     return weights, 30.0 * t**2 * (1.0 - t) ** 2, 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)

@@ -36,11 +36,13 @@ class CycleGroup:
         index: (n,) which of the N arms they are.
         arms: The arms.
         paths: Their path along each of the M motions.
+        refinement: How many times as many samples they have as at least.
     """
 
     index: IndexArray
     arms: ArmArrays
     paths: tuple[MotionPath, ...]
+    refinement: int
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ def find_paths(
         jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
         if done.any():
             found = tuple(MotionPath(path.motion, path.q[done]) for path in paths)
-            groups.append(CycleGroup(index[done], part[np.flatnonzero(done)], found))
+            groups.append(CycleGroup(index[done], part[np.flatnonzero(done)], found, factor))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
     return _measure(plan, entry, groups, jumps, obstacles, device)

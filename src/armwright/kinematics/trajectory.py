@@ -30,8 +30,8 @@ class Trajectory:
         payload: (R,) mass carried from the row on [kg].
         q: (R, D) joint values [rad] or [m].
         qd: (R, D) speeds [rad/s] or [m/s].
+        qdd: (R, D) accelerations [rad/s²] or [m/s²].
         tau: (R, D) torques of the drives at the joints [N m], or forces [N].
-        qdd: (R, D) accelerations [rad/s²] or [m/s²]; None if read from a file, which does not state them.
     """
 
     time: Array
@@ -40,8 +40,8 @@ class Trajectory:
     payload: Array
     q: Array
     qd: Array
+    qdd: Array
     tau: Array
-    qdd: Array | None = None
 
 
 def sample_trajectory(
@@ -68,7 +68,7 @@ def sample_trajectory(
     step, target, carried = _events(plan, motion)
     tau = _drive_torques(arm, q, qd, qdd, carried, payload)
     moves = arm.motion[0] != FIXED
-    return Trajectory(time, step, target, payload * carried, q[:, moves], qd[:, moves], tau[:, moves], qdd[:, moves])
+    return Trajectory(time, step, target, payload * carried, q[:, moves], qd[:, moves], qdd[:, moves], tau[:, moves])
 
 
 def _states(path: MotionPath, time: Array, duration: float) -> tuple[Array, Array, Array]:

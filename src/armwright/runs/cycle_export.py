@@ -15,6 +15,7 @@ from armwright.robot.arm import Arm
 from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
 
 MODEL, TRAJECTORY = "arm.xml", "trajectory.csv"
+QUANTITIES = ("q", "qd", "qdd", "tau")  # of joints, in a trajectory
 DIGITS = 9
 
 
@@ -66,17 +67,16 @@ def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:
 
 
 def trajectory_csv(trajectory: Trajectory, target_names: Sequence[str]) -> str:
-    """Return a trajectory as CSV, all joints' values after each other: q_1, …, qd_1, …, tau_1, ….
+    """Return a trajectory as CSV, all joints' values after each other: q_1, …, qd_1, …, qdd_1, …, tau_1, ….
 
     target is the name of a target where the arm has reached it and rested there, else empty.
     """
     n = trajectory.q.shape[1]
-    quantities = ("q", "qd", "tau")
     out = io.StringIO()
-    columns = [f"{quantity}_{k}" for quantity in quantities for k in range(1, n + 1)]
+    columns = [f"{quantity}_{k}" for quantity in QUANTITIES for k in range(1, n + 1)]
     out.write(",".join(["time", "step", "target", "payload", *columns]) + "\n")
-    values = np.hstack([getattr(trajectory, quantity) for quantity in quantities]) + 0.0  # no -0.0
-    line = ",".join([f"%.{DIGITS}g"] * (3 * n)) + "\n"
+    values = np.hstack([getattr(trajectory, quantity) for quantity in QUANTITIES]) + 0.0  # no -0.0
+    line = ",".join([f"%.{DIGITS}g"] * len(columns)) + "\n"
     heads = zip(trajectory.time, trajectory.step, trajectory.target, trajectory.payload, strict=True)
     for (time, step, target, payload), row in zip(heads, values.tolist(), strict=True):
         name = target_names[target] if target >= 0 else ""
@@ -88,9 +88,9 @@ def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
     """Return the trajectory of a CSV file."""
     head, *lines = text.splitlines()
     cells = [line.split(",") for line in lines]
-    n = (len(head.split(",")) - 4) // 3
+    n = (len(head.split(",")) - 4) // len(QUANTITIES)
     number = {name: index for index, name in enumerate(target_names)} | {"": -1}
-    values = np.array([row[4:] for row in cells], dtype=np.float64).reshape(len(cells), 3, n)
+    values = np.array([row[4:] for row in cells], dtype=np.float64).reshape(len(cells), len(QUANTITIES), n)
     return Trajectory(
         time=np.array([row[0] for row in cells], dtype=np.float64),
         step=np.array([row[1] for row in cells], dtype=np.intp),
@@ -98,5 +98,6 @@ def read_trajectory(text: str, target_names: Sequence[str]) -> Trajectory:
         payload=np.array([row[3] for row in cells], dtype=np.float64),
         q=values[:, 0],
         qd=values[:, 1],
-        tau=values[:, 2],
+        qdd=values[:, 2],
+        tau=values[:, 3],
     )

@@ -188,9 +188,13 @@ class _Driver:
         return Drive(q, qd, tau, speed, tip, tuple(arrivals), tuple(self._contacts.values()), stable)
 
     def _commands(self) -> tuple[Array, Array]:
-        """Return the (S, D) positions for the servos and torques for the feed-forward, at the middle of substeps."""
+        """Return the (S, D) positions for the servos and torques for the feed-forward, at the middle of substeps.
+
+        They are interpolated between rows, but not towards a row from which on the arm carries something else.
+        """
         trajectory = self._trajectory
-        share = ((np.arange(SUBSTEPS) + 0.5) / SUBSTEPS)[:, None]
+        same = np.diff(trajectory.payload) == 0.0
+        share = np.where(same[:, None], (np.arange(SUBSTEPS) + 0.5) / SUBSTEPS, 0.0)[:, :, None]
 
         def between(values: Array) -> Array:
             return (values[:-1, None] + share * (values[1:] - values[:-1])[:, None]).reshape(-1, self._n)

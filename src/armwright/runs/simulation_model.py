@@ -31,6 +31,9 @@ from armwright.tasks.targets import TargetArrays
 
 TIMESTEP = 0.001  # [s]
 NOTHING = 1e-9  # mass [kg] and moments of inertia [kg m²] of a payload that is not carried
+# MuJoCo softens friction by default: a slow joint does not meet the whole of it, so the torque that should overcome it
+# pushes the arm past where it should stop.
+STIFF_FRICTION = {"solreffriction": f"{2.0 * TIMESTEP:g} 1", "solimpfriction": "0.999 0.999 0.001"}
 STIFFNESS = 20.0  # [1/rad] or [1/m] position gain of a joint without actuator, relative to its peak torque
 
 # Geoms touch if a type of one is among the affinities of the other.
@@ -82,7 +85,7 @@ def to_simulation_mjcf(
     root = Element("mujoco", model=name)
     SubElement(root, "compiler", COMPILER)
     gravity = numbers((0.0, 0.0, -GRAVITY))
-    SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP), integrator="implicitfast")
+    SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP), integrator="RK4")
     SubElement(SubElement(root, "default"), "geom", {**TOUCHES_NOTHING, "mass": "0"})
     world = add_scene(root, arm)
     _add_obstacles(world, surroundings.obstacles)
@@ -170,7 +173,9 @@ def _joint(name: str, joint: Joint) -> dict[str, str]:
         "frictionloss": (actuator.coulomb_friction or 0.0) / travel,
     }
     limit = f"{number(-joint.effort)} {number(joint.effort)}"
-    return attributes | {key: number(value) for key, value in drive.items() if value} | {"actuatorfrcrange": limit}
+    drive = {key: number(value) for key, value in drive.items() if value}
+    friction = STIFF_FRICTION if "frictionloss" in drive else {}
+    return attributes | drive | friction | {"actuatorfrcrange": limit}
 
 
 def _add_link(body: Element, segment: Segment) -> None:
