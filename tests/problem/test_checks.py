@@ -214,6 +214,7 @@ def test_designs_lie_within_the_intervals_of_their_size(keys: dict[str, Any]) ->
     [
         (["price <= 80"], ['"price <= 80": price is at least 82.5 USD in this space']),
         (["mass >= 100"], ["mass is at most"]),
+        (["mass <= -1"], ["mass is at least"]),
         (["length <= 0.05"], ["length is at least 0.09 m"]),
         (["joints >= 6"], ["joints is at most 5"]),
         (

@@ -45,13 +45,13 @@ NOTHING = Interval(0.0, 0.0)
 
 def check_constraints(problem: Problem) -> list[Finding]:
     """Find constraints that no design satisfies, alone or together."""
-    fixed = _intervals_of_task(problem)
+    fixed, by_size = _intervals_of_task(problem), intervals_by_modules(problem)
     findings: list[Finding] = []
     for constraint in problem.constraints:
-        interval = fixed.get(constraint.quantity.name)
+        name = constraint.quantity.name
+        interval = None if name in by_size[problem.space.max_joints] else fixed.get(name)
         if interval is not None and interval.excludes(constraint):
             findings.append(Finding(_describe(constraint, interval), PROVEN))
-    by_size = intervals_by_modules(problem)
     violated = {
         n: [c for c in problem.constraints if c.quantity.name in known and known[c.quantity.name].excludes(c)]
         for n, known in by_size.items()
@@ -130,7 +130,7 @@ def _hull(intervals: list[Interval]) -> Interval:
 
 def _intervals_of_task(problem: Problem) -> Mapping[str, Interval]:
     """Return the intervals of quantities that do not depend on the space."""
-    intervals = dict.fromkeys((name for name in OBJECTIVES), Interval(0.0))
+    intervals = dict.fromkeys(OBJECTIVES, Interval(0.0))
     n = float(len(problem.task.targets))
     intervals |= {"unreached_targets": Interval(0.0, n), "jumps": Interval(0.0, n), "manipulability": Interval(0.0)}
     intervals |= dict.fromkeys(("uncovered_fraction", "anisotropy"), Interval(0.0, 1.0))
