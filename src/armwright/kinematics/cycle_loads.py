@@ -23,15 +23,14 @@ from armwright.tasks.motions import CyclePlan
 INSTANTS = 33  # of a motion, equally spaced in time
 ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
 MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
-SHARP = 8  # refinement of a path from which on joints may pass through a short peak of speed
-BETWEEN = 16  # as many instants of such a path, of which the largest values count
+BETWEEN = 16  # times as many instants of a sharp path, of which the largest values count
 
 
 @dataclass(frozen=True)
 class CycleLoads:
     """N arms along the M motions of a cycle, at F instants of each, equally spaced in time.
 
-    Where a path passes through a short peak of speed, the largest values around each instant are kept.
+    Of sharp paths (`CycleGroup`), the largest values around each instant are kept.
 
     Attributes:
         durations: (N, M) [s].
@@ -106,7 +105,7 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
 
 def _density(group: CycleGroup) -> int:
     """Return how many times as many instants are evaluated as are kept."""
-    return BETWEEN if group.refinement >= SHARP else 1
+    return BETWEEN if group.is_sharp else 1
 
 
 def _thinned(values: Array, density: int) -> Array:

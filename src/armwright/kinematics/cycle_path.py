@@ -25,24 +25,25 @@ from armwright.tasks.motions import CyclePlan, stack_poses
 from armwright.tasks.obstacles import Obstacle
 
 MAX_REFINEMENT = 64  # of the samples
+SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
 REDUCED = 0.75  # a step that twice the samples leave above this share of it is a jump
 
 
 @dataclass(frozen=True)
 class CycleGroup:
-    """Arms whose paths have equally many samples.
+    """Arms whose paths have equally many samples, and are all sharp or not.
 
     Attributes:
         index: (n,) which of the N arms they are.
         arms: The arms.
         paths: Their path along each of the M motions.
-        refinement: How many times as many samples they have as at least.
+        is_sharp: Whether joints move several times as fast in a short part of a line as on average.
     """
 
     index: IndexArray
     arms: ArmArrays
     paths: tuple[MotionPath, ...]
-    refinement: int
+    is_sharp: bool
 
 
 @dataclass(frozen=True)
@@ -136,9 +137,11 @@ def find_paths(
         is_jump = (along > 1.0) & ((along > REDUCED * before[index]) | (factor >= MAX_REFINEMENT))
         done = (steps.max(axis=1) <= 1.0) | is_jump | chosen.hopeless[index] | (factor >= MAX_REFINEMENT)
         jumps[index] = is_jump[:, None] & is_line & (steps > 1.0)
-        if done.any():
-            found = tuple(MotionPath(path.motion, path.q[done]) for path in paths)
-            groups.append(CycleGroup(index[done], part[np.flatnonzero(done)], found, factor))
+        sharp = _is_sharp(part, paths) & ~is_jump & ~chosen.hopeless[index]
+        for rows, kind in ((np.flatnonzero(done & ~sharp), False), (np.flatnonzero(done & sharp), True)):
+            if len(rows):
+                found = tuple(MotionPath(path.motion, path.q[rows]) for path in paths)
+                groups.append(CycleGroup(index[rows], part[rows], found, kind))
         before[index], refinement[index] = along, _refined(refinement[index], steps.max(axis=1))
         unfinished = np.setdiff1d(unfinished, index[done])
     return _measure(plan, entry, groups, jumps, obstacles, device)
@@ -153,6 +156,17 @@ def _refined(refinement: IndexArray, ratio: Array) -> IndexArray:
 def _step_ratio(arms: ArmArrays, path: MotionPath) -> Array:
     """Return the (N,) largest step of any joint relative to the allowed one."""
     return (path.largest_steps / np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)).max(axis=1)
+
+
+def _is_sharp(arms: ArmArrays, paths: Sequence[MotionPath]) -> NDArray[np.bool_]:
+    """Return (N,) whether a step along a line is several times as large as the mean of the line."""
+    sharp = np.zeros(len(arms), dtype=bool)
+    allowed = np.where(arms.prismatic, MAX_SLIDE, MAX_STEP)[:, None]
+    for path in paths:
+        if path.motion.by == "line":
+            steps = (np.abs(np.diff(path.q, axis=1)) / allowed).max(axis=2)
+            sharp |= steps.max(axis=1) > SHARP * steps.mean(axis=1)
+    return sharp
 
 
 def _follow(arms: ArmArrays, plan: CyclePlan, entry: Array, refinement: int, device: Device) -> tuple[MotionPath, ...]:
