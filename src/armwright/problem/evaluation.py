@@ -1,6 +1,6 @@
 """Per-target kinematics and statics of arms, not aggregated."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,13 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
-from armwright.kinematics.arm_arrays import FIXED, MAX_JOINTS, ArmArrays, carrying, stack_arms
+from armwright.kinematics.arm_arrays import ArmArrays, carrying, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads, holding_torques
 from armwright.kinematics.cycle_path import CyclePaths, find_paths
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.jacobian import jacobians
+from armwright.kinematics.restarts import nearer_postures, random_starts
 from armwright.kinematics.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
 from armwright.robot.arm import Arm
@@ -276,8 +277,8 @@ def evaluate_arrays(
 
     def nearest() -> Postures:
         postures = solve(initial_q)
-        for other in _restarts(arrays, scene.target_arrays.restarts):
-            postures = _nearer(postures, solve(other), targets, scene.target_arrays)
+        for other in random_starts(arrays, scene.target_arrays.restarts):
+            postures = nearer_postures(postures, solve(other), targets, scene.target_arrays)
         return postures
 
     if scene.plan is None:
@@ -300,32 +301,6 @@ def evaluate_arrays(
         joint_torques=postures.torque.astype(np.float64),
         cycle_paths=paths,
         device=device,
-    )
-
-
-def _restarts(arrays: ArmArrays, n: int) -> Iterator[Array]:
-    """Yield n times (N, 1, D) initial postures, each the same share of every joint's range for all arms."""
-    if n == 0:
-        return
-    shares = np.random.default_rng(0).uniform(size=(n, MAX_JOINTS))[:, : arrays.dof]
-    lower, upper = arrays.lower.astype(np.float64), arrays.upper.astype(np.float64)
-    for share in shares:
-        yield np.where(arrays.motion == FIXED, 0.0, lower + share * (upper - lower))[:, None]
-
-
-def _nearer(first: Postures, second: Postures, targets: Array, target_arrays: TargetArrays) -> Postures:
-    """Return, per arm and target, the posture with the smaller distance, angles included; the first of equals."""
-
-    def off(postures: Postures) -> Array:
-        distance = np.linalg.norm(postures.reached.astype(np.float64) - targets, axis=-1)
-        return np.hypot(distance, target_arrays.metres_per_radian * postures.angle)
-
-    better = off(second) < off(first)
-    return Postures(
-        q=np.where(better[..., None], second.q, first.q),
-        reached=np.where(better[..., None], second.reached, first.reached),
-        torque=np.where(better[..., None], second.torque, first.torque),
-        angle=np.where(better, second.angle, first.angle),
     )
 
 
