@@ -26,6 +26,7 @@ SHOWN = (
     "load_task",
     "optimize",
     "paper_space",
+    "solve",
     "to_urdf",
 )
 

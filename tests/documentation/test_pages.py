@@ -52,7 +52,7 @@ LONG = re.compile(r"armwright experiment (paper|recorded|rules|n-step|samplers|s
 # Pages whose programs are run elsewhere, where what comes of them is looked at, too.
 PROGRAMS_RUN_IN = {"README.md": "test_public.py", "docs/optuna.md": "test_examples.py"}
 
-FOLLOWED = [page for page in PAGES if commands(page)]
+FOLLOWED = [page for page in PAGES if commands(page) or any(block.language == "python" for block in blocks(page))]
 MAX_WAIT = 900.0  # [s] for a command; only one that waits forever takes this long
 
 # What a page takes for granted. Short runs will do: a page says what to do with a run, not how it was made.
