@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from armwright.exceptions import RunFolderError
 from armwright.problem.problem import Problem
+from armwright.report.arm_figures import draw_arms
 from armwright.report.figures import chosen_members, draw_attribution, draw_hypervolume, draw_samples, write_figures
 from armwright.report.style import line
 from armwright.study.progress import Progress, StudyResult
@@ -55,6 +57,28 @@ def test_redrawing_removes_outdated_figures(tmp_path: Path) -> None:
     write_figures(tmp_path)
     arms = {path.name for path in (tmp_path / "figures").glob("arm-*.png")}
     assert arms == {f"arm-{member.number:04d}.png" for _, member in chosen_members(run.history)}
+
+
+@pytest.mark.slow
+def test_arms_along_a_cycle_are_drawn_within_the_axes(tmp_path: Path) -> None:
+    task = Task.model_validate(
+        {
+            "name": "from-above",
+            "targets": [{"position": [0.3, y, 0.1], "axis": [0, 0, -1]} for y in (-0.05, 0.05)],
+            "cycle": {
+                "time": 1.0,
+                "approach": 0.9,
+                "steps": [{"to": 1, "by": "joint", "do": "pick"}, {"to": 2, "by": "joint", "do": "place"}],
+            },
+        }
+    )
+    history = short(tmp_path, Problem(task), n_total=30).history
+    for axes in draw_arms(history, chosen_members(history)).axes:
+        low, high = np.transpose([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])  # type: ignore[attr-defined]
+        for drawn in axes.lines:
+            points = np.transpose(drawn.get_data_3d())  # type: ignore[attr-defined]
+            assert (low <= points).all()
+            assert (points <= high).all()
 
 
 def test_chosen_members_are_the_ends_of_the_front_and_of_its_part_in_the_box(tmp_path: Path) -> None:

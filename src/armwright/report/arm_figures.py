@@ -122,6 +122,14 @@ def _draw_motions(axes: Any, evaluation: Evaluation, row: int, targets: Sequence
             axes.plot(*forward_kinematics(arms, path.q).tip[0].T, **TIP)
 
 
+def _drawn_motions(evaluation: Evaluation, row: int) -> list[np.ndarray]:
+    """Return the ends (P, 3) of all lines of the cycle, and the path (N, 3) of the tip on each motion of an arm [m]."""
+    if evaluation.plan is None:
+        return []
+    arms, paths = evaluation.paths.of_arm(row)
+    return [evaluation.plan.poses.position, *(forward_kinematics(arms, path.q).tip[0] for path in paths)]
+
+
 def _draw_orientation(axes: Any, evaluation: Evaluation, target: int, size: float) -> None:
     """Draw the required tool direction: an arrow along its z axis, and for a full orientation also along x and y."""
     goal, rows = evaluation.targets[target], evaluation.target_arrays.n_angular[target]
@@ -153,14 +161,15 @@ def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
 
 
 def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.ndarray, float]:
-    """Return the centre (3,) and half the side of the cube that contains all targets and postures [m]."""
+    """Return the centre (3,) and half the side of the cube that contains all targets, postures and motions [m]."""
     places = [
         joint_positions(member.arm, q[: len(member.arm.joints)])
         for row, member in enumerate(members)
         for q in evaluation.q[row]
     ]
+    motions = [points for row in range(len(members)) for points in _drawn_motions(evaluation, row)]
     corners = [corner for region in evaluation.workspace for corner in region.corners]
-    points = np.vstack([evaluation.targets, *corners, *places])
+    points = np.vstack([evaluation.targets, *corners, *places, *motions])
     low, high = points.min(axis=0), points.max(axis=0)
     for obstacle in evaluation.obstacles:
         if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor close below
