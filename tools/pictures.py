@@ -55,7 +55,7 @@ def target_2(folder: Path) -> Path:
 
 def report(folder: Path, page: Page, file: Path) -> None:
     """Show the top of a report."""
-    open_report(page, target_2(folder), (1280, 1290), "#design=120&target=2")
+    open_report(page, target_2(folder), (1280, 1340), "#design=120&target=2")
     page.screenshot(path=file)
 
 
@@ -164,9 +164,11 @@ PICTURES: dict[str, Shot] = {
     "page-live.png": live_report,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(
-        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=7&target=4", drag=90, zoom=250
+        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=6&target=4", drag=90, zoom=250
     ),
-    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=3&target=3"),
+    "example-obstacles.png": arm_of(
+        "5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=14&target=3"
+    ),
     "compare-arms.png": existing_arms,
     "dashboard.png": dashboard,
 }
