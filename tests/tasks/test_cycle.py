@@ -239,7 +239,7 @@ TWO = steps(1, {"to": 2, "by": "line"}, closed=False)
             {},
             'targets: two are named "bin"; give each its own name',
         ),
-        (POINTS[:2], TWO, {"payload": [0.1, 0.2]}, "payload: expected one value, since the cycle picks and places it"),
+        (POINTS[:2], TWO, {"payload": [0.1, 0.2]}, "payload: expected one value for the whole cycle"),
         (POINTS, steps("bin", 2), {}, 'step 1: unknown target "bin". The targets have no names; use their numbers'),
         (
             POINTS,

@@ -67,7 +67,7 @@ def show_front(console: Console, history: History, summary: dict[str, Any]) -> N
     console.print(_front_table(history, None if verified is None else set(verified["robust_numbers"])))
     if verified is not None:
         console.print(
-            f"verified in float64 and with the base or a link 1 mm off: {verified['robust']} robust, "
+            f"recomputed in float64 and with the base or a link 1 mm off: {verified['robust']} robust, "
             f"{verified['sensitive']} sensitive ({verified['robust_from_any_start']} also robust from other initial "
             f"postures); hypervolume of the robust designs {verified['hypervolume_of_robust']:.3f}, of all in their "
             f"worst case {verified['hypervolume_worst_case']:.3f}"

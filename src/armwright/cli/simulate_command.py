@@ -84,6 +84,9 @@ def _show(
     from armwright.runs.design_folders import DESIGNS
     from armwright.runs.simulation import PASS, mujoco_version
 
+    if not results:
+        console.print(f"nothing to simulate: {run} has no feasible design")
+        return
     numbers = ("cycle [s]", "energy [J]", "tip error [mm]", "without feed-forward", "peak torque / claimed")
     table = plain_table("#", "verdict", *numbers, right=("#", *numbers))
     for one in results:

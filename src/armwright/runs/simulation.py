@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.extras import check_extra
+from armwright.extras import check_extra, requires_extra
 from armwright.kinematics.trajectory import PERIOD, Trajectory
 from armwright.runs.simulation_model import NOTHING, TIMESTEP
 
@@ -123,8 +123,8 @@ class SimulatedDesign:
 
 def mujoco_version() -> str:
     """Return the version of MuJoCo; MissingExtraError without it."""
-    check_extra("sim", "the simulation")
-    return str(import_module("mujoco").__version__)
+    with requires_extra("sim", "the simulation"):
+        return str(import_module("mujoco").__version__)
 
 
 def drive(model_xml: str, trajectory: Trajectory, target_names: tuple[str, ...], feed_forward: bool = True) -> Drive:

@@ -178,7 +178,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         if not np.all((self.payloads >= 0.0) & (self.payloads <= MAX_MASS)):
             raise ValueError(f"payload: expected 0 to {MAX_MASS:g} kg, got {self.payload} kg")
         if self.cycle is not None and isinstance(self.payload, tuple):
-            raise ValueError("payload: expected one value, since the cycle picks and places it; got a list")
+            raise ValueError("payload: expected one value for the whole cycle, got a list")
         if sum(region.points for region in self.workspace) > MAX_POINTS:
             raise ValueError(f"workspace: expected at most {MAX_POINTS} points in all boxes together")
         if self.reference_point is not None and min(self.reference_point) <= 0.0:
