@@ -14,10 +14,10 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.pareto import front_mask, hypervolume
-from armwright.problem.objectives import PAPER_OBJECTIVES
+from armwright.problem.objectives import PAPER_OBJECTIVES, named_objectives
 from armwright.problem.problem import Problem
 from armwright.runs.trial import Count
-from armwright.spaces.design_space import paper_space
+from armwright.spaces.design_space import default_space
 from armwright.spaces.parameters import Design, FloatParameter
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
@@ -52,28 +52,30 @@ class FrontGap:
 
 
 def known_front(problem: Problem) -> KnownFront | None:
-    """Return the best known front of a problem, if it has a built-in task's targets and the paper's space."""
-    paper = paper_space()
-    is_known = (
-        problem.space.model_copy(update={"name": paper.name}) == paper
-        and not problem.tolerance
-        and problem.objectives == PAPER_OBJECTIVES
-        and not problem.task.payloads.any()
-        and problem.task.tool == NO_TOOL
-        and not problem.constraints
-        and problem.task.is_plain
-    )
-    if not is_known:
+    """Return the best known front of a problem, if it is that of a built-in task in the space that it is meant for."""
+    if problem.tolerance or problem.evaluator is not None:
         return None
     for name in sorted(builtin_names(), key=lambda name: name != problem.task.name):  # nearly always the first
-        if load_task(name).targets == problem.task.targets:
+        space = default_space(name)
+        if problem.space.model_copy(update={"name": space.name}) == space and _is_same(problem, load_task(name)):
             return _read(name)
     return None
 
 
+def _is_same(problem: Problem, task: Task) -> bool:
+    """Return whether a problem has the designs of a built-in task, as good as there."""
+    if task.is_plain and not task.cycle:
+        plain = not problem.task.payloads.any() and problem.task.tool == NO_TOOL and problem.task.is_plain
+        unbounded = problem.objectives == PAPER_OBJECTIVES and not problem.constraints
+        return plain and unbounded and problem.task.targets == task.targets
+    labels = {name: getattr(task, name) for name in ("name", "description", "provenance", "reference_point")}
+    default = named_objectives(task.objectives or [])
+    return problem.objectives == default and problem.task.model_copy(update=labels) == task
+
+
 def best_known_hypervolume(task: Task) -> float | None:
-    """Return the best known hypervolume of a task in the paper's design space; None if no front is known."""
-    known = None if task.cycle else known_front(Problem(task))
+    """Return the best known hypervolume of a task in the space that it is meant for; None if no front is known."""
+    known = known_front(Problem(task, default_space(task.name)))
     if known is None or task.reference_point is None:
         return None
     return hypervolume(known.values, task.reference_point)
@@ -97,17 +99,18 @@ def front_gap(problem: Problem, values: Array, reference_point: Sequence[float])
 
 
 @cache
-def _read(task: str) -> KnownFront | None:
-    file = resources.files("armwright.runs") / "best_known_fronts" / f"{task}.csv"
+def _read(task_name: str) -> KnownFront | None:
+    file = resources.files("armwright.runs") / "best_known_fronts" / f"{task_name}.csv"
     if not file.is_file():
         return None
     lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     rows = list(csv.DictReader(lines))
-    space = paper_space()
+    space, task = default_space(task_name), load_task(task_name)
     real = {parameter.name for parameter in space.parameters if isinstance(parameter, FloatParameter)}
+    present = [{p.name: row[p.name] for p in space.parameters if row[p.name]} for row in rows]
     designs = [
-        space.design({p.name: float(row[p.name]) if p.name in real else row[p.name] for p in space.parameters})
-        for row in rows
+        space.design({name: float(value) if name in real else value for name, value in params.items()})
+        for params in present
     ]
-    values = [[float(row[objective.name]) for objective in PAPER_OBJECTIVES] for row in rows]
-    return KnownFront(tuple(designs), np.array(values))
+    names = [objective.name for objective in Problem(task, space).objectives]
+    return KnownFront(tuple(designs), np.array([[float(row[name]) for name in names] for row in rows]))
