@@ -261,7 +261,7 @@ class Problem:
     def _variants(self, matrix: Array) -> Iterator[Evaluation]:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""
         for case in range(len(self.scenes)):
-            exact = self.physics_of_arms(self.arms(matrix), case)
+            exact = self.physics(matrix) if case == 0 else self.physics_of_arms(self.arms(matrix), case)
             yield exact
             for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
                 yield self.physics_of_arms(self.arms(rows), case, near=exact.cycle_paths)
