@@ -1,8 +1,6 @@
 """`armwright design`: front searches in a run folder."""
 
-import dataclasses
 import json
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -12,25 +10,21 @@ import pytest
 
 from armwright.exceptions import RunConflictError, RunFolderError, SettingsError
 from armwright.pareto import front_mask, hypervolume
-from armwright.problem.objectives import POSITION_ERROR, TORQUE
 from armwright.problem.problem import Problem
 from armwright.proposers.rules import RulesProposer
 from armwright.report.figures import write_figures
 from armwright.runs.folder import read_run
-from armwright.runs.front_gap import front_gap, known_front
+from armwright.runs.front_gap import known_front
 from armwright.runs.results import read_summary, verify_run
 from armwright.search.front_search import FrontSearch
 from armwright.spaces.design_space import paper_space
 from armwright.study.front_run import FrontRun, find_front
 from armwright.study.search_budget import SearchBudget, SearchProgress
 from armwright.study.study import optimize
-from armwright.tasks.catalogue import builtin_tasks, load_task
+from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
 
 PROBLEM = Problem(load_task("target-1"))
-
-
-OTHERS = (POSITION_ERROR, dataclasses.replace(TORQUE, name="effort"))
 
 
 OPEN = Task(name="open", targets=((0.3, 0.0, 0.3), (0.2, 0.1, 0.4)))
@@ -266,62 +260,3 @@ def test_front_run_ends_at_a_stall() -> None:
     run = find_front(Problem(near, narrow), budget="1e6", seed=0)
     assert run.summary["search"]["ended_by"] == "stall"
     assert run.summary["search"]["evaluations"] < 100_000
-
-
-def known_tasks() -> list[str]:
-    fronts = resources.files("armwright.runs") / "best_known_fronts"
-    return [name for name in builtin_tasks() if (fronts / f"{name}.csv").is_file()]
-
-
-def test_paper_tasks_have_a_best_known_front() -> None:
-    assert {"target-1", "target-2", "target-3"} <= set(known_tasks())
-
-
-@pytest.mark.parametrize("name", known_tasks())
-@pytest.mark.fast_cases(3)
-def test_best_known_fronts_are_reproducible_fronts(name: str) -> None:
-    """Their designs are in the space, none dominates another, and most give their values on this machine, too.
-
-    Not all: the solver is chaotic in places, and another processor may round otherwise.
-    """
-    problem = Problem(load_task(name))
-    known = known_front(problem)
-    assert known is not None
-    assert front_mask(known.values).all()
-    values = problem.evaluate(known.designs).values
-    assert np.mean(np.abs(values - known.values).max(axis=1) < 1e-3) > 0.7
-
-
-def test_front_gap_to_the_best_known_front() -> None:
-    known = known_front(PROBLEM)
-    assert known is not None
-    same = front_gap(PROBLEM, known.values, (5.0, 5.0))
-    assert same is not None
-    assert (same.share, same.beyond, same.gain) == (1.0, 0, 0.0)
-    half = front_gap(PROBLEM, known.values[::2], (5.0, 5.0))
-    assert half is not None
-    assert half.share < 1.0
-    better = front_gap(PROBLEM, known.values[::2] * 0.9, (5.0, 5.0))
-    assert better is not None
-    assert better.beyond == len(known.values[::2])
-    union = hypervolume(np.vstack([known.values, known.values[::2] * 0.9]), (5.0, 5.0))
-    assert better.gain == pytest.approx(union / better.hypervolume - 1.0)
-
-
-@pytest.mark.parametrize(
-    "problem",
-    [
-        Problem(OPEN),
-        Problem(PROBLEM.task, paper_space(5)),
-        Problem(PROBLEM.task, paper_space().model_copy(update={"link": (0.03, 0.31)})),
-        Problem(PROBLEM.task, tolerance=1e-3),
-        Problem(PROBLEM.task, objectives=OTHERS),
-    ],
-)
-def test_changed_problems_have_no_best_known_front(problem: Problem) -> None:
-    assert known_front(problem) is None
-
-
-def test_renamed_space_keeps_its_best_known_front() -> None:
-    renamed: Any = paper_space().model_copy(update={"name": "mine"})
-    assert known_front(Problem(PROBLEM.task.model_copy(update={"name": "mine"}), renamed)) is not None
