@@ -116,7 +116,7 @@ def show_task(
         ("durations", task.cycle.describe_times() if task.cycle and not is_brief else ""),
         ("constraints of the cycle", ", ".join(cycle_constraints(task, has_drives))),
         *(("workspace", region.describe()) for region in task.workspace),
-        ("reference point", "chosen from the first random trials" if reference is None else format_point(reference)),
+        ("reference point", "found by the search" if reference is None else format_point(reference)),
         ("provenance", task.provenance),
         ("best known hypervolume", "" if best_known is None else f"{best_known:.2f}"),
     ):

@@ -119,7 +119,12 @@ def _show_hypervolume(console: Console, history: History, summary: dict[str, Any
     """Print the hypervolume and how it compares; remedy: what may help if the front is empty."""
     volume = summary["hypervolume"]
     mean = f"mean over iterations {volume['mean']:.3f}; " if "mean" in volume else ""
-    reference = ", ".join(f"{value:.4g}" for value in volume["reference_point"])
+    origins = [
+        f" ({origin})" for origin in summary.get("search", {}).get("reference_point_from", ()) if origin != "task"
+    ]
+    point = volume["reference_point"]
+    parts = zip(point, origins or [""] * len(point), strict=True)
+    reference = ", ".join(f"{value:.4g}{origin}" for value, origin in parts)
     console.print(f"hypervolume {volume['final']:.3f} ({mean}reference point {reference})")
     if len(history) and not history.feasible.any():
         reason = describe_infeasibility(history, summary["feasibility"]["conflict"])

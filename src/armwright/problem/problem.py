@@ -156,7 +156,7 @@ class Problem:
         if point is not None and len(point) != len(names):
             raise TaskError(
                 f"task {self.task.name}: reference_point: expected {len(names)} values ({', '.join(names)}), got "
-                f"{len(point)}; without reference_point it is found from the first random trials"
+                f"{len(point)}; without reference_point the search finds one"
             )
 
     @property
@@ -248,15 +248,18 @@ class Problem:
 
     def _evaluate(self, matrix: Array, measured: Mapping[str, Array]) -> Outcomes:
         """Evaluate settled rows, with only the postures of one chunk in memory at a time."""
-        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
         values = np.empty((len(matrix), len(self.objectives)))
         violations = np.empty((len(matrix), len(self.constraints)))
-        for first in range(0, len(matrix), size):
-            rows = slice(first, first + size)
+        for rows in self.chunks(len(matrix)):
             chunk = {name: column[rows] for name, column in measured.items()}
             found = worst_case([self.outcomes(physics, chunk) for physics in self._variants(matrix[rows])])
             values[rows], violations[rows] = found.values, found.violations
         return Outcomes(values, violations)
+
+    def chunks(self, n: int) -> Iterator[slice]:
+        """Yield the rows of n designs that are evaluated at once, so that their postures fit into memory."""
+        size = max(1, POSTURES_AT_ONCE[self.device] // self._postures)
+        yield from (slice(first, first + size) for first in range(0, n, size))
 
     def _variants(self, matrix: Array) -> Iterator[Evaluation]:
         """Yield the physics of designs in each case of the task, exact and off by the tolerance."""

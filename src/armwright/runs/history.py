@@ -21,6 +21,7 @@ from armwright.pareto import (
 )
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.problem import Problem
+from armwright.problem.stated_bounds import stated_bounds, with_bounds
 from armwright.robot.arm import Arm
 from armwright.runs.config import Method
 from armwright.runs.trial import FinishedTrial
@@ -190,8 +191,9 @@ class History:
         return self.hypervolumes[self.n_init :]
 
     def found_reference_point(self) -> tuple[float, ...]:
-        """Choose a reference point from the first n_init trials."""
-        return found_reference_point(self.values[: self.n_init], self.violations[: self.n_init])
+        """Choose a reference point: from the bounds that the constraints imply, else from the first n_init trials."""
+        found = found_reference_point(self.values[: self.n_init], self.violations[: self.n_init])
+        return with_bounds(found, stated_bounds(self.problem))
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:
         """Evaluate the designs of these trials again; the result is equal to the bit."""

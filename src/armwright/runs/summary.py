@@ -112,6 +112,7 @@ class _Search(_Record):
     ended_by: Literal["budget", "stall"]
     hypervolume_history: Annotated[list[_Point], Field(min_length=1)]
     infeasible: Count = 0
+    reference_point_from: list[str]
 
 
 class _Summary(_Record):

@@ -44,7 +44,7 @@ STALL_GROWTH = 3e-4  # of the hypervolume, relative, over that share
 
 # Attributes of a search, without the leading underscore, that make up its state.
 _COUNTERS = ("generation", "evaluations", "side_evaluations", "side_age")
-_ARRAYS = ("matrix", "values", "front_matrix", "front_values", "side_matrix", "side_values")
+_ARRAYS = ("matrix", "values", "front_matrix", "front_values", "side_matrix", "side_values", "reference_point")
 
 
 class FrontSearch:
@@ -149,6 +149,12 @@ class FrontSearch:
         """Run one generation."""
         matrix = self.ask()
         self.tell(matrix, self._evaluate(matrix))
+
+    def move_reference_point(self, reference_point: Sequence[float]) -> None:
+        """Replace the reference point; the recorded hypervolumes begin anew."""
+        self._reference_point = np.asarray(reference_point, dtype=np.float64)
+        self._update_front(self._matrix, self._values)
+        self._history = [(self._evaluations, self.hypervolume)]
 
     def best(self, n: int) -> Indices:
         """Return the sorted indices in `matrix` of at most `n` designs that keep most of the hypervolume."""

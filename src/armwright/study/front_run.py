@@ -24,20 +24,20 @@ from armwright.problem.problem import Problem
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import PROPOSALS, SEARCH, RunFolder, read_run
-from armwright.runs.history import FRONT_SEARCH, History, found_reference_point
+from armwright.runs.history import FRONT_SEARCH, History
 from armwright.runs.infeasibility import ViolationTally
 from armwright.runs.results import complete_summary, discard_results, summarize_front, write_results
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import verify_front
 from armwright.search.front_search import FrontSearch
 from armwright.study.progress import RunResult
+from armwright.study.reference_survey import ReferenceSurvey
 from armwright.study.search_budget import SearchBudget, SearchProgress
 from armwright.study.settings import run_config
 from armwright.study.study import optimize
 
 SAVE_SECONDS = 5.0
 MAX_DESIGNS = 300  # of the front that become trials: those with the largest hypervolume contributions
-N_SAMPLE = 10  # random designs that give the reference point, if the task states none
 N_PROPOSED = 20  # initial designs requested from a proposer
 
 
@@ -82,8 +82,6 @@ def find_front(
     stop_if_proven(check_instantly(problem))
     matrix, origin = _initial_matrix(problem, initial_designs)  # before a folder is made
     config = run_config(problem, FrontMethod(initial_designs=origin), seed)
-    if config.reference_point is None:
-        config = config.model_copy(update={"reference_point": _reference_point(problem, config.seed)})
     with ExitStack() as stack:
         folder = None if out is None else stack.enter_context(RunFolder(Path(out)))
         if folder is not None:
@@ -114,8 +112,8 @@ class _DirectSearch:
         self.config = config
         self.folder = folder
         self.watch = watch
-        assert config.reference_point is not None
-        self.search = FrontSearch(problem.space.parameters, self._evaluate, config.reference_point, config.seed, matrix)
+        self.survey = ReferenceSurvey(problem, config.seed)
+        self.search = FrontSearch(problem.space.parameters, self._evaluate, self.survey.point, config.seed, matrix)
         self.seconds = 0.0  # of all sessions
         self.infeasible = 0  # designs of all sessions
         self.tally = ViolationTally(len(problem.constraints))  # of all sessions
@@ -137,10 +135,12 @@ class _DirectSearch:
             started = saved
             while not (ended := self._end_reason(budget, stop_at_stall)):
                 self.search.step()
+                if self.survey.close():
+                    self.search.move_reference_point(self.survey.point)
                 now = time.monotonic()
                 self.seconds = before + now - started
                 state = {"seconds": self.seconds, "infeasible": self.infeasible, **self.tally.state()}
-                state |= self.search.state()
+                state |= {**self.survey.state(), **self.search.state()}
                 if now - saved >= SAVE_SECONDS:
                     self._save(state)
                     saved = now
@@ -157,7 +157,8 @@ class _DirectSearch:
         """Return why the search ends; empty if it goes on."""
         if budget.is_spent(self.search.evaluations, self.seconds):
             return "budget"
-        return "stall" if stop_at_stall and self.search.evaluations and self.search.stalled else ""
+        is_settled = self.search.evaluations and not self.survey.is_open
+        return "stall" if stop_at_stall and is_settled and self.search.stalled else ""
 
     def _save(self, state: Mapping[str, Any]) -> None:
         if self.folder is None:
@@ -176,6 +177,7 @@ class _DirectSearch:
                 self.seconds = float(state["seconds"])
                 self.infeasible = int(state["infeasible"])
                 self.tally.restore(state)
+                self.survey.restore(state)
         except Exception as fault:  # numpy, zipfile, zlib and tokenize raise different ones
             raise RunFolderError(
                 f"{path} is damaged ({fault}); delete it to start a new search from the front in {folder.path}"
@@ -186,10 +188,12 @@ class _DirectSearch:
         outcomes = self.problem.evaluate_matrix(matrix)
         values = outcomes.penalised
         self.tally.add(outcomes.violations)
+        self.survey.add(outcomes)
         self.infeasible += int(np.any(values >= PENALTY, axis=1).sum())
         return values
 
     def _finish(self, ended: str, resumed: int) -> FrontRun:
+        self._settle_reference_point()
         trials = self._front_trials()
         history = History(self.problem, trials, 0, self.config.reference_point)
         statistics = {
@@ -197,6 +201,7 @@ class _DirectSearch:
             **({"infeasible": self.infeasible} if self.problem.constraints else {}),
             "seconds": round(self.seconds, 3),
             "ended_by": ended,
+            "reference_point_from": self.survey.origins,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
         values = self.search.values
@@ -210,6 +215,16 @@ class _DirectSearch:
             summary = summarize_front(history, self.config, values, statistics, verification, self.tally)
             write_results(self.folder, history, summary, verification)
         return FrontRun(history, self.config, summary, self.folder.path, resumed)
+
+    def _settle_reference_point(self) -> None:
+        """Store the reference point that the task leaves open; a longer search may still find another."""
+        point = self.survey.best_point()
+        if point != self.config.reference_point:
+            self.config = self.config.model_copy(update={"reference_point": point})
+            if self.folder is not None:
+                self.folder.write_config(self.config)
+        if point != self.survey.point:
+            self.search.move_reference_point(point)
 
     def _front_trials(self) -> list[FinishedTrial]:
         """Return the best designs of the front as trials."""
@@ -225,12 +240,6 @@ class _DirectSearch:
                 zip(self.problem.space.designs(matrix), values.tolist(), strict=True)
             )
         ]
-
-
-def _reference_point(problem: Problem, seed: int) -> tuple[float, ...]:
-    """Return a reference point from a few random designs, for a task that states none."""
-    outcomes = problem.evaluate(problem.space.sample(N_SAMPLE, seed))
-    return found_reference_point(outcomes.values, outcomes.violations)
 
 
 def _matrix(problem: Problem, trials: Iterable[FinishedTrial]) -> Array:

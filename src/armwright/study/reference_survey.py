@@ -1,0 +1,94 @@
+"""Choice of a reference point that the task leaves open, during a direct search."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from armwright.pareto import feasible_mask, front_mask
+from armwright.problem.problem import Outcomes, Problem
+from armwright.problem.stated_bounds import MARGIN, stated_bounds, with_bounds
+from armwright.runs.history import found_reference_point
+
+N_SAMPLE = 10  # random designs that give the provisional point
+N_FEASIBLE = 1000  # feasible designs that give the final one
+RANGE_MARGIN = 0.5  # of the range of their front: later designs reach beyond it
+
+
+class ReferenceSurvey:
+    """The reference point of a direct search.
+
+    Where the constraints of the task imply a bound of an objective, the coordinate is 1.1 times the bound. The others
+    come from the front of the first 1000 feasible designs that the search evaluates. Until then the search is bounded
+    by a provisional point, from ten random designs, which matters little: infeasible designs rank by their violation.
+
+    Args:
+        problem: The problem.
+        seed: Seed of the random designs.
+
+    Attributes:
+        point: The reference point.
+        is_open: True while the point is provisional.
+    """
+
+    def __init__(self, problem: Problem, seed: int) -> None:
+        self._bounds = stated_bounds(problem)
+        self.is_open = problem.reference_point is None and None in self._bounds
+        self._n_feasible = 0
+        self._front = np.empty((0, len(problem.objectives)))
+        self._is_stated = problem.reference_point is not None
+        if problem.reference_point is not None:
+            self.point = problem.reference_point
+        elif self.is_open:
+            random = problem.evaluate(problem.space.sample(N_SAMPLE, seed))
+            self.point = with_bounds(found_reference_point(random.values, random.violations), self._bounds)
+        else:
+            self.point = with_bounds([0.0] * len(self._bounds), self._bounds)
+
+    def add(self, outcomes: Outcomes) -> None:
+        """Note evaluated designs while the point is open."""
+        if self.is_open:
+            values = outcomes.values[feasible_mask(outcomes.violations)]
+            self._n_feasible += len(values)
+            values = np.vstack([self._front, values])
+            self._front = values[front_mask(values)]
+
+    def close(self) -> bool:
+        """Set the point if enough feasible designs are known; return whether it changed."""
+        if not self.is_open or self._n_feasible < N_FEASIBLE or len(self._front) < len(self._bounds):
+            return False
+        self.point, self.is_open = self._found(), False
+        return True
+
+    def best_point(self) -> tuple[float, ...]:
+        """Return the point, or the best one so far if it is open."""
+        return self._found() if self.is_open and len(self._front) else self.point
+
+    @property
+    def origins(self) -> list[str]:
+        """Where each coordinate of `best_point` comes from."""
+        if self._is_stated:
+            return ["task"] * len(self._bounds)
+        others = "random designs" if self.is_open and not len(self._front) else "feasible designs"
+        return [others if bound is None else bound.reason for bound in self._bounds]
+
+    def state(self) -> dict[str, Any]:
+        """Return what `restore` needs."""
+        return {
+            "survey_point": np.array(self.point),
+            "survey_open": self.is_open,
+            "survey_feasible": self._n_feasible,
+            "survey_front": self._front,
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Resume from a `state`."""
+        self.point = tuple(state["survey_point"].tolist())
+        self.is_open = bool(state["survey_open"])
+        self._n_feasible = int(state["survey_feasible"])
+        self._front = np.array(state["survey_front"])
+
+    def _found(self) -> tuple[float, ...]:
+        worst, best = self._front.max(axis=0), self._front.min(axis=0)
+        point = worst + np.maximum((MARGIN - 1.0) * worst, RANGE_MARGIN * (worst - best))
+        return with_bounds(np.maximum(point, 1e-9).tolist(), self._bounds)
