@@ -2,8 +2,9 @@
 
 import os
 import threading
-from collections.abc import Generator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from typing import Any, Literal, cast, get_args
 
@@ -40,6 +41,33 @@ def cores() -> int:
     return min(available, int(limit)) if limit.isdecimal() and int(limit) > 0 else available
 
 
+class Compilation:
+    """Compilation of kernels by this process, which happens once per machine and version.
+
+    Attributes:
+        seconds: Wall-clock time spent so far [s].
+        announce: Called before the first kernel compiles.
+    """
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self.announce: Callable[[], None] = lambda: None
+        self._has_begun = False
+
+    @contextmanager
+    def timed(self) -> Generator[None]:
+        """Add the time of this context, and announce the first one."""
+        if not self._has_begun:
+            self._has_begun = True
+            self.announce()
+        started = time.monotonic()
+        try:
+            yield
+        finally:
+            self.seconds += time.monotonic() - started
+
+
+compilation = Compilation()
 _loading = threading.Lock()
 
 
@@ -88,8 +116,7 @@ def _load(precision: Precision, lanes: int, motions: Motions, kind: TargetKind, 
         from armwright.kinematics.ik_kernels import ik_kernels
 
         kernels = ik_kernels(precision, lanes, motions, kind)
-        for kernel in (kernels.solve_ik, kernels.static_torque):
-            kernel.module.load(device)
+        _load_modules((kernels.solve_ik, kernels.static_torque), device)
     return kernels
 
 
@@ -99,8 +126,7 @@ def _load_clearance(precision: Precision, device: Device) -> Any:
         from armwright.kinematics.clearance_kernels import clearance_kernels
 
         kernels = clearance_kernels(precision)
-        for kernel in (kernels.link_axes, kernels.self_clearance, kernels.obstacle_clearance):
-            kernel.module.load(device)
+        _load_modules((kernels.link_axes, kernels.self_clearance, kernels.obstacle_clearance), device)
     return kernels
 
 
@@ -110,8 +136,7 @@ def _load_path(device: Device) -> Any:
         from armwright.kinematics.path_kernels import path_kernels
 
         kernels = path_kernels()
-        for kernel in (kernels.follow, kernels.tool_errors):
-            kernel.module.load(device)
+        _load_modules((kernels.follow, kernels.tool_errors), device)
     return kernels
 
 
@@ -121,8 +146,19 @@ def _load_dynamics(device: Device) -> Any:
         from armwright.kinematics.dynamics_kernels import dynamics_kernels
 
         kernels = dynamics_kernels()
-        kernels.torque_terms.module.load(device)
+        _load_modules((kernels.torque_terms,), device)
     return kernels
+
+
+def _load_modules(kernels: Sequence[Any], device: Device) -> None:
+    """Load the modules of kernels on a device; compile those that are not in the cache."""
+    # Warp launches with this size on the CPU. Modules of another size would have to be compiled again.
+    block_dim = 1 if device == "cpu" else None
+    cache_dir = str(_warp().config.kernel_cache_dir)
+    for module in (kernel.module for kernel in kernels):
+        is_cached = os.path.exists(os.path.join(cache_dir, module.get_module_identifier(block_dim)))
+        with nullcontext() if is_cached else compilation.timed():
+            module.load(device, block_dim)
 
 
 @contextmanager
