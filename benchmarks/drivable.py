@@ -77,7 +77,7 @@ def show(result: Result) -> None:
 
 def measure(name: str, evaluations: int) -> Result:
     """Search the front of a task and drive all its designs."""
-    history = aw.find_front(problem(name), budget=evaluations, seed=0).history
+    history = aw.find_front(problem(name), evaluations=evaluations, seed=0).history
     simulator = Simulator(history)
     members = [simulator(member.number) for member in history.front]
     with TemporaryDirectory() as folder:

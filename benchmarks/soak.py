@@ -130,7 +130,11 @@ def front(n: int, folder: Path) -> list[Look]:
     problem = Problem(load_task(TASK))
     watcher = Watcher(n)
     find_front(
-        problem, budget=n, stop_at_stall=False, out=folder, watch=lambda progress: watcher.see(progress.evaluations)
+        problem,
+        evaluations=n,
+        stop_at_stall=False,
+        out=folder,
+        watch=lambda progress: watcher.see(progress.evaluations),
     )
     return watcher.looks
 

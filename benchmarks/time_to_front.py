@@ -18,7 +18,7 @@ from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
 from armwright.study.front_run import find_front
 from armwright.study.progress import Progress
-from armwright.study.search_budget import SearchBudget, SearchProgress
+from armwright.study.search_budget import SearchProgress
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 
@@ -83,7 +83,7 @@ def ours(problem: Problem, seed: int) -> Course:
     def watch(progress: SearchProgress) -> None:
         course.append((progress.evaluations, progress.seconds, progress.hypervolume))
 
-    find_front(problem, budget=SearchBudget(seconds=LONGEST), seed=seed, watch=watch)
+    find_front(problem, budget=LONGEST, seed=seed, watch=watch)
     return course
 
 

@@ -90,16 +90,16 @@ def tutorial(folder: Path, page: Page, file: Path) -> None:
     for name, key in (("feeder.yaml", "name: feeder"), ("space.yaml", "name: servo-arm")):
         block = next(b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if b.startswith(key))
         (folder / name).write_text(block)
-    command = ["design", "feeder.yaml", "--space", "space.yaml", "--budget", 8000]
+    command = ["design", "feeder.yaml", "--space", "space.yaml", "--evaluations", 8000]
     open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=1&target=3")
     page.screenshot(path=file)
 
 
-def arm_of(task: str, space: str, budget: int, at: str, drag: int = 0, zoom: int = 0) -> Shot:
+def arm_of(task: str, space: str, evaluations: int, at: str, drag: int = 0, zoom: int = 0) -> Shot:
     """Return a picture of the 3D view of an example, turned and enlarged by the mouse."""
 
     def shot(folder: Path, page: Page, file: Path) -> None:
-        command = ("design", EXAMPLES / task, "--space", EXAMPLES / space, "--budget", budget)
+        command = ("design", EXAMPLES / task, "--space", EXAMPLES / space, "--evaluations", evaluations)
         open_report(page, once(folder, f"runs/{task}", *command), (1280, 1290), at)
         box = page.locator("#arm-box canvas").bounding_box()
         assert box is not None
@@ -118,7 +118,7 @@ def arm_of(task: str, space: str, budget: int, at: str, drag: int = 0, zoom: int
 def existing_arms(folder: Path, page: Page, file: Path) -> None:
     """Show a front with two existing arms."""
     task, space = (EXAMPLES / f"7-compare-arms-{part}.yaml" for part in ("task", "space"))
-    run = once(folder, "runs/shelves", "design", task, "--space", space, "--budget", 4000)
+    run = once(folder, "runs/shelves", "design", task, "--space", space, "--evaluations", 4000)
     for name, robot_file in (("so101", "so101"), ("ur3", "ur3_robot")):
         shutil.copy(robot(robot_file), folder / f"{name}.urdf")
     armwright(folder, "compare-arms", task, "so101.urdf", "ur3.urdf", "--run", run)

@@ -33,7 +33,7 @@ if __name__ == "__main__":
     run = aw.optimize(problem, proposer="rules", n_total=20, seed=0, out="python")
     assert run.hypervolume[-1] > 0
     assert aw.to_urdf(run.front[0].arm).startswith("<?xml")
-    assert len(aw.find_front(problem, budget="20000").front) > 20
+    assert len(aw.find_front(problem, evaluations=20000).front) > 20
     assert [path for path in aw.write_figures("python") if path.suffix == ".png"]
     for ask in (
         lambda: aw.LlmProposer("openai-chat:gpt-4o"),
@@ -117,7 +117,7 @@ def main(folder: Path) -> None:
     for kind in FORMATS:
         armwright("export", "run", "--format", kind, "--out", f"out/{kind}")
 
-    armwright("design", "target-1", "--budget", "100000", "--out", "front")
+    armwright("design", "target-1", "--evaluations", "100000", "--out", "front")
     armwright("check", "target-1")
     Path("two-methods.yaml").write_text(EXPERIMENT)
     told = json.loads(armwright("experiment", "two-methods.yaml", "--out", "cells", "--json").stdout)

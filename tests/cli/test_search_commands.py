@@ -11,13 +11,13 @@ from tests.support.command_line import armwright, refused
 
 @pytest.mark.slow
 def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> None:
-    done = armwright("design", "target-1", "--budget", "3000", "--seed", "4", "--no-figures")
+    done = armwright("design", "target-1", "--evaluations", "3000", "--seed", "4", "--no-figures")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     for words in ("of the best known hypervolume", "robust", "sensitive", "budget spent", "a toy"):
         assert words in done.stdout
     assert (in_folder / "runs" / "target-1-design-seed4" / "summary.json").is_file()
-    more = armwright("design", "target-1", "--budget", "4000", "--seed", "4", "--no-figures", "--json")
+    more = armwright("design", "target-1", "--evaluations", "4000", "--seed", "4", "--no-figures", "--json")
     summary = json.loads(more.stdout)
     assert summary["search"]["evaluations"] >= 4000
     assert summary["folder"] == "runs/target-1-design-seed4"
@@ -34,13 +34,15 @@ def test_design_continues_and_refine_adds_improved_designs(in_folder: Path) -> N
     again = armwright("optimize", "target-1", *SHORT, "--proposer", "none", "--out", "mine")
     assert "is finished; nothing was computed again" in again.stdout
 
-    from_run = armwright("design", "target-1", "--budget", "300", "--from", "mine", "--no-figures", "--out", "from-run")
+    from_run = armwright(
+        "design", "target-1", "--evaluations", "300", "--from", "mine", "--no-figures", "--out", "from-run"
+    )
     assert from_run.returncode == 0, from_run.stderr
 
 
 @pytest.mark.slow
 def test_design_and_refine_draw_their_figures(in_folder: Path) -> None:
-    armwright("design", "target-1", "--budget", "1000", "--out", "front")
+    armwright("design", "target-1", "--evaluations", "1000", "--out", "front")
     armwright("optimize", "target-1", *SHORT, "--out", "mine")
     armwright("refine", "mine", "--evaluations", "60")
     for folder in ("front", "mine"):
@@ -67,9 +69,10 @@ def test_robust_and_refine_every(in_folder: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "args", "words"),
     [
-        (2, ("design", "target-1", "--budget", "0"), 'budget = "0" is neither a time above 0'),
+        (2, ("design", "target-1", "--budget", "0"), 'budget = "0" is no time above 0'),
         (2, ("design", "target-1", "--budget", "5 bananas"), 'budget = "5 bananas"'),
         (2, ("design", "target-1", "--budget", "-1s"), 'budget = "-1s"'),
+        (2, ("design", "target-1", "--evaluations", "0"), "a budget of 0 evaluations"),
         (2, ("design", "target-9"), 'unknown task "target-9"'),
         (2, ("design", "target-1", "--device", "cuda"), "no NVIDIA GPU"),
         (2, ("design", "target-1", "--device", "tpu"), 'device = "tpu" is not one of'),
@@ -86,9 +89,22 @@ def test_invalid_search_arguments_are_one_line(in_folder: Path, code: int, args:
 
 
 def test_optimize_and_refine_reject_a_design_run(in_folder: Path) -> None:
-    done = armwright("design", "target-1", "--budget", "300", "--no-figures", "--out", "run", "--json")
+    done = armwright("design", "target-1", "--evaluations", "300", "--no-figures", "--out", "run", "--json")
     assert json.loads(done.stdout)["search"]["ended_by"] == "budget"
     assert "not a study" in refused(1, "refine", "run")
     assert "holds a run with other settings" in refused(2, "optimize", "target-1", "--out", "run")
     assert "not a study" in refused(1, "prompt", "--after", "run")
     assert "to replay" in refused(1, "optimize", "target-1", "--proposer", "replay:run", "--out", "other")
+
+
+def test_optimize_names_design_for_tasks_with_constraints(in_folder: Path) -> None:
+    task = ("name: near", "targets: [[0.3, 0.0, 0.3], [0.2, 0.1, 0.4]]", "reference_point: [1, 1]")
+    (in_folder / "free.yaml").write_text("\n".join(task))
+    (in_folder / "bound.yaml").write_text("\n".join([*task, "constraints: [worst_error <= 0.01]"]))
+    line = "`armwright design bound.yaml` suits this task better"
+    short = (*SHORT, "--no-figures")
+    assert line in armwright("optimize", "bound.yaml", *short, "--out", "a").stdout
+    assert line not in armwright("optimize", "bound.yaml", *short, "--out", "a").stdout  # the run exists
+    assert line not in armwright("optimize", "bound.yaml", *short, "--proposer", "rules", "--out", "b").stdout
+    assert "suits this task better" not in armwright("optimize", "free.yaml", *short, "--out", "c").stdout
+    json.loads(armwright("optimize", "bound.yaml", *short, "--json", "--out", "d").stdout)

@@ -222,7 +222,7 @@ def test_runs_with_different_reference_points_share_their_maximum(tmp_path: Path
             optimize(Problem(task), proposer=proposer, n_init=4, n_total=6, n_step=3, seed=seed, verify=False,
                      out=tmp_path / f"{proposer}-{seed}")  # fmt: skip
     optimize(Problem(stated), sampler="random", proposer="none", n_init=4, n_total=6, verify=False, out=tmp_path / "s")
-    find_front(Problem(task), budget=2000, out=tmp_path / "front")
+    find_front(Problem(task), evaluations=2000, out=tmp_path / "front")
     records = [read_run_summary(folder) for folder in find_runs([tmp_path])]
     own = [record.config.reference_point for record in records]
     assert len(set(own)) > 2
@@ -244,7 +244,7 @@ def test_runs_with_different_reference_points_share_their_maximum(tmp_path: Path
 
 
 def test_front_search_is_compared_with_studies(runs: Path, tmp_path: Path) -> None:
-    find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
+    find_front(Problem(load_task("target-1")), evaluations=2000, out=tmp_path / "front")
     found = compare_summaries([read_run_summary(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     row = next(row for row in found.rows if row.method == "front search")
     assert row.e_hv is None
@@ -293,7 +293,7 @@ def test_all_comparison_figures_are_written(comparison: Comparison, tmp_path: Pa
 
 @pytest.mark.slow
 def test_comparison_figures_include_a_front_search(runs: Path, tmp_path: Path) -> None:
-    find_front(Problem(load_task("target-1")), budget=2000, out=tmp_path / "front")
+    find_front(Problem(load_task("target-1")), evaluations=2000, out=tmp_path / "front")
     found = compare_summaries([read_run_summary(folder) for folder in [runs / "target-1-none-0", tmp_path / "front"]])
     names = {path.stem for path in write_comparison_figures(tmp_path, found)}
     assert {"hypervolume-methods", "attainment-target-1"} <= names

@@ -29,7 +29,7 @@ def argument_seeds() -> list[bytes]:
         ["prompt", "target-1", "--model-options", "{memory: own}", "--n-init", "3"],
         ["prompt", "--after", run, "--number", "3"],
         ["prompt", "--template"], ["prompt", "--variables"], ["prompt", "target-1", "--schema"],
-        ["design", "target-1", "--budget", "100", "--no-stall", "--seed", "1"],
+        ["design", "target-1", "--evaluations", "100", "--no-stall", "--seed", "1"],
         ["experiment", "paper", "--seeds", "1", "--task", "target-1", "--method", "bbo", "--print-commands"],
         ["experiment", "rules", "--print"], ["compare", run, "--baseline", "BBO"], ["runs", run, "--json"],
         ["compare-arms", "target-1", "arm.urdf", "--base", "0,0,0.5", "--tip", "tip", "--base-link", "base"],
@@ -63,9 +63,11 @@ def run_arguments(data: bytes) -> None:
         given[1:1] = ["--no-figures"]
     if given and given[0] in ("optimize", "design", "experiment"):
         given += (
-            {"optimize": ["--n-init=1", "--n-total=2"], "design": ["--budget=50"], "experiment": ["--print-commands"]}[
-                given[0]
-            ]
+            {
+                "optimize": ["--n-init=1", "--n-total=2"],
+                "design": ["--evaluations=50"],
+                "experiment": ["--print-commands"],
+            }[given[0]]
             if len(data) % 4
             else ["--out=/dev/null/x"]
         )

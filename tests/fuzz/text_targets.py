@@ -51,10 +51,10 @@ def run_words(data: bytes) -> None:
     """Read expressions of options and task files; none of them is evaluated as code."""
     from armwright.problem.constraints import read_constraints
     from armwright.runs.selection import read_condition, read_weights
-    from armwright.study.search_budget import SearchBudget
+    from armwright.study.search_budget import read_seconds
 
     text = data.decode("utf-8", "replace")
-    reads = (read_condition, read_weights, SearchBudget.parse, lambda words: read_constraints(words.split("\n")))
+    reads = (read_condition, read_weights, read_seconds, lambda words: read_constraints(words.split("\n")))
     any_of((lambda read=read: read(text)) for read in reads)
 
 

@@ -400,22 +400,22 @@ def test_custom_study_states_its_violations() -> None:
 @pytest.mark.slow
 def test_front_search_keeps_constraints_and_resumes_identically(tmp_path: Path) -> None:
     problem = Problem(task(*BOUNDS))
-    whole = find_front(problem, budget=12_000, stop_at_stall=False, out=tmp_path / "whole")
+    whole = find_front(problem, evaluations=12_000, stop_at_stall=False, out=tmp_path / "whole")
     assert np.all(whole.history.feasible)
     assert np.array_equal(
         whole.history.violations, problem.evaluate([m.design for m in whole.history.trials]).violations
     )
     assert 0 < whole.summary["search"]["infeasible"] < whole.summary["search"]["evaluations"]
-    free = find_front(Problem(task()), budget=12_000, stop_at_stall=False)
+    free = find_front(Problem(task()), evaluations=12_000, stop_at_stall=False)
     assert 0.0 < whole.summary["hypervolume"]["final"] < free.summary["hypervolume"]["final"]
-    find_front(problem, budget=6_000, stop_at_stall=False, out=tmp_path / "parts")
-    parts = find_front(problem, budget=12_000, stop_at_stall=False, out=tmp_path / "parts")
+    find_front(problem, evaluations=6_000, stop_at_stall=False, out=tmp_path / "parts")
+    parts = find_front(problem, evaluations=12_000, stop_at_stall=False, out=tmp_path / "parts")
     assert lines(tmp_path / "parts") == lines(tmp_path / "whole")
     assert parts.summary["search"]["infeasible"] == whole.summary["search"]["infeasible"]
 
 
 def test_front_search_without_a_feasible_design_keeps_the_nearest() -> None:
-    run = find_front(Problem(task(*IMPOSSIBLE)), budget=3_000)
+    run = find_front(Problem(task(*IMPOSSIBLE)), evaluations=3_000)
     assert run.front == []
     assert run.summary["hypervolume"]["final"] == 0.0
     assert run.summary["feasibility"]["nearest"]["number"] == 0

@@ -136,7 +136,7 @@ def test_evaluator_settings_are_validated(make: Callable[[], object], words: str
 def test_front_search_refuses_custom_evaluators(tmp_path: Path) -> None:
     problem = aw.Problem(WHOLE, SPACE, evaluator=measured)
     with pytest.raises(SettingsError, match="only in `armwright optimize`"):
-        aw.find_front(problem, budget=100, out=tmp_path / "front")
+        aw.find_front(problem, evaluations=100, out=tmp_path / "front")
 
 
 FILE = """

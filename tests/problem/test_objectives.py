@@ -235,7 +235,7 @@ def test_task_objectives_reach_run_prompt_figures_and_page(tmp_path: Path, names
     assert "payloads, point masses of [kg], for each TARGET in this order: 0.5, 0.2, 0." in prompt
     for objective in history.problem.objectives:
         assert objective.description in prompt
-    front = find_front(Problem(task), budget=2000, out=tmp_path / "front")
+    front = find_front(Problem(task), evaluations=2000, out=tmp_path / "front")
     values = np.array([member.values for member in front.front])
     point = front.summary["hypervolume"]["reference_point"]
     assert front.summary["hypervolume"]["final"] == pytest.approx(moocore.hypervolume(values, ref=point), rel=0.02)

@@ -381,13 +381,13 @@ def test_markup_in_answers_is_escaped(tmp_path: Path, tab: Tab, chat_server: Cha
 
 
 def test_page_of_a_front_search(tmp_path: Path, tab: Tab) -> None:
-    run = aw.find_front(aw.Problem(task=aw.load_task("target-3")), budget=3000, out=tmp_path / "front")
+    run = aw.find_front(aw.Problem(task=aw.load_task("target-3")), evaluations=3000, out=tmp_path / "front")
     tab.open(write_report(tmp_path / "front"))
     assert f"{run.summary['hypervolume']['final']:.4g}" in tab.text("#facts")
     assert "3,000" in tab.text("#facts")
     assert tab.page.locator("#iterations").is_hidden()
     assert tab.page.locator("#table tbody tr").count() == len(run.front)
-    assert tab.text("#repeat code") == "armwright design target-3 --budget 3000 --seed 0"
+    assert tab.text("#repeat code") == "armwright design target-3 --evaluations 3000 --seed 0"
     assert tab.faults == []
 
 

@@ -101,13 +101,13 @@ def test_study_reports_its_conflict() -> None:
 
 def test_direct_search_reports_the_conflict_of_all_its_designs_and_of_all_sessions(tmp_path: Path) -> None:
     problem = Problem(task("worst_error <= 1e-3", "length <= 0.2"))
-    whole = find_front(problem, budget=3000, seed=0, stop_at_stall=False)
+    whole = find_front(problem, evaluations=3000, seed=0, stop_at_stall=False)
     conflict = whole.summary["feasibility"]["conflict"]
     assert conflict["designs"] == whole.summary["search"]["evaluations"]
     assert conflict["conflicts"] == [["worst_error <= 0.001", "length <= 0.2"]]
     assert min(conflict["satisfied_by"].values()) > 0
-    find_front(problem, budget=1500, seed=0, stop_at_stall=False, out=tmp_path / "run")
-    resumed = find_front(problem, budget=3000, seed=0, stop_at_stall=False, out=tmp_path / "run")
+    find_front(problem, evaluations=1500, seed=0, stop_at_stall=False, out=tmp_path / "run")
+    resumed = find_front(problem, evaluations=3000, seed=0, stop_at_stall=False, out=tmp_path / "run")
     assert resumed.summary["feasibility"]["conflict"] == conflict
 
 

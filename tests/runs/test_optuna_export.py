@@ -303,7 +303,7 @@ def test_only_an_export_writes_a_database(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_front_search_is_exported(tmp_path: Path) -> None:
-    found = find_front(Problem(load_task("target-1")), budget=1000, out=tmp_path / "front")
+    found = find_front(Problem(load_task("target-1")), evaluations=1000, out=tmp_path / "front")
     with opened(export_study(tmp_path / "front").database) as study:
         assert sorted(trial.values for trial in study.best_trials) == sorted(list(m.values) for m in found.front)
         assert {trial.user_attrs["source"] for trial in study.trials} == {"front_search"}

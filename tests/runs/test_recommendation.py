@@ -104,6 +104,14 @@ def test_failing_designs_are_demoted_with_their_reason() -> None:
         assert one.status == "not verified: joint_2 is at its torque limit"
 
 
+def test_recommended_designs_are_not_simulated_without_time() -> None:
+    history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
+    simulator = SimpleNamespace(members={})
+    chosen = recommend(history, cast("Simulator", simulator), has_time=lambda _: False)
+    assert [one.design for one in chosen] == [numbers[0] for numbers in candidates(history).values()]
+    assert {one.status for one in chosen} == {"not simulated: the time is up"}
+
+
 def test_ends_of_the_front_have_the_least_objectives() -> None:
     history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
     for index, role in enumerate(("least position_error", "least torque")):

@@ -206,7 +206,7 @@ def test_restricted_space_is_respected_by_a_run(tmp_path: Path) -> None:
     run = optimize(problem, proposer="rules", n_init=4, n_step=2, n_total=12, out=tmp_path / "run")
     assert {trial.design.joints[0] for trial in run.trials} == {"Y"}
     assert read_run(tmp_path / "run")[0].space == space
-    found = find_front(problem, budget=1500)
+    found = find_front(problem, evaluations=1500)
     assert {member.design.joints[0] for member in found.front} == {"Y"}
     prompt = load_prompt("plus").render(run.history, 0)
     assert "origin_z = 0 (fixed); joint_1 = Y; joint_2 is one of R, P; 0.1 <= link_1 <= 0.2." in prompt

@@ -19,7 +19,7 @@ from armwright.runs.results import read_summary, verify_run
 from armwright.search.front_search import FrontSearch
 from armwright.spaces.design_space import paper_space
 from armwright.study.front_run import FrontRun, find_front
-from armwright.study.search_budget import SearchBudget, SearchProgress
+from armwright.study.search_budget import SearchProgress
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from armwright.tasks.task import Task
@@ -30,32 +30,9 @@ PROBLEM = Problem(load_task("target-1"))
 OPEN = Task(name="open", targets=((0.3, 0.0, 0.3), (0.2, 0.1, 0.4)))
 
 
-@pytest.mark.parametrize(
-    ("words", "budget"),
-    [
-        ("5s", SearchBudget(seconds=5.0)),
-        ("0.5s", SearchBudget(seconds=0.5)),
-        ("2min", SearchBudget(seconds=120.0)),
-        ("1h", SearchBudget(seconds=3600.0)),
-        ("100000", SearchBudget(evaluations=100_000)),
-        ("1e6", SearchBudget(evaluations=1_000_000)),
-        ("100_000", SearchBudget(evaluations=100_000)),
-        ("5", SearchBudget(evaluations=5)),
-    ],
-)
-def test_search_budgets_are_parsed(words: str, budget: SearchBudget) -> None:
-    assert SearchBudget.parse(words) == budget
-
-
-@pytest.mark.parametrize("words", ["0", "0s", "-5s", "5 parsecs", "", "s", "1.5", "1e99", "nan", "inf s", "5m"])
-def test_invalid_search_budgets_are_refused(words: str) -> None:
-    with pytest.raises(SettingsError, match="budget"):
-        SearchBudget.parse(words)
-
-
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> FrontRun:
-    return find_front(PROBLEM, budget="6000", seed=1, out=tmp_path_factory.mktemp("front") / "run")
+    return find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path_factory.mktemp("front") / "run")
 
 
 def test_trials_of_a_front_run_are_its_front(done: FrontRun) -> None:
@@ -108,16 +85,16 @@ def test_resumed_front_run_equals_uninterrupted_one(done: FrontRun, tmp_path: Pa
             raise StopError
 
     with pytest.raises(StopError):
-        find_front(PROBLEM, budget="6000", seed=1, out=tmp_path / "run", watch=stop)
+        find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run", watch=stop)
     assert read_summary(tmp_path / "run") is None
-    run = find_front(PROBLEM, budget="6000", seed=1, out=tmp_path / "run")
+    run = find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run")
     assert 3000 <= run.resumed < 6000
     assert np.array_equal(run.history.values, done.history.values)
     assert [t.design for t in run.history] == [t.design for t in done.history]
     # Once more: nothing is left to do. A larger budget goes on.
-    again = find_front(PROBLEM, budget="6000", seed=1, out=tmp_path / "run")
+    again = find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run")
     assert again.summary == read_summary(tmp_path / "run")
-    longer = find_front(PROBLEM, budget="8000", seed=1, out=tmp_path / "run")
+    longer = find_front(PROBLEM, evaluations=8000, seed=1, out=tmp_path / "run")
     assert longer.resumed == run.summary["search"]["evaluations"]
     assert hypervolume(longer.history.values, (5, 5)) >= hypervolume(run.history.values, (5, 5))
 
@@ -125,10 +102,10 @@ def test_resumed_front_run_equals_uninterrupted_one(done: FrontRun, tmp_path: Pa
 @pytest.mark.slow
 def test_front_run_starts_from_a_run_or_a_proposer(tmp_path: Path) -> None:
     study = optimize(PROBLEM, proposer="rules", n_total=30, seed=0, out=tmp_path / "study")
-    run = find_front(PROBLEM, budget="500", seed=0, initial_designs=tmp_path / "study", out=tmp_path / "a")
+    run = find_front(PROBLEM, evaluations=500, seed=0, initial_designs=tmp_path / "study", out=tmp_path / "a")
     together = np.vstack([run.history.values, study.history.values])
     assert hypervolume(together, (5, 5)) == pytest.approx(hypervolume(run.history.values, (5, 5)))  # nothing is lost
-    proposed = find_front(PROBLEM, budget="500", seed=0, initial_designs=RulesProposer(), out=tmp_path / "b")
+    proposed = find_front(PROBLEM, evaluations=500, seed=0, initial_designs=RulesProposer(), out=tmp_path / "b")
     assert proposed.config.method.initial_designs == {"proposer": {"name": "rules"}}
     _, first = read_run(tmp_path / "b" / "proposals")
     assert sum(trial.source == "rules" for trial in first) == 20
@@ -137,40 +114,40 @@ def test_front_run_starts_from_a_run_or_a_proposer(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="not a run folder"):
         find_front(PROBLEM, initial_designs=tmp_path / "nothing")
     with pytest.raises(RunConflictError, match="initial_designs"):
-        find_front(PROBLEM, budget="500", seed=0, out=tmp_path / "a")
+        find_front(PROBLEM, evaluations=500, seed=0, out=tmp_path / "a")
 
 
 def test_front_run_refuses_folders_of_other_runs(done: FrontRun, tmp_path: Path) -> None:
     with pytest.raises(RunConflictError, match="seed: 1 stored, 2 requested"):
-        find_front(PROBLEM, budget="100", seed=2, out=done.folder)
+        find_front(PROBLEM, evaluations=100, seed=2, out=done.folder)
     with pytest.raises(RunConflictError):
         optimize(PROBLEM, proposer="none", n_total=5, seed=1, out=done.folder)
     optimize(PROBLEM, proposer="none", n_init=2, n_total=2, seed=1, out=tmp_path / "study")
     with pytest.raises(RunConflictError):
-        find_front(PROBLEM, budget="100", seed=1, out=tmp_path / "study")
+        find_front(PROBLEM, evaluations=100, seed=1, out=tmp_path / "study")
 
 
 def test_damaged_search_state_is_reported(tmp_path: Path) -> None:
-    find_front(PROBLEM, budget="300", seed=1, out=tmp_path / "run")
+    find_front(PROBLEM, evaluations=300, seed=1, out=tmp_path / "run")
     state = tmp_path / "run" / "search.npz"
     for content in (b"", b"PK\x03\x04 nothing", state.read_bytes()[:500]):
         state.write_bytes(content)
         with pytest.raises(RunFolderError, match=r"search\.npz is damaged"):
-            find_front(PROBLEM, budget="600", seed=1, out=tmp_path / "run")
+            find_front(PROBLEM, evaluations=600, seed=1, out=tmp_path / "run")
     # One wrong byte anywhere: numpy, zipfile, zlib and tokenize each complain in their own way.
-    find_front(PROBLEM, budget="300", seed=1, out=tmp_path / "other")
+    find_front(PROBLEM, evaluations=300, seed=1, out=tmp_path / "other")
     whole = (tmp_path / "other" / "search.npz").read_bytes()
     refused = 0
     for place in range(0, len(whole), len(whole) // 30):
         state.write_bytes(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
         try:
-            find_front(PROBLEM, budget="300", seed=1, out=tmp_path / "run")
+            find_front(PROBLEM, evaluations=300, seed=1, out=tmp_path / "run")
         except RunFolderError:
             refused += 1
     assert refused > 0
     before = read_run(tmp_path / "run")[1]
     state.unlink()
-    anew = find_front(PROBLEM, budget="600", seed=1, out=tmp_path / "run")
+    anew = find_front(PROBLEM, evaluations=600, seed=1, out=tmp_path / "run")
     assert anew.summary["hypervolume"]["final"] >= hypervolume(before.values, (5, 5))
 
 
@@ -189,8 +166,8 @@ def test_front_run_stopped_within_a_generation_resumes_identically(
     monkeypatch.setattr(FrontSearch, "_select", interrupted)
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
-            find_front(PROBLEM, budget="6000", seed=1, out=tmp_path / "run")
-    run = find_front(PROBLEM, budget="6000", seed=1, out=tmp_path / "run")
+            find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run")
+    run = find_front(PROBLEM, evaluations=6000, seed=1, out=tmp_path / "run")
     assert run.resumed > 0
     assert np.array_equal(run.history.values, done.history.values)
 
@@ -199,8 +176,8 @@ def test_front_run_stopped_within_a_generation_resumes_identically(
 def test_front_outside_the_reference_box_is_kept_and_resumed(tmp_path: Path) -> None:
     target = {"position": [9.0, 0.0, 0.0], "tolerance": 8.0}
     far = Task.model_validate({"name": "far", "targets": [target], "reference_point": [1.0, 1.0]})
-    for budget in (600, 900):
-        run = find_front(Problem(far), budget=budget, out=tmp_path / "run")
+    for evaluations in (600, 900):
+        run = find_front(Problem(far), evaluations=evaluations, out=tmp_path / "run")
         assert run.summary["hypervolume"]["final"] == 0.0
         assert front_mask(run.history.values).all()
         assert 0 < len(run.history) <= 300
@@ -211,7 +188,7 @@ def test_front_outside_the_reference_box_is_kept_and_resumed(tmp_path: Path) -> 
 def test_proposer_is_not_called_for_a_conflicting_folder(tmp_path: Path) -> None:
     optimize(PROBLEM, proposer="none", n_init=2, n_total=2, out=tmp_path / "study")
     with pytest.raises(RunConflictError):
-        find_front(PROBLEM, budget=500, initial_designs=RulesProposer(), out=tmp_path / "study")
+        find_front(PROBLEM, evaluations=500, initial_designs=RulesProposer(), out=tmp_path / "study")
     assert not (tmp_path / "study" / "proposals").exists()
 
 
@@ -230,15 +207,9 @@ def test_good_initial_designs_are_not_a_stall() -> None:
         assert not search.stalled
 
 
-@pytest.mark.parametrize("bounds", [{"evaluations": 0}, {"seconds": -1.0}, {"seconds": float("nan")}])
-def test_budget_must_be_positive(bounds: dict[str, float]) -> None:
-    with pytest.raises(SettingsError, match="above 0"):
-        SearchBudget(**bounds)  # pyright: ignore[reportArgumentType]
-
-
 @pytest.mark.slow
 def test_gpu_run_is_verified_without_a_gpu(tmp_path: Path) -> None:
-    find_front(PROBLEM, budget=300, out=tmp_path / "run")
+    find_front(PROBLEM, evaluations=300, out=tmp_path / "run")
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text().replace("device: cpu", "device: cuda"))
     assert "device: cuda" in config.read_text()
@@ -247,7 +218,7 @@ def test_gpu_run_is_verified_without_a_gpu(tmp_path: Path) -> None:
 
 
 def test_front_run_finds_a_missing_reference_point() -> None:
-    run = find_front(Problem(OPEN), budget="2500", seed=0)
+    run = find_front(Problem(OPEN), evaluations=2500, seed=0)
     assert run.folder is None
     assert run.config.reference_point == run.history.reference_point
     assert run.summary["hypervolume"]["final"] > 0.0
@@ -257,6 +228,6 @@ def test_front_run_finds_a_missing_reference_point() -> None:
 def test_front_run_ends_at_a_stall() -> None:
     narrow = paper_space(1).model_copy(update={f"origin_{axis}": (0.0, 0.0) for axis in "xyz"})
     near = Task(name="near", targets=((0.2, 0.0, 0.2), (0.1, 0.1, 0.2)))
-    run = find_front(Problem(near, narrow), budget="1e6", seed=0)
+    run = find_front(Problem(near, narrow), evaluations=1_000_000, seed=0)
     assert run.summary["search"]["ended_by"] == "stall"
     assert run.summary["search"]["evaluations"] < 100_000

@@ -76,7 +76,7 @@ def test_run_from_the_future_is_resumed(tmp_path: Path, whole: Path, clock: dict
 def test_design_and_experiment_survive_a_jumping_clock(
     tmp_path: Path, clock: dict[str, str], record_property: Tell
 ) -> None:
-    asked = ("design", "target-1", "--budget", "5000", "--out")
+    asked = ("design", "target-1", "--evaluations", "5000", "--out")
     done = armwright(*asked, tmp_path / "whole", "--no-figures")
     assert (done.returncode, done.stderr) == (0, "")
     done = armwright(*asked, tmp_path / "run", environment=clock)

@@ -199,8 +199,8 @@ def test_damaged_transcripts_are_reported_or_harmless(
 
 
 def test_damaged_search_state_is_reported_or_harmless(tmp_path: Path, kills: int, record_property: Tell) -> None:
-    def search(folder: Path, budget: str = "3000") -> object:
-        return find_front(PROBLEM, budget=budget, seed=1, stop_at_stall=False, out=folder)
+    def search(folder: Path, evaluations: int = 3000) -> object:
+        return find_front(PROBLEM, evaluations=evaluations, seed=1, stop_at_stall=False, out=folder)
 
     intact, extended, restarted = (tmp_path / name for name in ("intact", "extended", "restarted"))
     search(intact, "2000")

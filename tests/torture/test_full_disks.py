@@ -92,7 +92,7 @@ def test_full_disk_keeps_finished_trials(disk: Path, whole: Path, kills: int, re
 
 
 def test_no_space_for_a_search(tmp_path: Path) -> None:
-    asked = ("design", "target-1", "--budget", "5000", "--no-figures", "--out")
+    asked = ("design", "target-1", "--evaluations", "5000", "--no-figures", "--out")
     assert armwright(*asked, tmp_path / "whole").returncode == 0
     for n in (1000, 20_000):
         folder = tmp_path / f"run{n}"

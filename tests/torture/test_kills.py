@@ -211,7 +211,7 @@ def is_same_front(folder: Path, whole: Path) -> None:
 
 
 def searching(folder: Path) -> list[str]:
-    settings = ["--budget", str(BUDGET), "--no-stall", "--seed", "3", "--no-figures"]
+    settings = ["--evaluations", str(BUDGET), "--no-stall", "--seed", "3", "--no-figures"]
     return ["design", "target-1", *settings, "--out", str(folder)]
 
 

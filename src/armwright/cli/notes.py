@@ -1,5 +1,8 @@
 """Notes on what a task holds and what its objectives leave out."""
 
+import shlex
+from pathlib import Path
+
 from armwright.problem.objectives import CLEARANCE_QUANTITIES, UNCOVERED_FRACTION
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import paper_space
@@ -24,6 +27,22 @@ def space_note(problem: Problem) -> str:
     """Return which space the task brings, or an empty string if it is the paper's."""
     name = problem.space.name
     return "" if name == paper_space().name else f"design space: {name}, the task's own; --space names another"
+
+
+def design_note(problem: Problem, task: str, space: Path | None) -> str:
+    """Return that `armwright design` suits a problem better than `optimize`, or an empty string if it does not.
+
+    It does if the kernels compute all objectives and there are constraints, which few of 200 designs satisfy.
+
+    Args:
+        problem: The problem.
+        task: The task as it was given.
+        space: The space file as it was given.
+    """
+    if problem.evaluator is not None or not problem.constraints:
+        return ""
+    command = shlex.join(["armwright", "design", task, *([] if space is None else ["--space", str(space)])])
+    return f"`{command}` suits this task better: it evaluates thousands of designs in the same time"
 
 
 def payload_note(task: Task) -> str:

@@ -10,11 +10,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Column
 
+from armwright.kinematics.devices import compilation
 from armwright.report.style import look
 from armwright.study.progress import Progress as StudyProgress
 from armwright.study.search_budget import SearchProgress
 
 LINE_INTERVAL = 10  # counted trials between two plain lines of a study
+RATE_AFTER = 1.0  # [s] of search
 SHARE_INTERVAL = 0.1  # share of the budget between two plain lines of a search
 
 
@@ -49,12 +51,14 @@ def search_progress(console: Console) -> Generator[Callable[[SearchProgress], No
     """Yield a callback that shows a front search."""
     with _live_line(console) as update:
         due = 0.0  # spent share of the budget at the next plain line
+        is_rate_known = False
 
         def watch(progress: SearchProgress) -> None:
-            nonlocal due
-            budget = progress.budget
-            by_evaluations = progress.evaluations / (budget.evaluations or math.inf)
-            spent = min(1.0, max(by_evaluations, progress.seconds / (budget.seconds or math.inf)))
+            nonlocal due, is_rate_known
+            if not is_rate_known and progress.new_seconds >= RATE_AFTER:
+                is_rate_known = True
+                _print_at_once(console, describe_rate(progress))
+            spent = progress.share
             count = f"{progress.evaluations:9,} evaluations"
             state = f"{progress.seconds:6.1f} s  hypervolume {progress.hypervolume:.3f}  front {progress.front_size}"
             if update is not None:
@@ -64,6 +68,33 @@ def search_progress(console: Console) -> Generator[Callable[[SearchProgress], No
                 due = spent + SHARE_INTERVAL
 
         yield watch
+
+
+def announce_compilation(console: Console) -> None:
+    """Print a line before the first kernel compiles."""
+    compilation.announce = lambda: _print_at_once(
+        console, "compiling kernels for this machine, once; this time does not count"
+    )
+
+
+def describe_rate(progress: SearchProgress) -> str:
+    """Return the measured rate of a search and how many designs it will evaluate."""
+    rate = progress.new_evaluations / progress.new_seconds
+    left = min(progress.seconds_left, ((progress.budget.evaluations or math.inf) - progress.evaluations) / rate)
+    n, seconds = progress.evaluations + rate * left, progress.seconds + left
+    return f"about {_rounded(rate)} designs/s: {_rounded(n)} designs in {_describe_seconds(seconds)}"
+
+
+def _rounded(number: float) -> str:
+    """Return a number of two digits."""
+    return f"{float(f'{number:.2g}'):,.{0 if number >= 10.0 else 1}f}"
+
+
+def _describe_seconds(seconds: float) -> str:
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} s"
 
 
 def _note(progress: StudyProgress) -> str:

@@ -1,5 +1,7 @@
 """Commands that search designs: design, optimize, refine."""
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -35,8 +37,16 @@ from armwright.exceptions import AnswerPendingError, SettingsError, StoppedError
 def design(
     task: TaskName,
     budget: Annotated[
-        str, typer.Option(help="Budget of the search: a time (5s, 2min, 1h) or evaluations (100000, 1e6).")
-    ] = "5s",
+        str | None,
+        typer.Option(
+            help="Wall-clock time of the command: 60s, 5min, 1h, or a number of seconds. Compiling kernels in a first "
+            "run does not count.",
+            show_default="30s; no limit with --evaluations",
+        ),
+    ] = None,
+    evaluations: Annotated[
+        int | None, typer.Option(help="Evaluations of the search; with --budget, whichever ends first.")
+    ] = None,
     space: SpaceFile = None,
     objectives: Objectives = None,
     from_: Annotated[
@@ -55,18 +65,23 @@ def design(
 ) -> None:
     """Find the whole Pareto front of TASK by direct search in batches.
 
-    The same command with a larger --budget continues the search.
+    The same command with a larger --budget or --evaluations continues the search.
     """
+    started = time.monotonic()
     from armwright.cli.check import check_before_search, check_files
     from armwright.cli.notes import space_note
-    from armwright.cli.progress import search_progress
+    from armwright.cli.progress import announce_compilation, search_progress
     from armwright.cli.show_results import show_search
     from armwright.proposers.factory import choose_proposer
     from armwright.study.front_run import find_front
+    from armwright.study.search_budget import SearchBudget
+    from armwright.study.time_plan import TimePlan
 
     if from_ is not None and proposer is not None:
         raise SettingsError("--from and --proposer both set the initial designs; use one of them")
     console = open_console(json_)
+    announce_compilation(console)
+    plan = TimePlan(SearchBudget.of(budget, evaluations), drawing=figures, started=started)
     problem = load_problem(task, space, robust, device, many=True, objectives=objectives)
     if space is None and (note := space_note(problem)):
         console.print(note)
@@ -81,14 +96,14 @@ def design(
         with search_progress(console) as watch:
             run = find_front(
                 problem,
-                budget=budget,
+                budget=plan,
                 seed=seed,
                 initial_designs=from_ if choice is None else choice.proposer,
                 stop_at_stall=stall,
                 out=folder,
                 watch=watch,
             )
-        drawn = _draw(folder) if figures else []
+        drawn = _draw(folder, lambda seconds: plan.left >= seconds) if figures else []
     except KeyboardInterrupt:
         exit_interrupted(console, f"the search is saved in {folder}/")
     if json_:
@@ -96,7 +111,7 @@ def design(
         return
     if run.resumed:
         search = run.summary["search"]
-        option = "a larger --budget" if search["ended_by"] == "budget" else "--no-stall"
+        option = "a larger --budget or --evaluations" if search["ended_by"] == "budget" else "--no-stall"
         console.print(
             f"resumed at {run.resumed:,} evaluations"
             if search["evaluations"] > run.resumed
@@ -177,8 +192,8 @@ def optimize(
     The same command resumes or shows the run; a larger --n-total extends it.
     """
     from armwright.cli.check import check_before_search, check_files
-    from armwright.cli.notes import space_note
-    from armwright.cli.progress import study_progress
+    from armwright.cli.notes import design_note, space_note
+    from armwright.cli.progress import announce_compilation, study_progress
     from armwright.cli.show_results import show_result
     from armwright.llm.configuration import load_model_options
     from armwright.proposers.factory import choose_proposer
@@ -186,6 +201,7 @@ def optimize(
     from armwright.study.study import optimize as run_study
 
     console = open_console(json_)
+    announce_compilation(console)
     problem = load_problem(task, space, robust, device, objectives=objectives, evaluator=evaluator)
     if space is None and (note := space_note(problem)):
         console.print(note)
@@ -194,6 +210,9 @@ def optimize(
     choice = choose_proposer(proposer, given)
     folder = out or Path("runs") / f"{problem.task.name}-seed{seed}"
     console.print(choice.reason)
+    is_method_chosen = proposer != "auto" or model is not None or sampler != "tpe" or refine_every is not None
+    if not is_method_chosen and not folder.exists() and (note := design_note(problem, task, space)):
+        console.print(note)
     check_before_search(console, problem, check_files(task, space), folder)
     if live:
         from armwright.report.live_server import start_server
@@ -260,8 +279,13 @@ def refine(
     show_refined(open_console(), refined)
 
 
-def _draw(folder: Path) -> list[Path]:
-    """Return the figures of a finished run; draw them and the page if they are missing."""
+def _draw(folder: Path, has_time: Callable[[float], bool] = lambda _: True) -> list[Path]:
+    """Return the figures of a finished run; draw them and the page if they are missing.
+
+    Args:
+        folder: The run folder.
+        has_time: Returns whether there is time for another figure of so many seconds.
+    """
     from armwright.report.figures import write_figures
     from armwright.report.page import write_report
     from armwright.runs.folder import RunFolder
@@ -271,4 +295,4 @@ def _draw(folder: Path) -> list[Path]:
         existing = sorted((folder / FIGURES).glob("*.png"))
         if not (folder / REPORT).is_file():
             write_report(folder)
-        return existing or write_figures(folder)
+        return existing or write_figures(folder, has_time)

@@ -65,7 +65,7 @@ class Cell:
         return ["optimize", self.task, *self._arguments(arguments), "--no-figures"]
 
     def _design_options(self) -> list[str]:
-        return ["design", self.task, *self._arguments({"budget": self.plan.design}), "--no-figures"]
+        return ["design", self.task, *self._arguments({"evaluations": self.plan.design}), "--no-figures"]
 
     def _arguments(self, options: Mapping[str, Any]) -> list[str]:
         options = {**options, "space": self.space, "seed": self.seed, "out": self.folder}

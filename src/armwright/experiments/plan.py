@@ -36,7 +36,7 @@ Seeds = Annotated[
 
 
 class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """A method: the options of `armwright optimize`, or, with `design`, the budget of `armwright design`.
+    """A method: the options of `armwright optimize`, or, with `design`, the evaluations of `armwright design`.
 
     label: name in tables and figures. proposer: as in `armwright optimize`; `replay:NAME` may contain {task} and
         {seed}, and runs the cells for which there is such a recording.
@@ -46,7 +46,7 @@ class MethodPlan(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
 
     label: str = Field(min_length=1, max_length=40)
     proposer: str = "none"
-    design: str | None = None  # a budget of `armwright design`, which then runs instead of a study
+    design: Count | None = None  # evaluations of `armwright design`, which then runs instead of a study
     sampler: str = "tpe"
     n_step: Count = 10
     refine_every: Count | None = None

@@ -59,7 +59,7 @@ def run_cell(cell: Cell) -> CellOutcome:
 def _run(cell: Cell) -> tuple[dict[str, Any], bool]:
     plan, problem = cell.plan, _problem(cell)
     if plan.design is not None:
-        found = find_front(problem, budget=plan.design, seed=cell.seed, out=cell.folder)
+        found = find_front(problem, evaluations=plan.design, seed=cell.seed, out=cell.folder)
         return found.summary, found.resumed == found.summary["search"]["evaluations"]
     run = optimize(
         problem,

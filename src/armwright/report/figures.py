@@ -1,6 +1,7 @@
 """Figures of one run, written to its folder as PNG and PDF."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,18 +36,27 @@ SAMPLE_SHARES = (0.05, 0.35, 0.65, 1.0)  # of the counted trials; 10, 70, 130 an
 SHOWN = 1.35  # drawn part of the plane, as a multiple of the reference point
 
 
-def write_figures(folder: str | Path) -> list[Path]:
-    """Draw the figures of a run folder and return the PNG files."""
+def write_figures(folder: str | Path, has_time: Callable[[float], bool] = lambda _: True) -> list[Path]:
+    """Draw the figures of a run folder and return the PNG files.
+
+    Args:
+        folder: The run folder.
+        has_time: Returns whether there is time for another figure of so many seconds. If not, figures of single
+            designs are left out.
+    """
     folder = Path(folder)
     config, history = read_run(folder)
     summary = read_summary(folder) if isinstance(config.method, FrontMethod) else None
     search = None if summary is None else summary.get("search")
     existing = read_existing_arms(folder, len(config.objectives))
-    return write_drawn(folder / FIGURES, _figures(history, search, existing))
+    return write_drawn(folder / FIGURES, _figures(history, search, existing, has_time))
 
 
 def _figures(
-    history: History, search: Mapping[str, Any] | None, existing: Sequence[ComparedArm]
+    history: History,
+    search: Mapping[str, Any] | None,
+    existing: Sequence[ComparedArm],
+    has_time: Callable[[float], bool],
 ) -> Iterator[tuple[str, Figure]]:
     """Yield figures by name; search: the record of a direct search, whose trials are its front."""
     is_plane = len(history.problem.objectives) > 1  # figures of the first two objectives
@@ -60,8 +70,12 @@ def _figures(
     if is_plane:
         yield "front", draw_front(history, existing)
     chosen = chosen_members(history)
+    started = time.monotonic()
     yield "arms", draw_arms(history, chosen)
+    seconds = time.monotonic() - started  # about as long as for a single design
     for title, member in chosen:
+        if not has_time(seconds):
+            return
         yield f"arm-{member.number:04d}", draw_arm(history, title, member)
 
 

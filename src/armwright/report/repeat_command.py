@@ -44,7 +44,7 @@ def repeat_command(config: RunConfig, refined: bool = False, spent: int | None =
         settings["space"] = spaces[0] if spaces else CUSTOM_SPACE
     if isinstance(config.method, FrontMethod):
         first = config.method.initial_designs or {}
-        settings |= {"budget": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
+        settings |= {"evaluations": spent, "from": first.get("run"), "proposer": first.get("proposer", {}).get("name")}
         command = "design"
     else:
         command = "optimize"

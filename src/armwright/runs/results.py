@@ -7,7 +7,7 @@ designs/NNNN/             each design of the front (design_folders.py)
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -149,6 +149,7 @@ def summarize_front(
     search: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
+    has_time: Callable[[int], bool] = lambda _: True,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a direct search.
 
@@ -159,10 +160,11 @@ def summarize_front(
         search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
         verification: Verification of the front; None if it was not verified.
         tally: All evaluated designs by the constraints that they satisfy.
+        has_time: Returns whether there is time for a number of simulations of recommended designs.
     """
     volume = {"final": hypervolume(found, history.reference_point or ())}
     return {
-        **_common_record(history, config, found, volume, verification, tally),
+        **_common_record(history, config, found, volume, verification, tally, has_time),
         "search": dict(search),
         "versions": dict(config.versions),
     }
@@ -175,6 +177,7 @@ def _common_record(
     volume: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
+    has_time: Callable[[int], bool] = lambda _: True,
 ) -> dict[str, Any]:
     """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
     reference = history.reference_point
@@ -190,7 +193,7 @@ def _common_record(
         "front_size": len(history.front),
         "verification": _verification_record(history, verification),
         **_assumed_record(history),
-        **_recommended_record(history),
+        **_recommended_record(history, has_time),
     }
 
 
@@ -200,11 +203,11 @@ def _assumed_record(history: History) -> dict[str, Any]:
     return {"assumed": assumed} if assumed else {}
 
 
-def _recommended_record(history: History) -> dict[str, Any]:
+def _recommended_record(history: History, has_time: Callable[[int], bool]) -> dict[str, Any]:
     """Return the recommended designs, verified in the simulator; empty for a task without a cycle."""
     if history.problem.task.cycle is None:
         return {}
-    return {"recommended": [asdict(one) for one in recommend(history)]}
+    return {"recommended": [asdict(one) for one in recommend(history, has_time=has_time)]}
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:

@@ -6,9 +6,10 @@ proposals/    the run in which a proposer gave the initial designs, if one did
 """
 
 import io
+import math
 import time
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import RunFolderError, SettingsError
+from armwright.exceptions import MissingExtraError, RunFolderError, SettingsError
 from armwright.kinematics.ik import MANY_ARMS
 from armwright.pareto import PENALTY
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
@@ -26,18 +27,20 @@ from armwright.runs.config import FrontMethod, RunConfig
 from armwright.runs.folder import PROPOSALS, SEARCH, RunFolder, read_run
 from armwright.runs.history import FRONT_SEARCH, History
 from armwright.runs.infeasibility import ViolationTally
-from armwright.runs.results import complete_summary, discard_results, summarize_front, write_results
+from armwright.runs.results import complete_summary, discard_results, read_summary, summarize_front, write_results
+from armwright.runs.simulated_run import Simulator
 from armwright.runs.trial import FinishedTrial
-from armwright.runs.verification import verify_front
+from armwright.runs.verification import Verification, verify, verify_front
 from armwright.search.front_search import FrontSearch
 from armwright.study.progress import RunResult
 from armwright.study.reference_survey import ReferenceSurvey
 from armwright.study.search_budget import SearchBudget, SearchProgress
 from armwright.study.settings import run_config
 from armwright.study.study import optimize
+from armwright.study.time_plan import ChunkSize, ResultCosts, TimePlan, files_seconds
 
 SAVE_SECONDS = 5.0
-MAX_DESIGNS = 300  # of the front that become trials: those with the largest hypervolume contributions
+N_MEASURED = 4  # designs that the cost of results is measured on
 N_PROPOSED = 20  # initial designs requested from a proposer
 
 
@@ -48,7 +51,8 @@ class FrontRun(RunResult):
 def find_front(
     problem: Problem,
     *,
-    budget: str | int | SearchBudget = "5s",
+    budget: str | float | TimePlan | None = None,
+    evaluations: int | None = None,
     seed: int = 0,
     initial_designs: str | Path | Proposer | None = None,
     stop_at_stall: bool = True,
@@ -59,8 +63,11 @@ def find_front(
 
     Args:
         problem: the problem.
-        budget: a time such as "5s", without the loading of the kernels, or a number of evaluations, which the last
-            batch may exceed by up to 1000. With a number the result depends on the seed only.
+        budget: wall-clock time of this call, with verification and files: "60s", "5min", "1h" or a number of seconds;
+            by default 30 s, or unlimited with `evaluations`. The compilation of kernels does not count. Or the plan of
+            a time that began earlier.
+        evaluations: number of evaluations, which the last batch may exceed by up to 1000. If it ends the search, the
+            result depends on the seed only.
         seed: of all random numbers.
         initial_designs: a run folder, whose designs are all taken, or a proposer.
         stop_at_stall: end early when the hypervolume hardly grows any more.
@@ -73,12 +80,12 @@ def find_front(
     Examples:
         >>> import armwright as aw
         >>> problem = aw.Problem(aw.load_task("target-2"))
-        >>> run = aw.find_front(problem, budget=2000, seed=0)
+        >>> run = aw.find_front(problem, evaluations=2000, seed=0)
         >>> volume = aw.hypervolume([member.values for member in run.front], problem.reference_point)
         >>> round(volume, 6) == round(run.summary["hypervolume"]["final"], 6)
         True
     """
-    budget = budget if isinstance(budget, SearchBudget) else SearchBudget.parse(str(budget))
+    plan = budget if isinstance(budget, TimePlan) else TimePlan(SearchBudget.of(budget, evaluations))
     stop_if_proven(check_instantly(problem))
     matrix, origin = _initial_matrix(problem, initial_designs)  # before a folder is made
     config = run_config(problem, FrontMethod(initial_designs=origin), seed)
@@ -94,7 +101,7 @@ def find_front(
                 )
             if folder is not None:
                 matrix = np.vstack([matrix, _matrix(problem, folder.open_trials(config))])
-        return _DirectSearch(problem, config, folder, matrix, watch).run(budget, stop_at_stall)
+        return _DirectSearch(problem, config, folder, matrix, plan, watch).run(stop_at_stall)
 
 
 class _DirectSearch:
@@ -106,59 +113,107 @@ class _DirectSearch:
         config: RunConfig,
         folder: RunFolder | None,
         matrix: Array,
+        plan: TimePlan,
         watch: Callable[[SearchProgress], None] | None,
     ) -> None:
         self.problem = problem
         self.config = config
         self.folder = folder
+        self.plan = plan
         self.watch = watch
         self.survey = ReferenceSurvey(problem, config.seed)
         self.search = FrontSearch(problem.space.parameters, self._evaluate, self.survey.point, config.seed, matrix)
-        self.seconds = 0.0  # of all sessions
+        self.seconds = 0.0  # of earlier sessions
+        self.resumed = 0  # evaluations of earlier sessions
+        self.ended_after = 0.0  # largest time budget that has ended the search [s]
+        self.chunk_size = ChunkSize(plan.budget)
         self.infeasible = 0  # designs of all sessions
         self.tally = ViolationTally(len(problem.constraints))  # of all sessions
         if folder is not None:
             self._restore(folder)
 
-    def run(self, budget: SearchBudget, stop_at_stall: bool) -> FrontRun:
+    def run(self, stop_at_stall: bool) -> FrontRun:
         """Search until the budget is spent or the search stalls, then write the results."""
-        resumed = self.search.evaluations
-        few = self.problem.space.matrix(self.problem.space.sample(1, 0))
-        self.problem.evaluate_matrix(np.repeat(few, MANY_ARMS, axis=0))  # loads all kernels
-        ended = self._end_reason(budget, stop_at_stall)
+        self._load_kernels()
+        self.plan.begin_search()
+        ended = self._end_reason(stop_at_stall)
         if not ended and self.folder is not None:
             discard_results(self.folder.path)
             self.config = self.folder.note_versions(self.config)
         state = None  # after the last complete generation: Ctrl-C may interrupt one
         try:
-            before, saved = self.seconds, time.monotonic()
-            started = saved
-            while not (ended := self._end_reason(budget, stop_at_stall)):
-                self.search.step()
+            saved = time.monotonic()
+            while not (ended := self._end_reason(stop_at_stall)):
+                matrix = self.search.ask()
+                values = self._evaluate(matrix)
+                self.search.tell(matrix[: len(values)], values)
                 if self.survey.close():
                     self.search.move_reference_point(self.survey.point)
-                now = time.monotonic()
-                self.seconds = before + now - started
-                state = {"seconds": self.seconds, "infeasible": self.infeasible, **self.tally.state()}
-                state |= {**self.survey.state(), **self.search.state()}
-                if now - saved >= SAVE_SECONDS:
+                if self.plan.should_measure:
+                    self.plan.costs = self._measure_costs()
+                state = self._state()
+                if time.monotonic() - saved >= SAVE_SECONDS:
                     self._save(state)
-                    saved = now
-                if self.watch is not None:
-                    search = self.search
-                    front_size = len(search.matrix)
-                    self.watch(SearchProgress(search.evaluations, self.seconds, search.hypervolume, front_size, budget))
+                    saved = time.monotonic()
+                self._report(0)
+            budget = self.plan.budget
+            if state is not None and budget.seconds is not None and ended == "budget" and not self._is_exhausted:
+                self.ended_after = budget.seconds
+                state = self._state()
         finally:
             if state is not None:
                 self._save(state)
-        return self._finish(ended, resumed)
+        return self._finish(ended, self.searched)
 
-    def _end_reason(self, budget: SearchBudget, stop_at_stall: bool) -> str:
+    @property
+    def searched(self) -> float:
+        """Search time of all sessions [s]."""
+        return self.seconds + self.plan.search_seconds
+
+    def _load_kernels(self) -> None:
+        """Load the kernels. Those of a cycle are loaded by one design: evaluating many of them takes seconds."""
+        few = self.problem.space.matrix(self.problem.space.sample(1, 0))
+        is_fast = self.problem.task.cycle is None and self.problem.tolerance == 0.0
+        self.problem.evaluate_matrix(np.repeat(few, MANY_ARMS if is_fast else 1, axis=0))
+
+    def _end_reason(self, stop_at_stall: bool) -> str:
         """Return why the search ends; empty if it goes on."""
-        if budget.is_spent(self.search.evaluations, self.seconds):
+        if not self.search.evaluations:
+            return ""
+        is_late = self.plan.search_left <= 0.0 or self.ended_after >= (self.plan.budget.seconds or math.inf)
+        if self._is_exhausted or is_late:
             return "budget"
-        is_settled = self.search.evaluations and not self.survey.is_open
+        is_settled = not self.survey.is_open
         return "stall" if stop_at_stall and is_settled and self.search.stalled else ""
+
+    @property
+    def _is_exhausted(self) -> bool:
+        """True if no evaluations are left in the budget."""
+        return self.search.evaluations >= (self.plan.budget.evaluations or math.inf)
+
+    def _state(self) -> dict[str, Any]:
+        """Return what a later session needs."""
+        times = {"seconds": self.searched, "spent": self.plan.spent, "ended_after": self.ended_after}
+        state = {**times, "infeasible": self.infeasible, **self.tally.state()}
+        return {**state, **self.survey.state(), **self.search.state()}
+
+    def _report(self, evaluated: int) -> None:
+        """Report the progress; evaluated: designs of the generation that is being evaluated."""
+        if self.watch is None:
+            return
+        search, plan = self.search, self.plan
+        self.watch(
+            SearchProgress(
+                evaluations=search.evaluations + evaluated,
+                seconds=self.searched,
+                hypervolume=search.hypervolume,
+                front_size=len(search.matrix),
+                budget=plan.budget,
+                seconds_left=max(0.0, plan.search_left),
+                new_evaluations=search.evaluations + evaluated - self.resumed,
+                new_seconds=plan.search_seconds,
+            )
+        )
 
     def _save(self, state: Mapping[str, Any]) -> None:
         if self.folder is None:
@@ -175,6 +230,11 @@ class _DirectSearch:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as state:
                 self.search.restore(state)
                 self.seconds = float(state["seconds"])
+                self.ended_after = float(state["ended_after"])
+                self.resumed = self.search.evaluations
+                # The results of an extended search take part of the budget that ended it.
+                is_extended = self.ended_after < (self.plan.budget.seconds or math.inf)
+                self.plan.earlier = max(float(state["spent"]), self.ended_after * is_extended)
                 self.infeasible = int(state["infeasible"])
                 self.tally.restore(state)
                 self.survey.restore(state)
@@ -184,37 +244,62 @@ class _DirectSearch:
             ) from fault
 
     def _evaluate(self, matrix: Array) -> Array:
-        """Return the (N, M) objective values of designs; penalties for infeasible ones."""
-        outcomes = self.problem.evaluate_matrix(matrix)
-        values = outcomes.penalised
-        self.tally.add(outcomes.violations)
-        self.survey.add(outcomes)
+        """Return the (N, M) objective values of designs, penalties for infeasible ones.
+
+        If the time is up, the last designs are left out.
+        """
+        parts: list[Array] = []
+        done = 0
+        while done < len(matrix) and (not done or self.plan.search_left > 0.0):
+            if done:
+                self._report(done)
+            chunk, started = matrix[done : done + self.chunk_size.value], self.plan.elapsed
+            outcomes = self.problem.evaluate_matrix(chunk)
+            self.chunk_size.adapt(len(chunk), self.plan.elapsed - started)
+            parts.append(outcomes.penalised)
+            done += len(chunk)
+            self.tally.add(outcomes.violations)
+            self.survey.add(outcomes)
+        values = np.vstack(parts)
         self.infeasible += int(np.any(values >= PENALTY, axis=1).sum())
         return values
 
-    def _finish(self, ended: str, resumed: int) -> FrontRun:
+    def _finish(self, ended: str, seconds: float) -> FrontRun:
+        """Write the results; seconds: search time of all sessions."""
         self._settle_reference_point()
-        trials = self._front_trials()
+        stored = None if self.folder is None else read_summary(self.folder.path)
+        trials = self._front_trials(self._affordable_designs() if stored is None else stored["n_trials"])
         history = History(self.problem, trials, 0, self.config.reference_point)
         statistics = {
             "evaluations": self.search.evaluations,
             **({"infeasible": self.infeasible} if self.problem.constraints else {}),
-            "seconds": round(self.seconds, 3),
+            "seconds": round(seconds, 3),
             "ended_by": ended,
             "reference_point_from": self.survey.origins,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
-        values = self.search.values
+
+        def summarize(verification: Verification | None) -> dict[str, Any]:
+            values, after = self.search.values, len(trials) * files_seconds(self.problem.task)
+            return summarize_front(
+                history,
+                self.config,
+                values,
+                statistics,
+                verification,
+                self.tally,
+                lambda n: self.plan.has_time_to_simulate(n, after),
+            )
+
         if self.folder is None:
-            summary = summarize_front(history, self.config, values, statistics, None, self.tally)
-            return FrontRun(history, self.config, summary, None, resumed)
+            return FrontRun(history, self.config, summarize(None), None, self.resumed)
         summary = complete_summary(self.folder.path, history)
         if summary is None or summary.get("search", {}).get("ended_by") != ended:
             self.folder.replace_trials(trials)
             verification = verify_front(history)
-            summary = summarize_front(history, self.config, values, statistics, verification, self.tally)
+            summary = summarize(verification)
             write_results(self.folder, history, summary, verification)
-        return FrontRun(history, self.config, summary, self.folder.path, resumed)
+        return FrontRun(history, self.config, summary, self.folder.path, self.resumed)
 
     def _settle_reference_point(self) -> None:
         """Store the reference point that the task leaves open; a longer search may still find another."""
@@ -226,9 +311,35 @@ class _DirectSearch:
         if point != self.survey.point:
             self.search.move_reference_point(point)
 
-    def _front_trials(self) -> list[FinishedTrial]:
-        """Return the best designs of the front as trials."""
-        kept = self.search.best(MAX_DESIGNS)
+    def _affordable_designs(self) -> int:
+        """Return how many designs of the front there is time to verify and write."""
+        if self.plan.costs is None and self.plan.budget.seconds is not None:
+            self.plan.costs = self._measure_costs()
+        return self.plan.n_designs
+
+    def _measure_costs(self) -> ResultCosts:
+        """Measure what results cost, on some of the best designs, feasible or not."""
+        reference_point = self.survey.best_point()
+
+        def verify_best(n: int) -> tuple[History, float]:
+            started = self.plan.elapsed
+            history = History(self.problem, self._front_trials(n), 0, reference_point)
+            if self.folder is not None:  # otherwise nothing is verified
+                verify(self.problem, [trial.design for trial in history], history.values, reference_point)
+            return history, (self.plan.elapsed - started) / len(history)
+
+        history, seconds = verify_best(1)
+        if not self.plan.is_notable(seconds):  # most of it may be the loading of kernels in float64
+            history, seconds = verify_best(N_MEASURED)
+        started = self.plan.elapsed
+        if self.problem.task.cycle is not None:
+            with suppress(MissingExtraError, SettingsError):  # such designs are not simulated later, either
+                Simulator(history)(0)
+        return ResultCosts(seconds + files_seconds(self.problem.task), self.plan.elapsed - started)
+
+    def _front_trials(self, n: int) -> list[FinishedTrial]:
+        """Return at most n of the best designs of the front as trials."""
+        kept = self.search.best(n)
         matrix, values = self.search.matrix[kept], self.search.values[kept]
         violations = np.empty((len(matrix), 0))
         if self.problem.constraints:  # the search knows penalised values only

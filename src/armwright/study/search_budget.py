@@ -1,22 +1,24 @@
 """Budget and progress of a direct search."""
 
+import math
 import re
 from dataclasses import dataclass
 
 from armwright.exceptions import SettingsError
 
 MAX_BUDGET = 10**12
-_BUDGET = re.compile(r"(\d+(?:\.\d+)?(?:e\d+)?)(s|min|h)?")
-_SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+DEFAULT_BUDGET = "30s"
+_TIME = re.compile(r"(\d+(?:\.\d+)?(?:e\d+)?)(s|min|h)?")
+_SECONDS = {None: 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 @dataclass(frozen=True)
 class SearchBudget:
-    """What a search may spend in all its sessions together.
+    """What a search may spend in all its sessions together; whichever limit is reached first ends it.
 
     Attributes:
-        evaluations: number of evaluations; None for no limit.
-        seconds: search time [s]; None for no limit.
+        evaluations: number of evaluations, which the last batch may exceed; None for no limit.
+        seconds: wall-clock time, with verification, files and figures [s]; None for no limit.
     """
 
     evaluations: int | None = None
@@ -25,23 +27,29 @@ class SearchBudget:
     def __post_init__(self) -> None:
         for name, bound in (("evaluations", self.evaluations), ("seconds", self.seconds)):
             if bound is not None and not 0.0 < bound <= MAX_BUDGET:
-                raise SettingsError(f"a budget of {bound} {name}: above 0 and at most {MAX_BUDGET:g}")
+                raise SettingsError(f"a budget of {bound} {name}: expected above 0 and at most {MAX_BUDGET:g}")
 
     @classmethod
-    def parse(cls, text: str) -> "SearchBudget":
-        """Return the budget of `5s`, `2min`, `1h`, or of a number of evaluations such as `100000` or `1e6`."""
-        match = _BUDGET.fullmatch(text.strip().replace("_", ""))
-        amount = float(match[1]) if match else 0.0
-        if match is None or not 0.0 < amount <= MAX_BUDGET or (match[2] is None and amount != int(amount)):
-            raise SettingsError(
-                f'budget = "{text}" is neither a time above 0 (5s, 2min, 1h) nor a number of evaluations (100000, 1e6)'
-            )
-        return cls(evaluations=int(amount)) if match[2] is None else cls(seconds=amount * _SECONDS[match[2]])
+    def of(cls, budget: str | float | None = None, evaluations: int | None = None) -> "SearchBudget":
+        """Return the budget of a time such as `60s`, `5min`, `1h` or a number of seconds, and of evaluations.
 
-    def is_spent(self, evaluations: int, seconds: float) -> bool:
-        """Return whether one of the limits is reached."""
-        bounds = ((evaluations, self.evaluations), (seconds, self.seconds))
-        return any(bound is not None and spent >= bound for spent, bound in bounds)
+        Without either, the time is 30 s. With evaluations alone, it is not limited.
+        """
+        if budget is None and evaluations is not None:
+            return cls(evaluations=evaluations)
+        return cls(evaluations, read_seconds(DEFAULT_BUDGET if budget is None else budget))
+
+
+def read_seconds(budget: str | float) -> float:
+    """Return the seconds of `60s`, `5min`, `1h`, or of a number of seconds."""
+    match = _TIME.fullmatch(str(budget).strip().replace("_", ""))
+    seconds = float(match[1]) * _SECONDS[match[2]] if match else 0.0
+    if not 0.0 < seconds <= MAX_BUDGET:
+        raise SettingsError(
+            f'budget = "{budget}" is no time above 0, such as 60s, 5min, 1h, or 60 for seconds; use evaluations '
+            "(--evaluations) for a number of designs"
+        )
+    return seconds
 
 
 @dataclass(frozen=True)
@@ -54,6 +62,9 @@ class SearchProgress:
         hypervolume: hypervolume of the front.
         front_size: designs on the front.
         budget: the budget of the search.
+        seconds_left: search time that the budget leaves [s]; infinite without a limit.
+        new_evaluations: designs evaluated in this session.
+        new_seconds: search time of this session [s].
     """
 
     evaluations: int
@@ -61,3 +72,13 @@ class SearchProgress:
     hypervolume: float
     front_size: int
     budget: SearchBudget
+    seconds_left: float = math.inf
+    new_evaluations: int = 0
+    new_seconds: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Share of the budget that is spent, 0 to 1."""
+        of_evaluations = self.evaluations / (self.budget.evaluations or math.inf)
+        planned = self.seconds + self.seconds_left
+        return min(1.0, max(of_evaluations, self.seconds / planned if planned > 0.0 else 1.0))

@@ -1,0 +1,181 @@
+"""Plan of the wall-clock time of a search: how much for evaluations, and how much for what follows them.
+
+Until the cost of results is measured on designs of the run, a fixed share is reserved for them. Afterwards, the reserve
+is what simulating the recommended designs and verifying up to 300 designs cost. If verification takes more than a
+share of the budget, fewer designs of the front are kept.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from armwright.kinematics.devices import compilation
+from armwright.study.search_budget import SearchBudget
+from armwright.tasks.task import Task
+
+MAX_DESIGNS = 300  # of the front that become trials
+FEW_DESIGNS = 10  # that are verified even if they take more than their share of the budget
+SEARCH_SHARE = 0.3  # of the budget that the search gets at least
+RESULTS_SHARE = 0.2  # of the budget at most, to verify and write designs
+FEW_SHARE = 0.4  # of the budget at most, to verify and write few designs
+NOTABLE_SHARE = 0.02  # of the budget
+LATE_SECONDS = 1.0  # [s] for verifying and writing designs even if the time is up
+SIMULATION_SHARE = 0.15  # of the budget at most
+UNKNOWN_SHARE = 0.3  # of the budget for results whose costs are unknown
+MEASURED_AT = 0.2  # spent share of the budget from which on costs are measured
+DRAWING_SHARE, DRAWING_SECONDS = 0.15, (2.5, 6.0)  # [s]: page and figures
+SIMULATIONS = 9  # three recommended designs, each as it is and with assumed values halved and doubled
+CHUNK_SHARE, CHUNK_SECONDS = 0.02, (0.5, 5.0)  # of the budget between two looks at the clock, and its bounds [s]
+FILES_SECONDS, CYCLE_FILES_SECONDS = 0.004, 0.05  # [s] of a design's files and its part of the page; with a cycle
+SMALLEST_CHUNK, CHUNK_GROWTH = 16, 4  # designs, of which fewer take nearly as long; largest factor to the next chunk
+
+
+@dataclass(frozen=True)
+class ResultCosts:
+    """Measured cost of results.
+
+    Attributes:
+        design: time to verify a design and write its files [s].
+        simulation: time to simulate a design [s].
+    """
+
+    design: float
+    simulation: float = 0.0
+
+
+class TimePlan:
+    """Share out the wall-clock time of a search, without the compilation of kernels.
+
+    Args:
+        budget: the budget.
+        drawing: whether figures and a page follow the search.
+        started: when the time began by the clock; None for now.
+        clock: a clock [s].
+        excluded: returns the time that does not count so far [s].
+
+    Attributes:
+        earlier: time of earlier sessions that counts [s].
+        costs: cost of results; None until measured.
+    """
+
+    def __init__(
+        self,
+        budget: SearchBudget,
+        drawing: bool = False,
+        started: float | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        excluded: Callable[[], float] = lambda: compilation.seconds,
+    ) -> None:
+        self.budget = budget
+        self.earlier = 0.0
+        self.costs: ResultCosts | None = None
+        self._limit = math.inf if budget.seconds is None else budget.seconds
+        least, most = DRAWING_SECONDS
+        self._drawing = min(most, max(least, DRAWING_SHARE * self._limit)) if drawing else 0.0
+        self._clock, self._excluded = clock, excluded
+        self._started = (clock() if started is None else started) - excluded()
+        self._search_started = 0.0
+
+    @property
+    def elapsed(self) -> float:
+        """Time of this session [s]."""
+        return self._clock() - self._started - self._excluded()
+
+    @property
+    def spent(self) -> float:
+        """Time of all sessions [s]."""
+        return self.earlier + self.elapsed
+
+    @property
+    def left(self) -> float:
+        """Time until the budget is spent [s]; infinite without a limit."""
+        return self._limit - self.spent
+
+    @property
+    def left_for_results(self) -> float:
+        """Time until page and figures have to begin [s]."""
+        return self.left - self._drawing
+
+    def begin_search(self) -> None:
+        """Note that the search begins now."""
+        self._search_started = self.elapsed
+
+    @property
+    def search_seconds(self) -> float:
+        """Search time of this session [s]."""
+        return self.elapsed - self._search_started
+
+    @property
+    def search_left(self) -> float:
+        """Time until the search should end [s]; infinite without a limit."""
+        if math.isinf(self._limit):
+            return math.inf
+        at_least = SEARCH_SHARE * (self._limit - self.earlier) - self.search_seconds
+        return max(self.left_for_results - self._reserved, min(at_least, self.left))
+
+    @property
+    def should_measure(self) -> bool:
+        """True if the cost of results is unknown and it is time to measure it."""
+        return self.costs is None and self.spent >= MEASURED_AT * self._limit
+
+    @property
+    def n_designs(self) -> int:
+        """Number of designs of the front that there is time to verify and write."""
+        if math.isinf(self._limit):
+            return MAX_DESIGNS
+        if self.costs is None:
+            return 1
+        seconds = max(self.left_for_results - self._simulations, min(LATE_SECONDS, RESULTS_SHARE * self._limit))
+        affordable = seconds / max(self.costs.design, 1e-9)
+        return int(min(MAX_DESIGNS, max(1.0, affordable)))
+
+    def is_notable(self, seconds: float) -> bool:
+        """Return whether a time is a notable part of the budget."""
+        return seconds > NOTABLE_SHARE * self._limit
+
+    def has_time_to_simulate(self, n: int, after: float) -> bool:
+        """Return whether n simulations fit in before what follows them, page and figures aside, which takes `after`."""
+        return self.costs is None or self.left_for_results - after >= n * self.costs.simulation
+
+    @property
+    def _reserved(self) -> float:
+        """Time for results, without page and figures [s]."""
+        if self.costs is None:
+            return UNKNOWN_SHARE * self._limit
+        all_designs = min(RESULTS_SHARE * self._limit, MAX_DESIGNS * self.costs.design)
+        few_designs = min(FEW_SHARE * self._limit, FEW_DESIGNS * self.costs.design)
+        return self._simulations + max(all_designs, few_designs)
+
+    @property
+    def _simulations(self) -> float:
+        """Time for the simulations of recommended designs [s]."""
+        simulation = 0.0 if self.costs is None else self.costs.simulation
+        return min(SIMULATION_SHARE * self._limit, SIMULATIONS * simulation)
+
+
+def files_seconds(task: Task) -> float:
+    """Return about how long it takes to write the files of a design [s]."""
+    return FILES_SECONDS if task.cycle is None else CYCLE_FILES_SECONDS
+
+
+class ChunkSize:
+    """Number of designs to evaluate between two looks at the clock, found from one chunk to the next.
+
+    Args:
+        budget: the budget of the search.
+
+    Attributes:
+        value: the number of designs.
+        seconds: the time that they should take [s].
+    """
+
+    def __init__(self, budget: SearchBudget) -> None:
+        least, most = CHUNK_SECONDS
+        self.value = SMALLEST_CHUNK
+        self.seconds = min(most, max(least, CHUNK_SHARE * (budget.seconds or math.inf)))
+
+    def adapt(self, designs: int, seconds: float) -> None:
+        """Choose the next size from a chunk and its duration [s]."""
+        affordable = designs * self.seconds / max(seconds, 1e-9)
+        self.value = max(SMALLEST_CHUNK, int(min(affordable, CHUNK_GROWTH * self.value)))

@@ -1,0 +1,242 @@
+"""`armwright design --budget`: a run ends on time. Clocks are injected: no test depends on the machine's speed."""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from armwright.cli.progress import search_progress
+from armwright.exceptions import SettingsError
+from armwright.kinematics.devices import Compilation
+from armwright.problem.problem import Outcomes, Problem
+from armwright.runs.history import History
+from armwright.runs.results import read_summary
+from armwright.runs.verification import Verification
+from armwright.study import front_run
+from armwright.study.front_run import find_front
+from armwright.study.search_budget import SearchBudget, SearchProgress, read_seconds
+from armwright.study.time_plan import ChunkSize, ResultCosts, TimePlan
+from armwright.tasks.catalogue import load_task
+
+PROBLEM = Problem(load_task("target-1"))
+PER_VERIFIED = 35  # evaluations that verifying a design takes, about as with real clocks
+
+
+class Clock:
+    """A clock that only `wait` moves."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def wait(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def plan_of(clock: Clock, drawing: bool = False, **budget: Any) -> TimePlan:
+    return TimePlan(SearchBudget(**budget), drawing, clock=clock, excluded=lambda: 0.0)
+
+
+@pytest.fixture
+def slow_evaluation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Return a function that sets how long evaluating a design takes by the clock; verifying it takes 35 times that."""
+    seconds = 0.0
+    evaluate, verify, verify_front = Problem.evaluate_matrix, front_run.verify, front_run.verify_front
+
+    def slow_evaluate(self: Problem, matrix: Any) -> Outcomes:
+        clock.wait(seconds * len(matrix))
+        return evaluate(self, matrix)
+
+    def slow_verify(problem: Problem, designs: Any, *others: Any) -> Verification:
+        clock.wait(seconds * PER_VERIFIED * len(designs))
+        return verify(problem, designs, *others)
+
+    def slow_verify_front(history: History) -> Verification | None:
+        clock.wait(seconds * PER_VERIFIED * len(history.front))
+        return verify_front(history)
+
+    monkeypatch.setattr(Problem, "evaluate_matrix", slow_evaluate)
+    monkeypatch.setattr(front_run, "verify", slow_verify)
+    monkeypatch.setattr(front_run, "verify_front", slow_verify_front)
+    monkeypatch.setattr(front_run, "MANY_ARMS", 1)
+
+    def set_seconds(value: float) -> None:
+        nonlocal seconds
+        seconds = value
+
+    return set_seconds
+
+
+@pytest.mark.parametrize(
+    ("budget", "seconds"),
+    [("60s", 60.0), ("5min", 300.0), ("1h", 3600.0), ("5", 5.0), (5, 5.0), (0.5, 0.5), ("0.5s", 0.5), ("1_000", 1e3)],
+)
+def test_budgets_are_times(budget: str | float, seconds: float) -> None:
+    assert read_seconds(budget) == seconds
+    assert SearchBudget.of(budget, 7) == SearchBudget(evaluations=7, seconds=seconds)
+
+
+def test_default_budget_is_a_time_unless_evaluations_are_given() -> None:
+    assert SearchBudget.of() == SearchBudget(seconds=30.0)
+    assert SearchBudget.of(evaluations=7) == SearchBudget(evaluations=7)
+
+
+@pytest.mark.parametrize("budget", ["0", "0s", "-5s", "5 parsecs", "", "s", "1e99", "nan", "inf s", "5m", 0, -1.0])
+def test_invalid_budgets_are_refused(budget: str | float) -> None:
+    with pytest.raises(SettingsError, match="budget"):
+        SearchBudget.of(budget)
+
+
+@pytest.mark.parametrize("bounds", [{"evaluations": 0}, {"seconds": -1.0}, {"seconds": float("nan")}])
+def test_budget_must_be_positive(bounds: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError, match="above 0"):
+        SearchBudget(**bounds)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "of_a_design"), [(5.0, 1e-3), (30.0, 0.01), (60.0, 0.02), (60.0, 0.05), (60.0, 0.2), (20.0, 0.1)]
+)
+def test_run_ends_on_time(
+    clock: Clock, slow_evaluation: Callable[[float], None], tmp_path: Path, seconds: float, of_a_design: float
+) -> None:
+    slow_evaluation(of_a_design)
+    started = clock.now
+    run = find_front(PROBLEM, budget=plan_of(clock, seconds=seconds), stop_at_stall=False, out=tmp_path / "run")
+    spent = clock.now - started
+    assert spent <= seconds + max(3.0, 0.1 * seconds)
+    assert spent >= 0.5 * seconds  # it is used
+    summary = read_summary(tmp_path / "run")
+    assert summary is not None
+    assert summary["search"]["ended_by"] == "budget"
+    assert summary["verification"]["robust"] + summary["verification"]["sensitive"] == len(run.front) > 0
+    # The same command computes nothing again; a larger budget goes on, within what it adds.
+    before, file = clock.now, (tmp_path / "run" / "summary.json").stat().st_mtime_ns
+    again = find_front(PROBLEM, budget=plan_of(clock, seconds=seconds), stop_at_stall=False, out=tmp_path / "run")
+    assert clock.now - before <= of_a_design * (1 + len(run.front))
+    assert (tmp_path / "run" / "summary.json").stat().st_mtime_ns == file
+    assert again.resumed == summary["search"]["evaluations"]
+    before = clock.now
+    more = find_front(PROBLEM, budget=plan_of(clock, seconds=2 * seconds), stop_at_stall=False, out=tmp_path / "run")
+    assert clock.now - before <= seconds + max(3.0, 0.2 * seconds)
+    assert more.summary["search"]["evaluations"] > more.resumed == again.resumed
+
+
+def test_evaluations_do_not_depend_on_the_clock(
+    clock: Clock, slow_evaluation: Callable[[float], None], tmp_path: Path
+) -> None:
+    quick = find_front(PROBLEM, evaluations=700, seed=3)
+    slow_evaluation(0.2)  # chunks of 25 designs
+    slow = find_front(PROBLEM, budget=plan_of(clock, evaluations=700), seed=3, out=tmp_path / "run")
+    assert np.array_equal(slow.history.values, quick.history.values)
+    assert slow.summary["search"]["evaluations"] == quick.summary["search"]["evaluations"]
+
+
+def test_whichever_limit_comes_first_ends_the_search(clock: Clock, slow_evaluation: Callable[[float], None]) -> None:
+    slow_evaluation(0.01)
+    by_time = find_front(PROBLEM, budget=plan_of(clock, seconds=10.0, evaluations=10**6))
+    assert by_time.summary["search"]["evaluations"] < 1000
+    by_evaluations = find_front(PROBLEM, budget=plan_of(clock, seconds=1e6, evaluations=100))
+    assert 100 <= by_evaluations.summary["search"]["evaluations"] <= 1100
+
+
+def test_compilation_does_not_count() -> None:
+    clock, compiled = Clock(), [4.0]
+    plan = TimePlan(SearchBudget(seconds=10.0), clock=clock, excluded=lambda: compiled[0])
+    clock.wait(9.0)
+    compiled[0] += 8.0
+    assert plan.elapsed == pytest.approx(1.0)
+    assert plan.left == pytest.approx(9.0)
+
+
+def test_compilation_is_announced_once() -> None:
+    compilation, announced = Compilation(), list[str]()
+    compilation.announce = lambda: announced.append("compiling")
+    for _ in range(2):
+        with compilation.timed():
+            assert announced == ["compiling"]
+    assert compilation.seconds >= 0.0
+
+
+def test_expensive_results_leave_fewer_designs_and_less_search(clock: Clock) -> None:
+    plan = plan_of(clock, drawing=True, seconds=60.0)
+    plan.begin_search()
+    left, kept = list[float](), list[int]()
+    for design in (1e-4, 0.01, 0.1, 1.0):
+        plan.costs = ResultCosts(design)
+        left.append(plan.search_left)
+        clock.wait(left[-1])
+        kept.append(plan.n_designs)
+        clock.wait(-left[-1])
+    assert left == sorted(left, reverse=True)
+    assert kept == [300, 300, 120, 12]
+    plan.costs = ResultCosts(0.01, simulation=0.5)
+    assert plan.search_left == pytest.approx(left[1] - 9 * 0.5)
+
+
+def test_simulations_need_time(clock: Clock) -> None:
+    plan = plan_of(clock, drawing=True, seconds=60.0)
+    plan.costs = ResultCosts(0.01, simulation=2.0)
+    assert plan.has_time_to_simulate(9, after=10.0)
+    clock.wait(43.0)
+    assert plan.has_time_to_simulate(1, after=0.0)
+    assert not plan.has_time_to_simulate(1, after=10.0)
+    assert plan_of(clock, evaluations=5).has_time_to_simulate(10**9, after=1e9)
+
+
+@pytest.mark.parametrize("seconds", [1e-6, 1e-3, 0.02])
+def test_chunks_take_a_small_share_of_the_budget(seconds: float) -> None:
+    size = ChunkSize(SearchBudget(seconds=100.0))
+    for _ in range(30):
+        size.adapt(size.value, seconds * size.value)
+        assert size.value * seconds <= 2.0
+    assert size.value * seconds == pytest.approx(2.0, rel=0.01)
+
+
+def test_chunks_of_slow_designs_are_not_too_small() -> None:
+    size = ChunkSize(SearchBudget(seconds=5.0))
+    size.adapt(size.value, 60.0)
+    assert size.value == 16
+
+
+def shown(*progress: SearchProgress) -> list[str]:
+    console = Console(file=io.StringIO(), width=200)
+    with search_progress(console) as watch:
+        for one in progress:
+            watch(one)
+    assert isinstance(console.file, io.StringIO)
+    return [line for line in console.file.getvalue().splitlines() if "designs/s" in line]
+
+
+def test_rate_is_shown_once_after_a_second_of_search() -> None:
+    budget = SearchBudget(seconds=150.0)
+    early = SearchProgress(100, 0.5, 0.0, 1, budget, 119.5, 100, 0.5)
+    first = SearchProgress(403, 1.0, 0.0, 1, budget, 119.0, 403, 1.0)
+    later = SearchProgress(900, 2.0, 0.0, 1, budget, 118.0, 900, 2.0)
+    assert shown(early) == []
+    assert shown(early, first, later) == ["about 400 designs/s: 48,000 designs in 2 min"]
+
+
+@pytest.mark.parametrize(
+    ("progress", "line"),
+    [
+        (SearchProgress(2_000, 2.0, 0.0, 1, SearchBudget(evaluations=9_000), new_evaluations=2_000, new_seconds=2.0),
+         "about 1,000 designs/s: 9,000 designs in 9 s"),
+        (SearchProgress(3, 2.0, 0.0, 1, SearchBudget(seconds=9_000.0), 7_198.0, 3, 2.0),
+         "about 1.5 designs/s: 11,000 designs in 2 h"),
+        (SearchProgress(50_500, 11.0, 0.0, 1, SearchBudget(seconds=30.0), 9.0, 500, 1.0),
+         "about 500 designs/s: 55,000 designs in 20 s"),
+    ],
+)  # fmt: skip
+def test_rate_counts_what_the_budget_allows(progress: SearchProgress, line: str) -> None:
+    assert shown(progress) == [line]
