@@ -32,6 +32,21 @@ def test_figures_are_written_as_png_and_pdf(tmp_path: Path) -> None:
         assert path.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
+def test_figures_of_single_designs_need_time(tmp_path: Path) -> None:
+    short(tmp_path, Problem(load_task("target-2")))
+    asked: list[float] = []
+
+    def has_time_for_one(seconds: float) -> bool:
+        asked.append(seconds)
+        return len(asked) <= 1
+
+    names = {path.name for path in write_figures(tmp_path, has_time_for_one)}
+    assert {"front.png", "arms.png"} <= names
+    assert sum(name.startswith("arm-") for name in names) == 1
+    assert all(seconds > 0.0 for seconds in asked)
+
+
 @pytest.mark.parametrize(
     "task",
     [

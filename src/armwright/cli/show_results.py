@@ -25,6 +25,7 @@ from armwright.runs.supply_record import supply_of
 from armwright.study.front_run import FrontRun
 from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
+from armwright.study.time_plan import MAX_DESIGNS
 
 SHORT_NAMES = {POSITION_ERROR: "error [m]", TORQUE: "torque"}
 MAX_ROWS = 16  # of the front; front.csv has all
@@ -83,6 +84,10 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     reason = {"budget": "budget spent", "stall": "hypervolume stalled"}[search["ended_by"]]
     infeasible = f", {search['infeasible']:,} infeasible," if run.history.problem.constraints else ""
     console.print(f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}")
+    if summary["n_trials"] < min(search["found"], MAX_DESIGNS):
+        console.print(
+            f"{summary['n_trials']} of the front's {search['found']} designs are kept: there was no time to verify more"
+        )
     console.print(run.history.problem.space.mass_note)
     _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))

@@ -110,6 +110,7 @@ class _Search(_Record):
     evaluations: Count
     seconds: float
     ended_by: Literal["budget", "stall"]
+    found: Count
     hypervolume_history: Annotated[list[_Point], Field(min_length=1)]
     infeasible: Count = 0
     reference_point_from: list[str]

@@ -149,6 +149,7 @@ class _DirectSearch:
                 self.search.tell(matrix[: len(values)], values)
                 if self.survey.close():
                     self.search.move_reference_point(self.survey.point)
+                self.plan.n_found = len(self.search.matrix)
                 if self.plan.should_measure:
                     self.plan.costs = self._measure_costs()
                 state = self._state()
@@ -275,6 +276,7 @@ class _DirectSearch:
             **({"infeasible": self.infeasible} if self.problem.constraints else {}),
             "seconds": round(seconds, 3),
             "ended_by": ended,
+            "found": len(self.search.matrix),
             "reference_point_from": self.survey.origins,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }

@@ -1,8 +1,8 @@
 """Plan of the wall-clock time of a search: how much for evaluations, and how much for what follows them.
 
 Until the cost of results is measured on designs of the run, a fixed share is reserved for them. Afterwards, the reserve
-is what simulating the recommended designs and verifying up to 300 designs cost. If verification takes more than a
-share of the budget, fewer designs of the front are kept.
+is what simulating the recommended designs and verifying the front, at most 300 designs, cost. If verification takes
+more than a share of the budget, fewer designs of the front are kept.
 """
 
 import math
@@ -57,6 +57,7 @@ class TimePlan:
     Attributes:
         earlier: time of earlier sessions that counts [s].
         costs: cost of results; None until measured.
+        n_found: designs on the front.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class TimePlan:
         self.budget = budget
         self.earlier = 0.0
         self.costs: ResultCosts | None = None
+        self.n_found = MAX_DESIGNS
         self._limit = math.inf if budget.seconds is None else budget.seconds
         least, most = DRAWING_SECONDS
         self._drawing = min(most, max(least, DRAWING_SHARE * self._limit)) if drawing else 0.0
@@ -143,7 +145,8 @@ class TimePlan:
         """Time for results, without page and figures [s]."""
         if self.costs is None:
             return UNKNOWN_SHARE * self._limit
-        all_designs = min(RESULTS_SHARE * self._limit, MAX_DESIGNS * self.costs.design)
+        n_designs = max(FEW_DESIGNS, min(MAX_DESIGNS, self.n_found))
+        all_designs = min(RESULTS_SHARE * self._limit, n_designs * self.costs.design)
         few_designs = min(FEW_SHARE * self._limit, FEW_DESIGNS * self.costs.design)
         return self._simulations + max(all_designs, few_designs)
 
