@@ -240,3 +240,16 @@ def test_rate_is_shown_once_after_a_second_of_search() -> None:
 )  # fmt: skip
 def test_rate_counts_what_the_budget_allows(progress: SearchProgress, line: str) -> None:
     assert shown(progress) == [line]
+
+
+def test_cost_of_simulations_is_measured_once_a_design_is_feasible(clock: Clock) -> None:
+    plan = plan_of(clock, seconds=100.0)
+    assert not plan.should_measure(is_feasible=True)
+    clock.wait(20.0)
+    assert plan.should_measure(is_feasible=False)
+    plan.costs = ResultCosts(0.01)
+    assert not plan.should_measure(is_feasible=False)
+    assert plan.should_measure(is_feasible=True)
+    plan.costs = ResultCosts(0.01, 0.0)
+    assert not plan.should_measure(is_feasible=True)
+    assert not plan_of(clock, evaluations=5).should_measure(is_feasible=True)

@@ -150,7 +150,7 @@ class _DirectSearch:
                 if self.survey.close():
                     self.search.move_reference_point(self.survey.point)
                 self.plan.n_found = len(self.search.matrix)
-                if self.plan.should_measure:
+                if self.plan.should_measure(bool(np.any(np.all(self.search.values < PENALTY, axis=1)))):
                     self.plan.costs = self._measure_costs()
                 state = self._state()
                 if time.monotonic() - saved >= SAVE_SECONDS:
@@ -320,7 +320,10 @@ class _DirectSearch:
         return self.plan.n_designs
 
     def _measure_costs(self) -> ResultCosts:
-        """Measure what results cost, on some of the best designs, feasible or not."""
+        """Measure what results cost, on some of the best designs.
+
+        Infeasible designs are verified as well, but never simulated: their cycle may take days.
+        """
         reference_point = self.survey.best_point()
 
         def verify_best(n: int) -> tuple[History, float]:
@@ -333,11 +336,14 @@ class _DirectSearch:
         history, seconds = verify_best(1)
         if not self.plan.is_notable(seconds):  # most of it may be the loading of kernels in float64
             history, seconds = verify_best(N_MEASURED)
+        design = seconds + files_seconds(self.problem.task)
+        if not history.front:
+            return ResultCosts(design)
         started = self.plan.elapsed
         if self.problem.task.cycle is not None:
             with suppress(MissingExtraError, SettingsError):  # such designs are not simulated later, either
-                Simulator(history)(0)
-        return ResultCosts(seconds + files_seconds(self.problem.task), self.plan.elapsed - started)
+                Simulator(history)(history.front[0].number)
+        return ResultCosts(design, self.plan.elapsed - started)
 
     def _front_trials(self, n: int) -> list[FinishedTrial]:
         """Return at most n of the best designs of the front as trials."""

@@ -37,11 +37,11 @@ class ResultCosts:
 
     Attributes:
         design: time to verify a design and write its files [s].
-        simulation: time to simulate a design [s].
+        simulation: time to simulate a design [s]; None while none is feasible.
     """
 
     design: float
-    simulation: float = 0.0
+    simulation: float | None = None
 
 
 class TimePlan:
@@ -116,10 +116,10 @@ class TimePlan:
         at_least = SEARCH_SHARE * (self._limit - self.earlier) - self.search_seconds
         return max(self.left_for_results - self._reserved, min(at_least, self.left))
 
-    @property
-    def should_measure(self) -> bool:
-        """True if the cost of results is unknown and it is time to measure it."""
-        return self.costs is None and self.spent >= MEASURED_AT * self._limit
+    def should_measure(self, is_feasible: bool) -> bool:
+        """Return whether it is time to measure the cost of results; is_feasible: whether a design is feasible."""
+        is_open = self.costs is None or (is_feasible and self.costs.simulation is None)
+        return is_open and self.spent >= MEASURED_AT * self._limit
 
     @property
     def n_designs(self) -> int:
@@ -138,7 +138,7 @@ class TimePlan:
 
     def has_time_to_simulate(self, n: int, after: float) -> bool:
         """Return whether n simulations fit in before what follows them, page and figures aside, which takes `after`."""
-        return self.costs is None or self.left_for_results - after >= n * self.costs.simulation
+        return self.left_for_results - after >= n * self._simulation
 
     @property
     def _reserved(self) -> float:
@@ -153,8 +153,12 @@ class TimePlan:
     @property
     def _simulations(self) -> float:
         """Time for the simulations of recommended designs [s]."""
-        simulation = 0.0 if self.costs is None else self.costs.simulation
-        return min(SIMULATION_SHARE * self._limit, SIMULATIONS * simulation)
+        return min(SIMULATION_SHARE * self._limit, SIMULATIONS * self._simulation)
+
+    @property
+    def _simulation(self) -> float:
+        """Time of a simulation, as far as it is known [s]."""
+        return (self.costs.simulation if self.costs is not None else None) or 0.0
 
 
 def files_seconds(task: Task) -> float:
