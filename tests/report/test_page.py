@@ -113,6 +113,14 @@ def test_front_outside_the_reference_box_is_shown(tmp_path: Path, tab: Tab) -> N
     assert tab.text("#repeat code").startswith("armwright optimize TASK.yaml ")
 
 
+def test_axes_fit_the_designs_if_the_reference_point_is_far(tmp_path: Path, tab: Tab) -> None:
+    task = aw.load_task("target-1").model_copy(update={"name": "far", "reference_point": (900.0, 9000.0)})
+    run = aw.optimize(aw.Problem(task=task), proposer="none", n_init=4, n_total=6, out=tmp_path / "run")
+    tab.open(write_report(tmp_path / "run"))
+    high = tab.ask("[pareto.layout.xaxis.range[1], pareto.layout.yaxis.range[1]]")
+    assert high == pytest.approx((1.1 * run.history.values.max(axis=0)).tolist(), rel=1e-3)
+
+
 def test_content_security_policy_allows_own_scripts_only(run: Path, tab: Tab) -> None:
     tab.open(run / "report.html")
     text = (run / "report.html").read_text()

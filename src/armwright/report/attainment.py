@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.experiments.compare_runs import Comparison
 from armwright.experiments.run_summary import RunSummary
 from armwright.pareto import front_indices
-from armwright.report.drawing import frame_plane, front_steps, legend_below, method_handle, one_panel
+from armwright.report.drawing import frame_plane, front_steps, legend_below, method_handle, one_panel, plane_limits
 from armwright.report.style import line
 
 
@@ -31,7 +31,9 @@ def draw_attainment(comparison: Comparison, task: str) -> Figure:
         axes.fill_between(grid, low, high, step="post", color=style.colour, alpha=0.13, linewidth=0)
         axes.step(*median, where="post", **style.curve)
         handles.append(method_handle(comparison, method, with_marker=False))
-    frame_plane(axes, comparison.first_run(task).config.problem, reference, 1.1)
+    fronts = [_front(run) for run in comparison.runs if run.task == task]
+    limits = plane_limits(np.vstack(fronts), reference, 1.1)
+    frame_plane(axes, comparison.first_run(task).config.problem, reference, limits)
     axes.set_title(f"{task}: attained by half of the runs (lines), by one and by all (areas)")
     legend_below(figure, handles)
     return figure

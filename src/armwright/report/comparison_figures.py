@@ -150,7 +150,8 @@ def draw_area(comparison: Comparison) -> Figure:
         draw_dominated(axes, inside, run.reference_point, label="area measured", **fill)
         axes.scatter(*inside.T, s=34, color=MISSED, edgecolors="white", linewidths=0.5, zorder=4, label="Pareto front")
     axes.annotate("reference point", reference[:2], xytext=(-4, 5), textcoords="offset points", ha="right")
-    frame_plane(axes, history.problem, run.reference_point, 1.15)
+    limits = np.column_stack([np.zeros(2), 1.15 * reference[:2]])  # the area reaches to the reference point
+    frame_plane(axes, history.problem, run.reference_point, limits)
     area = hypervolume(masked, run.reference_point)
     axes.set_title(f"{run.task}, {run.method}, seed {run.seed}: E_hv = {area:.2f}")
     axes.legend(loc="lower left")

@@ -13,10 +13,14 @@ from matplotlib.lines import Line2D
 from armwright.arrays import Array
 from armwright.experiments.compare_runs import Comparison
 from armwright.files import naming_write_errors, replace_folder
+from armwright.pareto import front_mask
 from armwright.problem.objectives import TORQUE
 from armwright.problem.problem import Problem
 from armwright.report.style import FRONT, RC, line
 
+FAR_REFERENCE = 2.0  # times the largest value; a reference point beyond is not drawn
+FITTED = 1.1  # upper limit of such an axis, as a multiple of the largest value
+SIMILAR = 0.5  # share of the upper limit; if all values are above, the axis begins near them
 LEGEND_MARK, LEGEND_LETTER = 0.5, 0.06  # widths [inch]
 
 
@@ -31,7 +35,30 @@ def several_panels(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], shown: float) -> None:
+def plane_limits(values: Array, reference: Sequence[float], shown: float) -> Array:
+    """Return the limits (2, 2) of a plane of two objectives: low and high of each.
+
+    The plane reaches beyond the reference point, but only beyond the largest value if the reference point is more than
+    twice as far. It begins at 0, or near the smallest value if all values within the reference point are similar.
+
+    Args:
+        values: (N, 2) designs to show: those nearer than the limits, else their front.
+        reference: The reference point.
+        shown: Upper limits of the axes, as a multiple of the reference point.
+    """
+    point = np.asarray(reference[:2])
+    within = values[np.all(values <= shown * point, axis=1)]
+    values = within if len(within) else values[front_mask(values)]
+    if not len(values):
+        return np.column_stack([np.zeros(2), shown * point])
+    best, worst = values.min(axis=0), values.max(axis=0)
+    is_far = (worst > 0.0) & (point > FAR_REFERENCE * worst)
+    high = np.where(is_far, FITTED * worst, shown * (point if len(within) else np.maximum(point, worst)))
+    low = np.where((best > SIMILAR * high) & (best < point), best - (FITTED - 1.0) * (high - best), 0.0)
+    return np.column_stack([low, high])
+
+
+def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], limits: Array) -> None:
     """Label a plane of the first two objectives, mark its reference point and set its limits.
 
     Torques of toy masses are marked as such.
@@ -39,15 +66,16 @@ def frame_plane(axes: Any, problem: Problem, reference: Sequence[float], shown: 
     Args:
         axes: The plane.
         problem: The problem with these objectives.
-        reference: The reference point.
-        shown: Upper limits of the axes, as a multiple of the reference point.
+        reference: The reference point; marked if it lies within the limits.
+        limits: (2, 2) low and high of each axis.
     """
     for i, axis in enumerate("xy"):
         objective = problem.objectives[i]
         toy = "; toy masses" if objective.name == TORQUE.name and problem.space.is_toy else ""
         label = f"{objective.label} [{objective.unit.replace(' x ', ' × ')}{toy}]"
-        axes.set(**{f"{axis}label": label, f"{axis}lim": (0, shown * reference[i])})
-    axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
+        axes.set(**{f"{axis}label": label, f"{axis}lim": tuple(limits[i])})
+    if np.all(np.asarray(reference[:2]) <= limits[:, 1]):
+        axes.plot(*reference[:2], marker="+", color=FRONT, markersize=9, clip_on=False)
 
 
 def draw_dominated(axes: Any, front: Array, reference: Sequence[float], **fill: Any) -> None:

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.experiments.compare_arms import ComparedArm, read_existing_arms
 from armwright.pareto import front_indices, hypervolume, knee_index, paper_solution_indices
@@ -20,6 +21,7 @@ from armwright.report.drawing import (
     frame_plane,
     legend_mark,
     one_panel,
+    plane_limits,
     several_panels,
     write_drawn,
 )
@@ -151,12 +153,12 @@ def draw_samples(history: History) -> Figure:
     """Draw all trials after 5, 35, 65 and 100 % of the counted ones, coloured by source, with the front."""
     figure = several_panels(10.4, 3.4)
     panels: Sequence[Any] = figure.subplots(1, len(SAMPLE_SHARES), sharex=True, sharey=True)
-    counted = len(history) - history.n_init
+    counted, limits = len(history) - history.n_init, _limits(history)
     shown = sorted({max(1, round(share * counted)) for share in SAMPLE_SHARES}) if counted > 0 else [0]
     for axes, iteration in zip(panels, shown, strict=False):
         part = History(history.problem, history.trials[: history.n_init + iteration], history.n_init)
-        _scatter(axes, part, _reference(history))
-        beyond = int(np.sum(np.any(part.values[:, :2] > SHOWN * np.asarray(_reference(history)[:2]), axis=1)))
+        _scatter(axes, part, _reference(history), limits)
+        beyond = int(np.sum(np.any(part.values[:, :2] > limits[:, 1], axis=1)))
         axes.set_title(f"After {iteration} iterations" + (f"\n({beyond} designs outside the view)" if beyond else ""))
         axes.label_outer()
     for axes in panels[len(shown) :]:
@@ -185,8 +187,8 @@ def draw_attribution(history: History) -> Figure:
 def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure:
     """Draw the final front by source, with the chosen designs labelled and existing arms for comparison."""
     figure, axes = one_panel(5.2, 4.2)
-    reference = _reference(history)
-    _scatter(axes, history, reference, alpha=0.25)
+    reference, limits = _reference(history), _limits(history)
+    _scatter(axes, history, reference, limits, alpha=0.25)
     for member in history.front:
         style = look(member.source)
         axes.scatter(*member.values[:2], **style.points | {"s": 1.6 * style.size}, zorder=4)
@@ -197,23 +199,23 @@ def draw_front(history: History, existing: Sequence[ComparedArm] = ()) -> Figure
             "#AAAAAA",
         )
         for title, m in chosen_members(history)
-        if np.all(np.array(m.values[:2]) <= SHOWN * np.array(reference[:2]))
+        if np.all(np.array(m.values[:2]) <= limits[:, 1])
     ]
-    arms = _draw_existing(axes, reference, existing)
+    arms = _draw_existing(axes, limits[:, 1], existing)
     axes.legend(handles=[*_legend(history), *([_mark(EXISTING)] if arms else [])], loc="upper right")
     area = hypervolume(history.masked_objectives, reference)
     axes.set_title(f"{history.problem.task.name}: {len(history.front)} designs on the front, hypervolume {area:.2f}")
     marks = [(reference[0], reference[1]), *((m.values[0], m.values[1]) for m in history.front)]
+    marks = [mark for mark in marks if np.all(np.array(mark) <= limits[:, 1])]
     place_labels(axes, labels + arms, marks)
     return figure
 
 
-def _draw_existing(axes: Any, reference: Sequence[float], existing: Sequence[ComparedArm]) -> list[PointLabel]:
+def _draw_existing(axes: Any, edge: Array, existing: Sequence[ComparedArm]) -> list[PointLabel]:
     """Draw existing arms in the plane of the first two objectives and return their labels.
 
-    An arm outside the drawn part is placed at its edge, with its values in the label.
+    An arm outside the drawn part is placed at its edge (2,), with its values in the label.
     """
-    edge = SHOWN * np.array(reference[:2])
     labels: list[PointLabel] = []
     for arm in existing:
         if None in arm.values[:2]:
@@ -230,7 +232,13 @@ def _short(value: float) -> str:
     return f"{value:,.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
-def _scatter(axes: Any, history: History, reference: Sequence[float], alpha: float = 0.85) -> None:
+def _limits(history: History) -> Array:
+    """Return the drawn part of the plane (2, 2), low and high: where the feasible designs are, if there are any."""
+    feasible = history.values[history.feasible]
+    return plane_limits((feasible if len(feasible) else history.values)[:, :2], _reference(history), SHOWN)
+
+
+def _scatter(axes: Any, history: History, reference: Sequence[float], limits: Array, alpha: float = 0.85) -> None:
     values = history.values
     infeasible = values[~history.feasible]
     axes.scatter(*infeasible.T[:2], s=14, facecolors="none", edgecolors=INFEASIBLE, linewidths=0.7, zorder=2)
@@ -241,7 +249,7 @@ def _scatter(axes: Any, history: History, reference: Sequence[float], alpha: flo
     inside = front[np.all(front < np.asarray(reference), axis=1)]
     if len(inside) and len(reference) == 2:  # more than two objectives have no front line
         draw_dominated(axes, inside, reference, color="#F0E442", alpha=0.18, zorder=0.5)
-    frame_plane(axes, history.problem, reference, SHOWN)
+    frame_plane(axes, history.problem, reference, limits)
     if not len(inside):
         _explain_empty(axes, history)
 

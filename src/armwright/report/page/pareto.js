@@ -5,8 +5,11 @@ import { $, colour, element, isTouched, number, onTheme, plain, plural, title } 
 
 const SYMBOLS = { o: "circle", x: "x-thin", "^": "triangle-up", v: "triangle-down", D: "diamond", s: "square" };
 const VIEW = 1.35; // initial range of the axes, as a multiple of the reference point
-const PRECISE = 0.02; // errors below this share of the reference point count as precise
-const FLOOR = 1e-4; // [m] smaller errors are drawn here on a logarithmic axis
+const FAR = 2; // times the largest value; an axis does not reach to a reference point beyond
+const FITTED = 1.1; // range of such an axis, as a multiple of the largest value
+const SIMILAR = 0.5; // share of the range; if all values are above, the axis begins near them
+const PRECISE = 0.02; // errors below this share of the axis count as precise
+const FLOOR = 1e-4; // [m] smaller errors are drawn here on a logarithmic axis; on a short one, at this share of it
 const DENSE = 100; // from this number of designs on a front, markers have no outlines
 const MARKS = [0.05, 0.35, 0.65, 1]; // shares of the iterations: 10, 70, 130, 200 of 200
 const CONFIG = {
@@ -15,7 +18,7 @@ const CONFIG = {
 };
 
 let content = null;
-let x = 0, y = 1, log = false;
+let x = 0, y = 1, log = false, floor = FLOOR;
 
 export function openPareto(shownContent) {
   content = shownContent;
@@ -62,8 +65,22 @@ export function growPareto() {
 function isPrecise() {
   const reference = content.head.reference_point;
   if (reference === null) return false;
-  const near = insideBox(content.head.front).filter((i) => content.values(i)[0] < PRECISE * reference[0]);
+  const small = PRECISE * Math.min(reference[0], range(0)[1]);
+  const near = insideBox(content.head.front).filter((i) => content.values(i)[0] < small);
   return near.length > content.head.front.length / 4;
+}
+
+// Returns the range of an objective's axis: to beyond the reference point, or to the designs if it is far from all.
+function range(k) {
+  const reference = content.head.reference_point;
+  if (reference === null) return undefined;
+  const all = [...Array(content.n).keys()], feasible = all.filter((i) => content.isFeasible(i));
+  const within = (feasible.length ? feasible : all).filter((i) => [x, y].every((m) => content.values(i)[m] <= VIEW * reference[m]));
+  const shown = within.length ? within : frontUntil(content.n);
+  if (!shown.length) return [0, VIEW * reference[k]];
+  const best = Math.min(...shown.map((i) => content.values(i)[k])), worst = Math.max(...shown.map((i) => content.values(i)[k]));
+  const high = worst > 0 && reference[k] > FAR * worst ? FITTED * worst : VIEW * Math.max(reference[k], within.length ? 0 : worst);
+  return [best > SIMILAR * high && best < reference[k] ? best - (FITTED - 1) * (high - best) : 0, high];
 }
 
 const insideBox = (numbers) => numbers.filter((i) => content.values(i).every((v, k) => v < content.head.reference_point[k]));
@@ -71,7 +88,7 @@ const insideBox = (numbers) => numbers.filter((i) => content.values(i).every((v,
 const isProposer = (source) => source === content.head.config.method.proposer?.name;
 const counted = () => Math.max(0, content.n - content.nInit);
 const until = () => (state.iteration === null ? content.n : content.nInit + state.iteration);
-const placed = (value, axis) => (log && axis === 0 ? Math.max(value, FLOOR) : value);
+const placed = (value, axis) => (log && axis === 0 ? Math.max(value, floor) : value);
 
 // Returns the feasible designs among the first n that are non-dominated in the shown objectives, by rising x.
 export function frontUntil(n) {
@@ -107,6 +124,8 @@ function slider() {
 
 function draw() {
   slider();
+  const ranges = new Map([x, y].map((k) => [k, range(k)])), high = (k) => ranges.get(k)?.[1];
+  floor = FLOOR * Math.min(1, high(x) ?? 1);
   const n = until(), reference = content.head.reference_point, traces = [], many = content.objectives.length > 2;
   const front = frontUntil(n);
   const inside = reference === null ? front
@@ -183,12 +202,10 @@ function draw() {
       marker: { symbol: "cross-thin", size: 12, line: { width: 2, color: colour("ink") } },
     });
   }
-  const worst = (k) => Math.max(...front.map((i) => content.values(i)[k]));
-  const high = (k) => (reference === null ? undefined : VIEW * (inside.length ? reference[k] : Math.max(reference[k], worst(k))));
-  const low = Math.max(FLOOR, Math.min(...inside.map((i) => content.values(i)[x]), high(x) ?? 1));
+  const low = Math.max(floor, Math.min(...inside.map((i) => content.values(i)[x]), high(x) ?? 1));
   const layout = {
-    xaxis: axis(content.objectives[x], log ? [Math.log10(low / 1.5), Math.log10(high(x) ?? 10)] : high(x) && [0, high(x)], log),
-    yaxis: axis(content.objectives[y], high(y) && [0, high(y)], false),
+    xaxis: axis(content.objectives[x], log ? [Math.log10(low / 1.5), Math.log10(high(x) ?? 10)] : ranges.get(x), log),
+    yaxis: axis(content.objectives[y], ranges.get(y), false),
     margin: { l: 58, r: 12, t: 8, b: 46 },
     legend: { orientation: "h", y: -64 / Math.max(100, $("pareto").clientHeight - 54), font: { size: 12 } },
     paper_bgcolor: "transparent", plot_bgcolor: "transparent", font: { color: colour("ink"), size: 13 },
@@ -203,7 +220,7 @@ function draw() {
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
   for (const arm of content.head.existing_arms) notes.push(describeExisting(arm, high));
   if (many) notes.push("Large: on the front in all objectives; other designs may dominate them in this plane.");
-  if (log) notes.push(`Logarithmic: values below ${number(FLOOR)} are drawn at ${number(FLOOR)}.`);
+  if (log) notes.push(`Logarithmic: values below ${number(floor)} are drawn at ${number(floor)}.`);
   if (content.head.is_toy) notes.push("Toy masses: use torques to compare designs, not to choose motors.");
   $("pareto-note").textContent = notes.join(" ");
 }
