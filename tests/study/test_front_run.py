@@ -57,10 +57,10 @@ def test_front_run_writes_summary_and_designs(done: FrontRun) -> None:
     search = summary["search"]
     assert 6000 <= search["evaluations"] <= 6000 + 3000
     assert search["ended_by"] == "budget"
-    # The history and the final value are of all that was found; some designs less are kept.
+    # The history and the final value are of all that was found; designs that differ too little are left out.
     final = summary["hypervolume"]["final"]
     assert search["hypervolume_history"][-1][1] == pytest.approx(final, rel=5e-3)
-    assert 0.995 * final < hypervolume(done.history.values, (5, 5)) <= final
+    assert 0.99 * final < hypervolume(done.history.values, (5, 5)) <= final
     assert summary["front_gap"]["share"] == pytest.approx(final / summary["front_gap"]["hypervolume"])
     _, verified = verify_run(done.folder)
     assert verified == summary

@@ -130,12 +130,13 @@ def load_problem(
     names = () if objectives is None else tuple(name.strip() for name in objectives.split(","))
     chosen = ()
     if measured is not None:
-        # the task's objectives and reference point do not apply to an evaluator's objectives
-        loaded = loaded.model_copy(update={"objectives": None, "reference_point": None})
+        # what the task states of its objectives does not apply to an evaluator's
+        loaded = loaded.model_copy(update={"objectives": None, "reference_point": None, "resolution": ()})
         chosen = named_objectives(names, measured.objectives) if names else measured.objectives
     elif objectives is not None and names != (loaded.objectives or tuple(o.name for o in PAPER_OBJECTIVES)):
         # the task's reference point applies to its own objectives only
-        loaded = loaded.model_copy(update={"objectives": names, "reference_point": None})
+        resolution = tuple(pair for pair in loaded.resolution if pair[0] in names)
+        loaded = loaded.model_copy(update={"objectives": names, "reference_point": None, "resolution": resolution})
     return Problem(
         loaded,
         default_space(loaded.name) if space is None else load_space(space),

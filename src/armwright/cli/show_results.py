@@ -86,8 +86,11 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     console.print(f"{search['evaluations']:,} evaluations{infeasible} in {search['seconds']:.1f} s; {reason}")
     if summary["n_trials"] < min(search["found"], MAX_DESIGNS):
         console.print(
-            f"{summary['n_trials']} of the front's {search['found']} designs are kept: there was no time to verify more"
+            f"{summary['n_trials']} of {search['found']} distinct designs are kept: there was no time to verify more"
         )
+    if tried := search["reduced"]["evaluations"]:
+        kept = search["reduced"]["designs"]
+        console.print(f"{tried} arms without a joint that never moved were evaluated; {kept} are on the front")
     console.print(run.history.problem.space.mass_note)
     _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))

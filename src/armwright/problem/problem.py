@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import EvaluatorError, SettingsError, TaskError
+from armwright.exceptions import EvaluatorError, SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.devices import Device, resolve_device
@@ -16,7 +16,13 @@ from armwright.problem.constraints import Constraint, cycle_constraints, read_co
 from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.objective import Objective
-from armwright.problem.objectives import ORIENTATION_ERROR, ORIENTATION_QUANTITIES, PAPER_OBJECTIVES, named_objectives
+from armwright.problem.objectives import (
+    ORIENTATION_ERROR,
+    ORIENTATION_QUANTITIES,
+    PAPER_OBJECTIVES,
+    RENAMED,
+    named_objectives,
+)
 from armwright.robot.arm import Arm
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
@@ -119,7 +125,7 @@ class Problem:
         """Resolve device, objectives and constraints.
 
         Raises:
-            TaskError: the reference point is for other objectives, or a constraint cannot be parsed.
+            TaskError: reference point or resolution are for other objectives, or a constraint cannot be parsed.
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
         texts = (*self.task.constraints, *cycle_constraints(self.task, self.has_drives))
@@ -137,6 +143,7 @@ class Problem:
         if self.device not in POSTURES_AT_ONCE:
             object.__setattr__(self, "device", resolve_device(self.device, many=True))
         self._check_reference_point()
+        self._check_resolution()
 
     @property
     def has_drives(self) -> bool:
@@ -158,6 +165,15 @@ class Problem:
                 f"task {self.task.name}: reference_point: expected {len(names)} values ({', '.join(names)}), got "
                 f"{len(point)}; without reference_point the search finds one"
             )
+
+    def _check_resolution(self) -> None:
+        names = [objective.name for objective in self.objectives]
+        for name, _ in self.task.resolution:
+            if name not in names:
+                raise TaskError(
+                    f'task {self.task.name}: resolution: "{name}" is not an objective of the task '
+                    f"({', '.join(names)}).{did_you_mean(name, names, RENAMED)}"
+                )
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:

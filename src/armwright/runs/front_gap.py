@@ -68,7 +68,9 @@ def _is_same(problem: Problem, task: Task) -> bool:
         plain = not problem.task.payloads.any() and problem.task.tool == NO_TOOL and problem.task.is_plain
         unbounded = problem.objectives == PAPER_OBJECTIVES and not problem.constraints
         return plain and unbounded and problem.task.targets == task.targets
-    labels = {name: getattr(task, name) for name in ("name", "description", "provenance", "reference_point")}
+    labels = {
+        name: getattr(task, name) for name in ("name", "description", "provenance", "reference_point", "resolution")
+    }
     default = named_objectives(task.objectives or [])
     return problem.objectives == default and problem.task.model_copy(update=labels) == task
 

@@ -106,6 +106,11 @@ class _Seconds(_Record):
 _Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
+class _Reduced(_Record):
+    evaluations: Count
+    designs: Count
+
+
 class _Search(_Record):
     evaluations: Count
     seconds: float
@@ -114,6 +119,7 @@ class _Search(_Record):
     hypervolume_history: Annotated[list[_Point], Field(min_length=1)]
     infeasible: Count = 0
     reference_point_from: list[str]
+    reduced: _Reduced
 
 
 class _Summary(_Record):

@@ -34,6 +34,7 @@ from armwright.runs.verification import Verification, verify, verify_front
 from armwright.search.front_search import FrontSearch
 from armwright.study.progress import RunResult
 from armwright.study.reference_survey import ReferenceSurvey
+from armwright.study.reported_front import ReportedFront, reported_front
 from armwright.study.search_budget import SearchBudget, SearchProgress
 from armwright.study.settings import run_config
 from armwright.study.study import optimize
@@ -268,21 +269,21 @@ class _DirectSearch:
     def _finish(self, ended: str, seconds: float) -> FrontRun:
         """Write the results; seconds: search time of all sessions."""
         self._settle_reference_point()
-        stored = None if self.folder is None else read_summary(self.folder.path)
-        trials = self._front_trials(self._affordable_designs() if stored is None else stored["n_trials"])
+        trials, record = self._reported_trials()
         history = History(self.problem, trials, 0, self.config.reference_point)
         statistics = {
             "evaluations": self.search.evaluations,
             **({"infeasible": self.infeasible} if self.problem.constraints else {}),
             "seconds": round(seconds, 3),
             "ended_by": ended,
-            "found": len(self.search.matrix),
             "reference_point_from": self.survey.origins,
+            **record,
             "hypervolume_history": [[int(n), volume] for n, volume in self.search.history.tolist()],
         }
 
         def summarize(verification: Verification | None) -> dict[str, Any]:
-            values, after = self.search.values, len(trials) * files_seconds(self.problem.task)
+            values = np.vstack([self.search.values, history.masked_objectives])
+            after = len(trials) * files_seconds(self.problem.task)
             return summarize_front(
                 history,
                 self.config,
@@ -313,6 +314,18 @@ class _DirectSearch:
         if point != self.survey.point:
             self.search.move_reference_point(point)
 
+    def _reported_trials(self) -> tuple[list[FinishedTrial], dict[str, Any]]:
+        """Return the designs that are reported as trials, and a record of their selection; those of a finished run."""
+        stored = None if self.folder is None else read_summary(self.folder.path)
+        if self.folder is not None and stored is not None:
+            _, history = read_run(self.folder.path)
+            if len(history) == stored["n_trials"]:
+                return list(history), {key: stored["search"][key] for key in ("found", "reduced")}
+        point, n = self.survey.best_point(), self._affordable_designs()
+        front = reported_front(self.problem, self.search.matrix, self.search.values, point, n)
+        reduction = {"evaluations": front.evaluations, "designs": front.reduced}
+        return self._front_trials(front), {"found": front.found, "reduced": reduction}
+
     def _affordable_designs(self) -> int:
         """Return how many designs of the front there is time to verify and write."""
         if self.plan.costs is None and self.plan.budget.seconds is not None:
@@ -327,8 +340,10 @@ class _DirectSearch:
         reference_point = self.survey.best_point()
 
         def verify_best(n: int) -> tuple[History, float]:
-            started = self.plan.elapsed
-            history = History(self.problem, self._front_trials(n), 0, reference_point)
+            started, best = self.plan.elapsed, self.search.best(n)
+            matrix, values = self.search.matrix[best], self.search.values[best]
+            front = reported_front(self.problem, matrix, values, reference_point, n)
+            history = History(self.problem, self._front_trials(front), 0, reference_point)
             if self.folder is not None:  # otherwise nothing is verified
                 verify(self.problem, [trial.design for trial in history], history.values, reference_point)
             return history, (self.plan.elapsed - started) / len(history)
@@ -345,10 +360,9 @@ class _DirectSearch:
                 Simulator(history)(history.front[0].number)
         return ResultCosts(design, self.plan.elapsed - started)
 
-    def _front_trials(self, n: int) -> list[FinishedTrial]:
-        """Return at most n of the best designs of the front as trials."""
-        kept = self.search.best(n)
-        matrix, values = self.search.matrix[kept], self.search.values[kept]
+    def _front_trials(self, front: ReportedFront) -> list[FinishedTrial]:
+        """Return the designs of a front as trials."""
+        matrix, values = front.matrix, front.values
         violations = np.empty((len(matrix), 0))
         if self.problem.constraints:  # the search knows penalised values only
             outcomes = self.problem.evaluate_matrix(matrix)

@@ -69,6 +69,8 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         objectives: Names of the minimised objectives; by default the paper's two, and orientation_error if a
             target has a tool direction.
         constraints: Bounds that a design must satisfy, such as "torque_utilisation <= 0.8".
+        resolution: Differences of objectives that do not matter, by name; of designs that differ by no more, `armwright
+            design` reports one.
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")  # also names run folders
@@ -87,6 +89,7 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     constraints: tuple[str, ...] = ()
     # One value per objective; for the paper's two: position error [m], torque [N m] times 40.
     reference_point: tuple[float, ...] | None = Field(default=None, min_length=1)
+    resolution: tuple[tuple[str, Annotated[float, Field(gt=0.0)]], ...] = ()
     description: str = Field(default="", max_length=10_000)  # what the arm has to do; shown to proposers
     provenance: str = Field(default="", max_length=10_000)  # where the points come from
     _records: tuple[Target | None, ...] = PrivateAttr(())  # None for plain points; empty if all are
@@ -121,6 +124,19 @@ class Task(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     @classmethod
     def _check_name(cls, name: str) -> str:
         return check_name(name)
+
+    @field_validator("resolution", mode="before")
+    @classmethod
+    def _mapping_to_pairs(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            return tuple(cast("dict[str, Any]", value).items())
+        if isinstance(value, tuple):  # of pairs, from a task
+            return cast("Any", value)
+        raise ValueError("expected objectives and their resolutions, such as {worst_error: 0.0005, price: 5}")
+
+    @field_serializer("resolution")
+    def _pairs_to_mapping(self, value: tuple[tuple[str, float], ...]) -> dict[str, float]:
+        return dict(value)
 
     @field_serializer("targets")
     def _with_records(self, targets: tuple[Point, ...]) -> tuple[Point | Target, ...]:
