@@ -9,8 +9,8 @@ import pinocchio
 import pytest
 
 from armwright.kinematics.arm_arrays import stack_arms
-from armwright.kinematics.cycle_loads import BETWEEN, INSTANTS, CycleLoads, cycle_loads
-from armwright.kinematics.cycle_path import find_paths
+from armwright.kinematics.cycle_loads import BETWEEN, CycleLoads, cycle_loads
+from armwright.kinematics.cycle_path import INSTANTS, find_paths
 from armwright.kinematics.motion_path import MotionPath
 from armwright.kinematics.torque_terms import torque_terms
 from armwright.robot.arm import Actuator, Arm, Joint, uniform_link

@@ -17,7 +17,7 @@ from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
 from armwright.runs.results import read_summary, verify_run
 from armwright.search.front_search import FrontSearch
-from armwright.spaces.design_space import paper_space
+from armwright.spaces.design_space import default_space, paper_space
 from armwright.study.front_run import FrontRun, find_front
 from armwright.study.search_budget import SearchProgress
 from armwright.study.study import optimize
@@ -97,6 +97,28 @@ def test_resumed_front_run_equals_uninterrupted_one(done: FrontRun, tmp_path: Pa
     longer = find_front(PROBLEM, evaluations=8000, seed=1, out=tmp_path / "run")
     assert longer.resumed == run.summary["search"]["evaluations"]
     assert hypervolume(longer.history.values, (5, 5)) >= hypervolume(run.history.values, (5, 5))
+
+
+@pytest.mark.slow
+def test_resumed_front_run_of_a_cycle_is_screened_identically(tmp_path: Path) -> None:
+    class StopError(Exception):
+        pass
+
+    def stop(progress: SearchProgress) -> None:
+        if progress.evaluations == 600:
+            raise StopError
+
+    problem = Problem(load_task("dispensing"), default_space("dispensing"))
+    whole = find_front(problem, evaluations=650, seed=1)
+    with pytest.raises(StopError):
+        find_front(problem, evaluations=650, seed=1, out=tmp_path / "run", watch=stop)
+    run = find_front(problem, evaluations=650, seed=1, out=tmp_path / "run")
+    assert run.resumed == 600
+    assert np.array_equal(run.history.values, whole.history.values)
+    screening = run.summary["search"]["screening"]
+    assert screening == whole.summary["search"]["screening"]
+    assert screening["considered"] == 30 * 200
+    assert screening["evaluated_though_rejected"] >= 0.05 * 200
 
 
 @pytest.mark.slow

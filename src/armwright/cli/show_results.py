@@ -91,6 +91,11 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
     if tried := search["reduced"]["evaluations"]:
         kept = search["reduced"]["designs"]
         console.print(f"{tried} arms without a joint that never moved were evaluated; {kept} are on the front")
+    if screening := search.get("screening"):
+        console.print(
+            f"considered {screening['considered']:,} designs: bounds discarded {screening['discarded_by_bounds']:,}, "
+            f"estimates ranked the rest; {screening['evaluated_though_rejected']:,} evaluated though rejected"
+        )
     console.print(run.history.problem.space.mass_note)
     _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))

@@ -20,7 +20,6 @@ from armwright.kinematics.drive_limits import MotionLoad, least_time, motion_loa
 from armwright.kinematics.torque_terms import TorqueTerms
 from armwright.tasks.motions import CyclePlan
 
-INSTANTS = 33  # of a motion, equally spaced in time
 ROUNDING = 1.0 + 1e-9  # of a least duration, so that its limits hold in spite of rounding
 MIN_TIME, MAX_TIME = 0.15, 1e3  # [s] of a motion that is as fast as possible; drives cannot follow shorter ones
 BETWEEN = 16  # times as many instants of a sharp path, of which the largest values count
@@ -58,7 +57,7 @@ class CycleLoads:
 
     def mean(self, moving: Array, resting: Array) -> Array:
         """Return the (N, ...) means over the cycle of (N, M, F, ...) values in motion and (N, M, ...) after motions."""
-        weights = np.full(INSTANTS, 1.0 / (INSTANTS - 1))
+        weights = np.full(moving.shape[2], 1.0 / (moving.shape[2] - 1))
         weights[[0, -1]] /= 2.0
         total = np.einsum("nm,f,nmf...->n...", self.durations, weights, moving)
         total += np.einsum("m,nm...->n...", self.dwells, resting)
@@ -67,11 +66,13 @@ class CycleLoads:
 
 def holding_torques(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> Array:
     """Return (N, M, F, D) torques against gravity at the instants of each motion [N m], or forces [N]."""
-    torques = np.empty((len(paths.jumps), len(paths.plan.motions), INSTANTS, paths.groups[0].arms.dof))
+    torques = np.empty((len(paths.jumps), len(paths.plan.motions), paths.instants, paths.groups[0].arms.dof))
     for group, of_motions in zip(paths.groups, terms, strict=True):
         density = _density(group)
         for i, part in enumerate(of_motions):
-            torques[group.index, i] = _thinned(_instants(part.gravity.shape[1], density)[0] @ part.gravity, density)
+            torques[group.index, i] = _thinned(
+                _instants(part.gravity.shape[1], paths.instants, density)[0] @ part.gravity, density
+            )
     return torques
 
 
@@ -88,10 +89,10 @@ def cycle_loads(paths: CyclePaths, terms: Sequence[tuple[TorqueTerms, ...]]) -> 
     plan, n = paths.plan, len(paths.jumps)
     m, dof = len(plan.motions), paths.groups[0].arms.dof
     durations, holding = np.empty((n, m)), np.empty((n, m, dof))
-    torques, speeds = np.empty((2, n, m, INSTANTS, dof))
+    torques, speeds = np.empty((2, n, m, paths.instants, dof))
     for group, of_motions in zip(paths.groups, terms, strict=True):
         density = _density(group)
-        loads = [_load(part, group.arms, density) for part in of_motions]
+        loads = [_load(part, group.arms, paths.instants, density) for part in of_motions]
         times = _durations(group.arms, plan, loads)
         durations[group.index] = times
         for i, load in enumerate(loads):
@@ -120,9 +121,9 @@ def _thinned(values: Array, density: int) -> Array:
     return np.concatenate([values[:, :1], np.take_along_axis(nearby, largest, axis=-1)[..., 0], values[:, -1:]], axis=1)
 
 
-def _load(terms: TorqueTerms, arms: ArmArrays, density: int) -> MotionLoad:
+def _load(terms: TorqueTerms, arms: ArmArrays, instants: int, density: int) -> MotionLoad:
     """Return the load of a motion; the drives' own inertia and friction count where they are known."""
-    weights, s_t, s_tt = _instants(terms.gravity.shape[1], density)
+    weights, s_t, s_tt = _instants(terms.gravity.shape[1], instants, density)
     q_s, q_ss, drag, push = (weights @ values for values in (terms.q_s, terms.q_ss, terms.drag, terms.push))
     rate, change = s_t[:, None], s_tt[:, None]
     gravity, inertial, velocity = weights @ terms.gravity, drag * rate**2 + push * change, q_s * rate
@@ -135,9 +136,9 @@ def _load(terms: TorqueTerms, arms: ArmArrays, density: int) -> MotionLoad:
 
 
 @cache
-def _instants(samples: int, density: int) -> tuple[Array, Array, Array]:
+def _instants(samples: int, instants: int, density: int) -> tuple[Array, Array, Array]:
     """Return (F, R) weights that interpolate between R samples at F instants, and s_τ and s_ττ there (F,)."""
-    t = np.linspace(0.0, 1.0, density * (INSTANTS - 1) + 1)
+    t = np.linspace(0.0, 1.0, density * (instants - 1) + 1)
     s = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
     at = s * (samples - 1)
     before = np.minimum(at.astype(np.intp), samples - 2)

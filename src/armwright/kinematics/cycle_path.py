@@ -6,8 +6,9 @@ for the cycle as a whole (cycle_choice.py), as in the ladder graph of Descartes 
 then followed with as many samples as it takes for neighbours to be near.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from armwright.tasks.obstacles import Obstacle
 MAX_REFINEMENT = 64  # of the samples
 SHARP = 4.0  # times the mean step of a line that makes its largest one a peak
 REDUCED = 0.75  # a step that twice the samples leave above this share of it is a jump
+INSTANTS = 33  # of a motion, equally spaced in time, at which its loads are evaluated
+ROUGH, ROUGH_INSTANTS = 0.25, 5  # refinement and instants of a rough path
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ class CyclePaths:
         jumps: (N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that
             speeds are not.
         worst: (N, M, 3) share of the motion at which path error, angle and clearance are worst.
+        instants: F, the number of instants of a motion, equally spaced in time, at which its loads are evaluated.
     """
 
     plan: CyclePlan
@@ -74,6 +78,7 @@ class CyclePaths:
     limit_distance: Array
     jumps: NDArray[np.bool_]
     worst: Array
+    instants: int = INSTANTS
 
     def of_arm(self, row: int) -> tuple[ArmArrays, tuple[MotionPath, ...]]:
         """Return an arm, as one of one, and its path along each motion."""
@@ -147,6 +152,27 @@ def find_paths(
     return _measure(plan, entry, groups, jumps, obstacles, device)
 
 
+def rough_paths(
+    arms: ArmArrays, plan: CyclePlan, near: Array, obstacles: Sequence[Obstacle] = (), device: Device = "cpu"
+) -> CyclePaths:
+    """Estimate the joint paths of N arms through a cycle by a few samples.
+
+    Nothing is chosen or refined. Of jumps only those are found that come from a joint at its limit.
+
+    Args:
+        arms: N arms.
+        plan: The cycle.
+        near: (N, B, D) postures near those at the first pose of each block.
+        obstacles: The obstacles.
+        device: The device to compute on.
+    """
+    entry = np.clip(near, arms.lower[:, None], arms.upper[:, None])
+    paths = _follow(arms, plan, entry, ROUGH, device)
+    group = CycleGroup(np.arange(len(arms)), arms, paths, is_sharp=False)
+    jumps = np.zeros((len(arms), len(paths)), dtype=bool)
+    return replace(_measure(plan, entry, [group], jumps, obstacles, device, between=1), instants=ROUGH_INSTANTS)
+
+
 def _refined(refinement: IndexArray, ratio: Array) -> IndexArray:
     """Return the refinement that should bring the largest step down to what is allowed, doubled at least."""
     doublings = np.ceil(np.log2(np.clip(ratio, 1.0, 8.0))).astype(np.intp)
@@ -169,11 +195,13 @@ def _is_sharp(arms: ArmArrays, paths: Sequence[MotionPath]) -> NDArray[np.bool_]
     return sharp
 
 
-def _follow(arms: ArmArrays, plan: CyclePlan, entry: Array, refinement: int, device: Device) -> tuple[MotionPath, ...]:
+def _follow(
+    arms: ArmArrays, plan: CyclePlan, entry: Array, refinement: float, device: Device
+) -> tuple[MotionPath, ...]:
     """Return the path of arms along each motion; entry: (N, B, D) postures at the first pose of each block."""
     samples = plan.sample(refinement)
     q = follow_lines(arms, samples, entry[:, :, None], device).q[:, 0]  # (N, S, D)
-    share = np.linspace(0.0, 1.0, refinement * JOINT_STEPS + 1)[:, None]
+    share = np.linspace(0.0, 1.0, math.ceil(refinement * JOINT_STEPS) + 1)[:, None]
     paths: list[MotionPath] = []
     for index, motion in enumerate(plan.motions):
         if motion.by == "line":
@@ -194,8 +222,9 @@ def _measure(
     jumps: NDArray[np.bool_],
     obstacles: Sequence[Obstacle],
     device: Device,
+    between: int = 2,
 ) -> CyclePaths:
-    """Return the paths with what they are off by and how near they come."""
+    """Return the paths with what they are off by and how near they come; between: as in `_line_errors`."""
     n, m = jumps.shape
     values = np.zeros((5, n, m))
     worst = np.zeros((n, m, 3))
@@ -203,7 +232,7 @@ def _measure(
         if plan.is_loop:
             gap = np.abs(group.paths[-1].q[:, -1] - group.paths[0].q[:, 0]).max(axis=1)
             jumps[group.index, -1] |= gap > CLOSED
-        errors = _line_errors(group, plan, device)
+        errors = _line_errors(group, plan, device, between)
         q = np.concatenate([path.q for path in group.paths], axis=1)
         clearance = np.stack(clearances(group.arms, q, obstacles, device))  # (2, n, R)
         margin = np.minimum(q - group.arms.lower[:, None], group.arms.upper[:, None] - q)
@@ -225,12 +254,12 @@ def _measure(
     return CyclePaths(plan, entry, tuple(groups), path_error, path_angle, own, clear, margin, jumps, worst)
 
 
-def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device) -> list[Any]:
-    """Return (n, 2 R + 1, 2) distance [m] and angle [rad] off each line, between the samples too; None for others."""
+def _line_errors(group: CycleGroup, plan: CyclePlan, device: Device, between: int) -> list[Any]:
+    """Return (n, between R + 1, 2) distance [m] and angle [rad] off each line of R + 1 samples; None for others."""
     lines = [path for path in group.paths if path.motion.by == "line"]
     if not lines:
         return [None] * len(group.paths)
-    shares = [np.linspace(0.0, 1.0, 2 * path.q.shape[1] - 1) for path in lines]
+    shares = [np.linspace(0.0, 1.0, between * (path.q.shape[1] - 1) + 1) for path in lines]
     poses = stack_poses([plan.line(path.motion, share) for path, share in zip(lines, shares, strict=True)])
     q = np.concatenate([path.at(share) for path, share in zip(lines, shares, strict=True)], axis=1)
     errors = iter(np.split(tool_errors(group.arms, poses, q, device), np.cumsum([len(s) for s in shares])[:-1], axis=1))

@@ -12,7 +12,7 @@ from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arm_arrays import ArmArrays, carrying, stack_arms
 from armwright.kinematics.clearance import clearances
 from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads, holding_torques
-from armwright.kinematics.cycle_path import CyclePaths, find_paths
+from armwright.kinematics.cycle_path import CyclePaths, find_paths, rough_paths
 from armwright.kinematics.devices import Device
 from armwright.kinematics.ik import UPDATES, Postures, solve_postures
 from armwright.kinematics.jacobian import jacobians
@@ -250,6 +250,7 @@ def evaluate_arrays(
     device: Device = "cpu",
     initial_q: ArrayLike | None = None,
     near: CyclePaths | None = None,
+    roughly_near: Array | None = None,
 ) -> Evaluation:
     """Evaluate stacked arms at every target of a scene, in their precision.
 
@@ -260,6 +261,8 @@ def evaluate_arrays(
         initial_q: initial joint values [rad] or [m] that broadcast to (N, T, D); None for the straight posture. The
             restarts of the targets begin elsewhere. Where the cycle stops, its postures count instead.
         near: Paths of N similar arms through the cycle, whose postures the arms keep; None to choose postures.
+        roughly_near: (N, B, D) postures near those at the first pose of each block of the cycle, from which the paths
+            are estimated (`rough_paths`); None for the paths themselves.
     """
     targets, arrays = scene.targets, carrying(arrays, scene.load_shape)
 
@@ -284,8 +287,11 @@ def evaluate_arrays(
     if scene.plan is None:
         paths, postures = None, nearest()
     else:
-        entry = None if near is None else near.entry
-        paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=entry)
+        if roughly_near is None:
+            entry = None if near is None else near.entry
+            paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=entry)
+        else:
+            paths = rough_paths(arrays, scene.plan, roughly_near, scene.obstacles, device)
         q = paths.postures(len(targets))
         if np.isnan(q).any():
             q = np.where(np.isnan(q), nearest().q, q)

@@ -57,11 +57,14 @@ class Outcomes:
         values: (N, M) objectives, minimised.
         violations: (N, C) constraint violations; satisfied at <= 0.
         failures: why the evaluator failed, by row.
+        postures: (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without
+            a cycle.
     """
 
     values: Array
     violations: Array
     failures: Mapping[int, str] = field(default_factory=dict[int, str])
+    postures: Array | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -85,7 +88,8 @@ def worst_case(outcomes: Sequence[Outcomes]) -> Outcomes:
     """Return the largest of each objective and violation, each by itself, of the same designs in several cases."""
     if len(outcomes) == 1:
         return outcomes[0]
-    return Outcomes(np.max([o.values for o in outcomes], axis=0), np.max([o.violations for o in outcomes], axis=0))
+    values, violations = (np.max([getattr(o, name) for o in outcomes], axis=0) for name in ("values", "violations"))
+    return Outcomes(values, violations, postures=outcomes[0].postures)
 
 
 @dataclass(frozen=True)
@@ -255,7 +259,9 @@ class Problem:
         """
         values = [measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives]
         names = [f"objective {o.name}" for o in self.objectives]
-        return Outcomes(_finite(values, names, len(evaluation)), self.violations(evaluation))
+        paths = evaluation.cycle_paths
+        postures = None if paths is None else paths.entry
+        return Outcomes(_finite(values, names, len(evaluation)), self.violations(evaluation), postures=postures)
 
     def violations(self, evaluation: Evaluation) -> Array:
         """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number."""
@@ -266,11 +272,13 @@ class Problem:
         """Evaluate settled rows, with only the postures of one chunk in memory at a time."""
         values = np.empty((len(matrix), len(self.objectives)))
         violations = np.empty((len(matrix), len(self.constraints)))
+        postures: list[Array] = []
         for rows in self.chunks(len(matrix)):
             chunk = {name: column[rows] for name, column in measured.items()}
             found = worst_case([self.outcomes(physics, chunk) for physics in self._variants(matrix[rows])])
             values[rows], violations[rows] = found.values, found.violations
-        return Outcomes(values, violations)
+            postures += [] if found.postures is None else [found.postures]
+        return Outcomes(values, violations, postures=np.concatenate(postures) if postures else None)
 
     def chunks(self, n: int) -> Iterator[slice]:
         """Yield the rows of n designs that are evaluated at once, so that their postures fit into memory."""

@@ -111,6 +111,12 @@ class _Reduced(_Record):
     designs: Count
 
 
+class _Screening(_Record):
+    considered: Count
+    discarded_by_bounds: Count
+    evaluated_though_rejected: Count
+
+
 class _Search(_Record):
     evaluations: Count
     seconds: float
@@ -118,6 +124,7 @@ class _Search(_Record):
     found: Count
     hypervolume_history: Annotated[list[_Point], Field(min_length=1)]
     infeasible: Count = 0
+    screening: _Screening | None = None
     reference_point_from: list[str]
     reduced: _Reduced
 

@@ -58,6 +58,7 @@ class FrontSearch:
         reference_point: (M,) bound of the hypervolume; points beyond it in any objective do not count.
         seed: of all random numbers.
         known: (N, P) designs that the first batch includes.
+        vary: makes new designs from a pool, as `variation.offspring` does.
     """
 
     def __init__(
@@ -67,9 +68,11 @@ class FrontSearch:
         reference_point: Sequence[float],
         seed: int,
         known: Array | None = None,
+        vary: Callable[[Array, DesignEncoding, int, np.random.Generator], Array] = offspring,
     ) -> None:
         self._encoding = DesignEncoding(parameters)
         self._evaluate = evaluate
+        self._vary = vary
         self._reference_point = np.asarray(reference_point, dtype=np.float64)
         self._seed = seed
         self._known = np.empty((0, len(self._encoding))) if known is None else known
@@ -126,10 +129,10 @@ class FrontSearch:
         if self._generation == 0:
             return np.vstack([self._known, self._encoding.random(FIRST_BATCH, rng)])
         if not self._is_side_generation:
-            return offspring(self._matrix, self._encoding, max(SMALLEST_BATCH, self._capacity), rng)
+            return self._vary(self._matrix, self._encoding, max(SMALLEST_BATCH, self._capacity), rng)
         if not len(self._side_matrix):
             return self._encoding.random(FIRST_BATCH, rng)
-        return offspring(self._side_matrix, self._encoding, SMALLEST_BATCH, rng)
+        return self._vary(self._side_matrix, self._encoding, SMALLEST_BATCH, rng)
 
     def tell(self, matrix: Array, values: Array) -> None:
         """Select from the designs that `ask` returned, given their (N, M) values."""

@@ -32,6 +32,8 @@ from armwright.runs.simulated_run import Simulator
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify, verify_front
 from armwright.search.front_search import FrontSearch
+from armwright.search.screening import Screen, pays
+from armwright.search.variation import offspring
 from armwright.study.progress import RunResult
 from armwright.study.reference_survey import ReferenceSurvey
 from armwright.study.reported_front import ReportedFront, reported_front
@@ -123,7 +125,10 @@ class _DirectSearch:
         self.plan = plan
         self.watch = watch
         self.survey = ReferenceSurvey(problem, config.seed)
-        self.search = FrontSearch(problem.space.parameters, self._evaluate, self.survey.point, config.seed, matrix)
+        self.screen = Screen(problem, lambda: self.survey.point) if pays(problem) else None
+        vary = offspring if self.screen is None else self.screen.offspring
+        parameters = problem.space.parameters
+        self.search = FrontSearch(parameters, self._evaluate, self.survey.point, config.seed, matrix, vary)
         self.seconds = 0.0  # of earlier sessions
         self.resumed = 0  # evaluations of earlier sessions
         self.ended_after = 0.0  # largest time budget that has ended the search [s]
@@ -197,7 +202,8 @@ class _DirectSearch:
         """Return what a later session needs."""
         times = {"seconds": self.searched, "spent": self.plan.spent, "ended_after": self.ended_after}
         state = {**times, "infeasible": self.infeasible, **self.tally.state()}
-        return {**state, **self.survey.state(), **self.search.state()}
+        screen = {} if self.screen is None else self.screen.state()
+        return {**state, **self.survey.state(), **self.search.state(), **screen}
 
     def _report(self, evaluated: int) -> None:
         """Report the progress; evaluated: designs of the generation that is being evaluated."""
@@ -240,6 +246,8 @@ class _DirectSearch:
                 self.infeasible = int(state["infeasible"])
                 self.tally.restore(state)
                 self.survey.restore(state)
+                if self.screen is not None:
+                    self.screen.restore(state)
         except Exception as fault:  # numpy, zipfile, zlib and tokenize raise different ones
             raise RunFolderError(
                 f"{path} is damaged ({fault}); delete it to start a new search from the front in {folder.path}"
@@ -262,6 +270,8 @@ class _DirectSearch:
             done += len(chunk)
             self.tally.add(outcomes.violations)
             self.survey.add(outcomes)
+            if self.screen is not None:
+                self.screen.learn(chunk, outcomes)
         values = np.vstack(parts)
         self.infeasible += int(np.any(values >= PENALTY, axis=1).sum())
         return values
@@ -274,6 +284,7 @@ class _DirectSearch:
         statistics = {
             "evaluations": self.search.evaluations,
             **({"infeasible": self.infeasible} if self.problem.constraints else {}),
+            **({} if self.screen is None else {"screening": self.screen.counts}),
             "seconds": round(seconds, 3),
             "ended_by": ended,
             "reference_point_from": self.survey.origins,

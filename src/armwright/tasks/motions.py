@@ -187,17 +187,17 @@ class CyclePlan:
             ),
         )
 
-    def sample(self, refinement: int = 1) -> LineSamples:
-        """Return samples of all lines, `refinement` times as many as at least."""
+    def sample(self, refinement: float = 1) -> LineSamples:
+        """Return samples of all lines, `refinement` times as many as a path needs at least."""
         if refinement not in self._samples:
             self._samples[refinement] = self._sample(refinement)
         return self._samples[refinement]
 
     @cached_property
-    def _samples(self) -> dict[int, LineSamples]:
+    def _samples(self) -> dict[float, LineSamples]:
         return {}
 
-    def _sample(self, refinement: int) -> LineSamples:
+    def _sample(self, refinement: float) -> LineSamples:
         parts: list[Poses] = []
         first, spans = [0], [(0, 0)] * len(self.motions)
         at = 0
@@ -205,7 +205,7 @@ class CyclePlan:
             parts.append(self.poses[[block.entry]])
             for index in block.lines:
                 motion = self.motions[index]
-                steps = refinement * line_steps(self.poses, motion.start, motion.end)
+                steps = math.ceil(refinement * line_steps(self.poses, motion.start, motion.end))
                 parts.append(self.line(motion, np.arange(1, steps + 1) / steps))
                 spans[index] = (at, at + steps)
                 at += steps

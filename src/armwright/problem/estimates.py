@@ -1,0 +1,82 @@
+"""Bounds and estimates of outcomes, from which a search decides which designs to evaluate."""
+
+import math
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.arm_arrays import ArmArrays
+from armwright.problem.evaluation import Evaluation, evaluate_arrays
+from armwright.problem.objectives import (
+    JOINTS,
+    LENGTH,
+    MASS,
+    OBJECTIVES,
+    POSITION_ERROR,
+    PRICE,
+    UNREACHED_TARGETS,
+    VOLTAGES,
+    WORST_ERROR,
+)
+from armwright.problem.problem import Outcomes, Problem, worst_case
+
+EXACT = (PRICE, MASS, LENGTH, JOINTS, VOLTAGES)  # quantities that an arm has without moving
+OF_REACH = (POSITION_ERROR, WORST_ERROR, UNREACHED_TARGETS)  # at least what the distance beyond reach implies
+ROUNDING = 1e-5  # of a distance relative to the reach, from single precision
+AT_ONCE = 1000  # designs that are estimated at once
+
+
+def lower_bounds(problem: Problem, matrix: Array) -> Outcomes:
+    """Return outcomes that no evaluation of the designs (N, P) can fall below.
+
+    Price, mass, length, joints and voltages are exact, and the tip is off a target by at least its distance beyond
+    reach. Other objectives are bounded by 0, custom ones and other constraints by nothing.
+    """
+    evaluation = _motionless(problem, problem.arms(problem.space.normalised(matrix)))
+    values = np.zeros((len(matrix), len(problem.objectives)))
+    for column, objective in enumerate(problem.objectives):
+        if objective in (*EXACT, *OF_REACH):
+            values[:, column] = objective(evaluation)
+        elif OBJECTIVES.get(objective.name) != objective:
+            values[:, column] = -math.inf
+    violations = np.full((len(matrix), len(problem.constraints)), -math.inf)
+    for column, constraint in enumerate(problem.constraints):
+        if constraint.quantity in EXACT or (constraint.quantity in OF_REACH and constraint.relation == "<="):
+            violations[:, column] = constraint(evaluation)
+    return Outcomes(values, violations)
+
+
+def estimates(problem: Problem, matrix: Array, near: Array) -> Outcomes:
+    """Estimate the outcomes of designs by rough paths through the cycle, in each case, without tolerances.
+
+    Args:
+        problem: a problem with a cycle.
+        matrix: (N, P) designs.
+        near: (N, B, D) postures near those at the first pose of each block, such as those of similar designs.
+    """
+    matrix = problem.space.normalised(matrix)
+    parts: list[Outcomes] = []
+    for first in range(0, len(matrix), AT_ONCE):
+        rows = slice(first, first + AT_ONCE)
+        arms = problem.arms(matrix[rows])
+        rough = [evaluate_arrays(arms, scene, problem.device, roughly_near=near[rows]) for scene in problem.scenes]
+        parts.append(worst_case([problem.outcomes(evaluation) for evaluation in rough]))
+    return Outcomes(np.concatenate([p.values for p in parts]), np.concatenate([p.violations for p in parts]))
+
+
+def _motionless(problem: Problem, arms: ArmArrays) -> Evaluation:
+    """Return an evaluation of arms in the first case of a task that is off each target by its distance beyond reach."""
+    scene = problem.scenes[0]
+    n, t = len(arms), len(scene.targets)
+    strokes = np.where(arms.prismatic, np.maximum(np.abs(arms.lower), np.abs(arms.upper)), 0.0)
+    reach = np.linalg.norm(arms.offset, axis=2).sum(axis=1) + strokes.sum(axis=1)
+    distance = np.linalg.norm(scene.targets - arms.base[:, None], axis=2)
+    return Evaluation(
+        **vars(scene),
+        arms=arms,
+        q=np.zeros((n, t, arms.dof)),
+        reached=np.zeros((n, t, 3)),
+        position_error=np.maximum(0.0, distance * (1.0 - ROUNDING) - reach[:, None] * (1.0 + ROUNDING)),
+        angle_error=np.zeros((n, t)),
+        joint_torques=np.zeros((n, t, arms.dof)),
+    )

@@ -1,0 +1,128 @@
+"""Screening of offspring: of many designs, bounds discard some, estimates rank the others, and the best are evaluated.
+
+An estimate follows the cycle roughly, from the postures of the nearest evaluated design with the same joints. A share
+of the evaluations goes to designs that the estimates reject, so that no design is out of reach because of them.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import moocore
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from armwright.arrays import Array
+from armwright.pareto import feasible_mask, front_mask
+from armwright.problem.estimates import estimates, lower_bounds
+from armwright.problem.problem import Outcomes, Problem
+from armwright.search.encoding import DesignEncoding
+from armwright.search.survival import Indices
+from armwright.search.variation import offspring
+
+CANDIDATES = 30  # designs considered for each one to evaluate
+REJECTED_SHARE = 0.05  # of the designs to evaluate, at least: drawn from those that the estimates reject
+REMEMBERED = 2000  # evaluated designs, the latest, whose postures estimates begin with
+
+COUNTS = ("considered", "discarded_by_bounds", "evaluated_though_rejected")  # in summary.json
+_ARRAYS = ("matrix", "postures", "feasible", "front", "counts")
+
+
+def pays(problem: Problem) -> bool:
+    """Return whether estimates take much less time than evaluations: for tasks with a cycle."""
+    return problem.task.cycle is not None
+
+
+class Screen:
+    """Offspring of which the estimates choose; `learn` has to be called with all that is evaluated.
+
+    Args:
+        problem: a problem with a cycle.
+        reference_point: gives the (M,) values beyond which a design counts for nothing, at present.
+    """
+
+    def __init__(self, problem: Problem, reference_point: Callable[[], Sequence[float]]) -> None:
+        plan, parameters = problem.scenes[0].plan, problem.space.parameters
+        assert plan is not None
+        dof = problem.arms(problem.space.matrix(problem.space.sample(1, 0))).dof
+        joints = {"n_joints", *(f"joint_{j}" for j in range(1, problem.space.max_joints + 1))}
+        self._problem = problem
+        self._reference_point = reference_point
+        self._encoding = DesignEncoding(parameters)
+        self._joints = [column for column, parameter in enumerate(parameters) if parameter.name in joints]
+        self._matrix = np.empty((0, len(parameters)))
+        self._postures = np.empty((0, len(plan.blocks), dof))
+        self._feasible = np.empty(0, dtype=bool)
+        self._front = np.empty((0, len(problem.objectives)))
+        self._counts = np.zeros(len(COUNTS), dtype=np.int64)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Designs considered, discarded by bounds, and evaluated although the estimates rejected them."""
+        return dict(zip(COUNTS, self._counts.tolist(), strict=True))
+
+    def offspring(self, pool: Array, encoding: DesignEncoding, n: int, rng: np.random.Generator) -> Array:
+        """Return an (n, P) matrix of new designs, chosen from many of `variation.offspring`, whose arguments it has."""
+        candidates = offspring(pool, encoding, CANDIDATES * n, rng)
+        hopeless = self._is_hopeless(lower_bounds(self._problem, candidates))
+        left, discarded = np.flatnonzero(~hopeless), np.flatnonzero(hopeless)
+        best, rejected = self._ranked(candidates[left], n - math.ceil(REJECTED_SHARE * n), rng)
+        drawn = rng.permutation(rejected)[: n - len(best)]
+        self._counts = self._counts + np.array([len(candidates), len(discarded), len(drawn)])
+        return candidates[np.concatenate([left[best], left[drawn], discarded])[:n]]
+
+    def learn(self, matrix: Array, outcomes: Outcomes) -> None:
+        """Remember evaluated designs (N, P) and their outcomes."""
+        assert outcomes.postures is not None
+        feasible = feasible_mask(outcomes.violations)
+        self._matrix = np.vstack([self._matrix, matrix])[-REMEMBERED:]
+        self._postures = np.concatenate([self._postures, outcomes.postures])[-REMEMBERED:]
+        self._feasible = np.concatenate([self._feasible, feasible])[-REMEMBERED:]
+        values = np.vstack([self._front, outcomes.values[feasible]])
+        self._front = values[front_mask(values)]
+
+    def state(self) -> dict[str, Any]:
+        """Return the arrays that `restore` needs; later calls do not change them."""
+        return {f"screen_{name}": getattr(self, f"_{name}") for name in _ARRAYS}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Resume from the `state` of a screen of the same problem, to the bit."""
+        for name in _ARRAYS:
+            setattr(self, f"_{name}", np.array(state[f"screen_{name}"]))
+
+    def _is_hopeless(self, bounds: Outcomes) -> NDArray[np.bool_]:
+        """Return (N,) True for designs that are proven to be infeasible, or not to enlarge the front."""
+        infeasible = np.any(bounds.violations > 0.0, axis=1)
+        if not len(self._front):  # then designs beyond the reference point may be the nearest to it
+            return infeasible
+        dominated = np.all(self._front <= bounds.values[:, None], axis=2).any(axis=1)
+        return infeasible | dominated | np.any(bounds.values >= np.asarray(self._reference_point()), axis=1)
+
+    def _ranked(self, matrix: Array, n: int, rng: np.random.Generator) -> tuple[Indices, Indices]:
+        """Return the indices of the n best designs by their estimates, and of the others.
+
+        They are ranked by Pareto rank among each other and the front, and in random order within a rank.
+        """
+        if not len(matrix):
+            return np.arange(0), np.arange(0)
+        found = estimates(self._problem, matrix, self._postures_near(matrix))
+        rank = moocore.pareto_rank(np.vstack([self._front, found.penalised]))[len(self._front) :]
+        order = np.lexsort((rng.random(len(rank)), rank))
+        return order[:n], order[n:]
+
+    def _postures_near(self, matrix: Array) -> Array:
+        """Return (N, B, D) postures of the nearest remembered designs with the same joints, feasible ones if any.
+
+        Without any, they are those of a straight arm.
+        """
+        near = np.zeros((len(matrix), *self._postures.shape[1:]))
+        own, known = self._encoding.units(matrix), self._encoding.units(self._matrix)
+        joints, of_row = np.unique(matrix[:, self._joints], axis=0, return_inverse=True)
+        for number, sequence in enumerate(joints):
+            rows = np.flatnonzero(of_row.ravel() == number)
+            same = np.all(self._matrix[:, self._joints] == sequence, axis=1)
+            same = np.flatnonzero(same & self._feasible if np.any(same & self._feasible) else same)
+            if len(same):
+                near[rows] = self._postures[same[KDTree(known[same]).query(own[rows])[1]]]
+        return near

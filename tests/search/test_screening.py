@@ -1,0 +1,103 @@
+"""Screening of offspring on a task with a cycle, from designs of its best known front."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.pareto import feasible_mask
+from armwright.problem.estimates import lower_bounds
+from armwright.problem.problem import Problem
+from armwright.runs.front_gap import known_front
+from armwright.search.encoding import DesignEncoding
+from armwright.search.screening import CANDIDATES, REJECTED_SHARE, REMEMBERED, Screen, pays
+from armwright.search.variation import offspring
+from armwright.spaces.design_space import default_space
+from armwright.tasks.catalogue import builtin_tasks, load_task
+
+TASK, SPACE = load_task("dispensing"), default_space("dispensing")
+PROBLEM = Problem(TASK, SPACE)
+ENCODING = DesignEncoding(SPACE.parameters)
+POINT = (3000.0, 3.0, 1.0)
+N = 40
+
+
+@pytest.fixture(scope="module")
+def pool() -> Any:
+    """Designs in the middle of a search: neighbours of the best known ones."""
+    known = known_front(PROBLEM)
+    assert known is not None
+    return offspring(SPACE.matrix(known.designs), ENCODING, 60, np.random.default_rng(0))
+
+
+def learnt(pool: Any, problem: Problem = PROBLEM, point: tuple[float, ...] = POINT) -> Screen:
+    screen = Screen(problem, lambda: point)
+    screen.learn(pool, problem.evaluate_matrix(pool))
+    return screen
+
+
+def screened(screen: Screen, pool: Any, seed: int = 1) -> Any:
+    return screen.offspring(pool, ENCODING, N, np.random.default_rng(seed))
+
+
+def test_screening_is_for_tasks_with_cycles() -> None:
+    chosen = {name for name, task in builtin_tasks().items() if pays(Problem(task, default_space(name)))}
+    assert chosen == {name for name, task in builtin_tasks().items() if task.cycle is not None}
+
+
+def test_chosen_offspring_are_feasible_more_often(pool: Any) -> None:
+    chosen = screened(learnt(pool), pool)
+    others = offspring(pool, ENCODING, len(chosen), np.random.default_rng(1))
+    shares = [feasible_mask(PROBLEM.evaluate_matrix(matrix).violations).mean() for matrix in (chosen, others)]
+    assert shares[0] > 0.85
+    assert shares[1] < 0.6
+
+
+def test_a_share_of_the_evaluations_goes_to_rejected_designs(pool: Any) -> None:
+    screen = learnt(pool)
+    chosen = screened(screen, pool)
+    assert len(chosen) == N
+    assert screen.counts["considered"] == CANDIDATES * len(chosen)
+    assert screen.counts["evaluated_though_rejected"] >= REJECTED_SHARE * len(chosen)
+
+
+def test_designs_that_bounds_discard_are_not_chosen(pool: Any) -> None:
+    dearest = PROBLEM.evaluate_matrix(pool).values[:, 0]
+    limit = float(np.median(dearest))
+    problem = Problem(TASK.model_copy(update={"constraints": (f"price <= {limit}",)}), SPACE)
+    screen = learnt(pool, problem)
+    chosen = screened(screen, pool)
+    assert screen.counts["discarded_by_bounds"] > 0
+    assert np.all(lower_bounds(problem, chosen).violations <= 0.0)
+    # Beyond the reference point, too.
+    screen = learnt(pool, point=(limit, 3.0, 1.0))
+    assert np.all(lower_bounds(PROBLEM, screened(screen, pool)).values[:, 0] < limit)
+    assert screen.counts["discarded_by_bounds"] > 0
+
+
+def test_screen_goes_on_if_bounds_discard_all_designs(pool: Any) -> None:
+    problem = Problem(TASK.model_copy(update={"constraints": ("price <= 1",)}), SPACE)
+    screen = learnt(pool, problem)
+    chosen = screened(screen, pool)
+    assert len(chosen) == N
+    assert screen.counts["discarded_by_bounds"] == screen.counts["considered"]
+
+
+def test_restored_screen_equals_uninterrupted_one(pool: Any) -> None:
+    screen, restored = learnt(pool), Screen(PROBLEM, lambda: POINT)
+    restored.restore(screen.state())
+    for seed in range(3):
+        chosen = screened(screen, pool, seed)
+        assert np.array_equal(screened(restored, pool, seed), chosen)
+        outcomes = PROBLEM.evaluate_matrix(chosen)
+        screen.learn(chosen, outcomes)
+        restored.learn(chosen, outcomes)
+    assert restored.counts == screen.counts
+
+
+def test_screen_forgets_the_oldest_designs(pool: Any) -> None:
+    screen, outcomes = Screen(PROBLEM, lambda: POINT), PROBLEM.evaluate_matrix(pool)
+    for _ in range(2 + REMEMBERED // len(pool)):
+        screen.learn(pool, outcomes)
+    state = screen.state()
+    assert [len(state[f"screen_{name}"]) for name in ("matrix", "postures", "feasible")] == [REMEMBERED] * 3
