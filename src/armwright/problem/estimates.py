@@ -23,7 +23,7 @@ from armwright.problem.problem import Outcomes, Problem, worst_case
 EXACT = (PRICE, MASS, LENGTH, JOINTS, VOLTAGES)  # quantities that an arm has without moving
 OF_REACH = (POSITION_ERROR, WORST_ERROR, UNREACHED_TARGETS)  # at least what the distance beyond reach implies
 ROUNDING = 1e-5  # of a distance relative to the reach, from single precision
-AT_ONCE = 1000  # designs that are estimated at once
+AT_ONCE = 500  # designs that are estimated at once: below MANY_ARMS, so that no other kernels are loaded
 
 
 def lower_bounds(problem: Problem, matrix: Array) -> Outcomes:
