@@ -43,7 +43,8 @@ from armwright.study.study import optimize
 from armwright.study.time_plan import ChunkSize, ResultCosts, TimePlan, files_seconds
 
 SAVE_SECONDS = 5.0
-N_MEASURED = 4  # designs that the cost of results is measured on
+N_MEASURED = (1, 4, 16, 64)  # designs that the cost of results is measured on: more, while that is quick
+NOTABLE_SHARE, LONG_SHARE = 0.02, 0.1  # of the budget
 N_PROPOSED = 20  # initial designs requested from a proposer
 
 
@@ -357,12 +358,15 @@ class _DirectSearch:
             history = History(self.problem, self._front_trials(front), 0, reference_point)
             if self.folder is not None:  # otherwise nothing is verified
                 verify(self.problem, [trial.design for trial in history], history.values, reference_point)
-            return history, (self.plan.elapsed - started) / len(history)
+            return history, self.plan.elapsed - started
 
         history, seconds = verify_best(1)
-        if not self.plan.is_notable(seconds):  # most of it may be the loading of kernels in float64
-            history, seconds = verify_best(N_MEASURED)
-        design = seconds + files_seconds(self.problem.task)
+        if not self.plan.is_above(LONG_SHARE, seconds):  # most of it may be the loading of kernels in float64
+            for n in N_MEASURED:
+                history, seconds = verify_best(n)
+                if self.plan.is_above(NOTABLE_SHARE, seconds):
+                    break
+        design = seconds / len(history) + files_seconds(self.problem.task)
         if not history.front:
             return ResultCosts(design)
         started = self.plan.elapsed

@@ -19,7 +19,6 @@ FEW_DESIGNS = 10  # that are verified even if they take more than their share of
 SEARCH_SHARE = 0.3  # of the budget that the search gets at least
 RESULTS_SHARE = 0.2  # of the budget at most, to verify and write designs
 FEW_SHARE = 0.4  # of the budget at most, to verify and write few designs
-NOTABLE_SHARE = 0.02  # of the budget
 LATE_SECONDS = 1.0  # [s] for verifying and writing designs even if the time is up
 SIMULATION_SHARE = 0.15  # of the budget at most
 UNKNOWN_SHARE = 0.3  # of the budget for results whose costs are unknown
@@ -132,9 +131,9 @@ class TimePlan:
         affordable = seconds / max(self.costs.design, 1e-9)
         return int(min(MAX_DESIGNS, max(1.0, affordable)))
 
-    def is_notable(self, seconds: float) -> bool:
-        """Return whether a time is a notable part of the budget."""
-        return seconds > NOTABLE_SHARE * self._limit
+    def is_above(self, share: float, seconds: float) -> bool:
+        """Return whether a time is more than a share of what the budget leaves to this session."""
+        return seconds > share * (self._limit - self.earlier)
 
     def has_time_to_simulate(self, n: int, after: float) -> bool:
         """Return whether n simulations fit in before what follows them, page and figures aside, which takes `after`."""
