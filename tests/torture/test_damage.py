@@ -203,7 +203,7 @@ def test_damaged_search_state_is_reported_or_harmless(tmp_path: Path, kills: int
         return find_front(PROBLEM, evaluations=evaluations, seed=1, stop_at_stall=False, out=folder)
 
     intact, extended, restarted = (tmp_path / name for name in ("intact", "extended", "restarted"))
-    search(intact, "2000")
+    search(intact, 2000)
     for undamaged in (extended, restarted):
         shutil.copytree(intact, undamaged)
     (restarted / "search.npz").unlink()
