@@ -26,12 +26,14 @@ def test_kept_designs_stand_for_all_others(front: np.ndarray, size: float, seed:
     m: int = front.shape[1]
     reference = (1.1,) * m
     resolution: Array = size * np.linspace(1.0 / m, 1.0, m)
-    kept = distinct(front, resolution, np.random.default_rng(seed).integers(3, size=len(front)))
+    rank = np.random.default_rng(seed).integers(3, size=len(front))
+    kept = distinct(front, resolution, rank)
     others = front[kept]
-    # The best of each objective stays, and each design has a kept one within the resolution.
+    # The best of each objective stays. Each design has a kept one that is as good, and similar or of lower rank.
     assert np.array_equal(others.min(axis=0), front.min(axis=0))
     near = np.all(np.abs(front[:, None] - others) <= resolution * (1.0 + 1e-9), axis=2)
-    assert near.any(axis=1).all()
+    as_good = np.all(others <= front[:, None] + resolution * (1.0 + 1e-9), axis=2)
+    assert (near | (as_good & (rank[kept] < rank[:, None]))).any(axis=1).all()
     # Only the best ones of two objectives may be near each other.
     assert (near[kept].sum() - len(kept)) / 2 <= m * (m - 1) / 2
     # The loss of hypervolume has the documented bound.
@@ -46,6 +48,13 @@ def test_of_equal_designs_the_lowest_rank_stays() -> None:
     resolution = np.array([0.1, 0.1])
     assert distinct(front, resolution, np.array([4, 6, 5, 4])).tolist() == [0, 2, 3]
     assert distinct(front, resolution, np.array([4, 5, 6, 4])).tolist() == [0, 1, 3]
+
+
+def test_a_higher_rank_needs_an_advantage_above_the_resolution() -> None:
+    front = np.array([[0.0, 1.0], [0.10, 0.60], [0.15, 0.40], [1.0, 0.0]])
+    resolution = np.array([0.1, 0.1])
+    assert distinct(front, resolution, np.array([4, 6, 5, 4])).tolist() == [0, 2, 3]
+    assert distinct(front, resolution, np.array([4, 5, 5, 4])).tolist() == [0, 1, 2, 3]
 
 
 def test_resolution_is_stated_or_a_share_of_the_range() -> None:

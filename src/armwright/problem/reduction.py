@@ -1,9 +1,9 @@
 """Arms with one joint fewer: a joint that never leaves 0 along the task is removed.
 
 At 0, a joint does not change any frame, so the links before and after it act as one. If both have the same direction,
-they become one link, the sum of both; the link of the first joint becomes a part of the base position. Where the space
-does not allow this, the joint becomes fixed, if the space has a fixed module. Of a module of two joints, the other one
-stays.
+they become one link, the sum of both; the link of the first joint becomes a part of the base position. Values beyond
+their ranges become the nearest allowed ones: the arm is no longer the same, but may serve as well. If the space does
+not allow this, the joint becomes a fixed module, if the space has one. Of a module of two joints, the other one stays.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from armwright.exceptions import DesignError
 from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import DIRECTIONS, MODULES, mounted_vector
-from armwright.spaces.parameters import Design, ParameterValue
+from armwright.spaces.parameters import Design, FloatParameter, ParameterValue
 
 IDLE = 1e-3  # [rad]; a joint that stays nearer to 0 along the task is removed
 KINDS = ("joint", "link", "direction", "motor", "stroke", "limit")  # parameters of a module
@@ -104,4 +104,6 @@ def _merged(space: DesignSpace, design: Design, i: int) -> dict[str, ParameterVa
     }
     arm = {name: value for name, value in design.params.items() if name.partition("_")[0] not in KINDS}
     arm |= {f"origin_{axis}": value for axis, value in zip("xyz", base, strict=True)}
-    return {**arm, **numbered, "n_joints": str(count - 1)}
+    merged = {**arm, **numbered, "n_joints": str(count - 1)}
+    ranges = {p.name: p for p in space.parameters if isinstance(p, FloatParameter)}
+    return merged | {name: ranges[name].nearest(float(value)) for name, value in merged.items() if name in ranges}

@@ -29,9 +29,10 @@ def resolution_of(
 def distinct(values: Array, resolution: Array, rank: NDArray[np.int64]) -> Indices:
     """Return the sorted indices of points of a front (N, M), N >= 1, that differ in some objective by the resolution.
 
-    Each point left out is within the resolution of a kept one in every objective. The points with the best value of
-    each objective stay. Of the others, those of the lowest rank come first, and of these the ones with the smallest sum
-    of objectives in units of the resolution.
+    A point is left out if a kept one differs by no more than the resolution in every objective, or if a kept one of
+    lower rank is not worse by more than that in any. The points with the best value of each objective stay. Of the
+    others, those of the lowest rank come first, and of these the ones with the smallest sum of objectives in units of
+    the resolution.
 
     The kept points, moved by the resolution r towards the ideal point, dominate the whole front. The loss of
     hypervolume is therefore at most the sum of r_m / L_m times the product of all L_m, the distances from the best
@@ -46,6 +47,8 @@ def distinct(values: Array, resolution: Array, rank: NDArray[np.int64]) -> Indic
     total = scaled.sum(axis=1)
     kept = sorted({int(np.lexsort((total, column))[0]) for column in scaled.T})
     for index in np.lexsort((total, rank)):
-        if not np.any(np.all(np.abs(scaled[kept] - scaled[index]) <= 1.0, axis=1)):
+        worse = scaled[kept] - scaled[index]
+        is_similar = (rank[kept] < rank[index]) | np.all(worse >= -1.0, axis=1)
+        if not np.any(is_similar & np.all(worse <= 1.0, axis=1)):
             kept.append(int(index))
     return np.sort(kept)
