@@ -134,6 +134,7 @@ class _DirectSearch:
         self.resumed = 0  # evaluations of earlier sessions
         self.ended_after = 0.0  # largest time budget that has ended the search [s]
         self.chunk_size = ChunkSize(plan.budget)
+        self.asking = 0.0  # of the latest generation: time that screening its designs took [s]
         self.infeasible = 0  # designs of all sessions
         self.tally = ViolationTally(len(problem.constraints))  # of all sessions
         if folder is not None:
@@ -151,7 +152,9 @@ class _DirectSearch:
         try:
             saved = time.monotonic()
             while not (ended := self._end_reason(stop_at_stall)):
+                started = self.plan.elapsed
                 matrix = self.search.ask()
+                self.asking = self.plan.elapsed - started
                 values = self._evaluate(matrix)
                 self.search.tell(matrix[: len(values)], values)
                 if self.survey.close():
@@ -188,7 +191,7 @@ class _DirectSearch:
         """Return why the search ends; empty if it goes on."""
         if not self.search.evaluations:
             return ""
-        is_late = self.plan.search_left <= 0.0 or self.ended_after >= (self.plan.budget.seconds or math.inf)
+        is_late = self.plan.search_left <= self.asking or self.ended_after >= (self.plan.budget.seconds or math.inf)
         if self._is_exhausted or is_late:
             return "budget"
         is_settled = not self.survey.is_open
