@@ -27,7 +27,7 @@ def pool() -> Any:
     """Designs in the middle of a search: neighbours of the best known ones."""
     known = known_front(PROBLEM)
     assert known is not None
-    return offspring(SPACE.matrix(known.designs), ENCODING, 60, np.random.default_rng(0))
+    return offspring(SPACE.matrix(known.designs), np.zeros(len(known.designs)), ENCODING, 60, np.random.default_rng(0))
 
 
 def learnt(pool: Any, problem: Problem = PROBLEM, point: tuple[float, ...] = POINT) -> Screen:
@@ -37,7 +37,7 @@ def learnt(pool: Any, problem: Problem = PROBLEM, point: tuple[float, ...] = POI
 
 
 def screened(screen: Screen, pool: Any, seed: int = 1) -> Any:
-    return screen.offspring(pool, ENCODING, N, np.random.default_rng(seed))
+    return screen.offspring(pool, np.zeros(len(pool)), ENCODING, N, np.random.default_rng(seed))
 
 
 def test_screening_is_for_tasks_with_cycles() -> None:
@@ -47,7 +47,7 @@ def test_screening_is_for_tasks_with_cycles() -> None:
 
 def test_chosen_offspring_are_feasible_more_often(pool: Any) -> None:
     chosen = screened(learnt(pool), pool)
-    others = offspring(pool, ENCODING, len(chosen), np.random.default_rng(1))
+    others = offspring(pool, np.zeros(len(pool)), ENCODING, len(chosen), np.random.default_rng(1))
     shares = [feasible_mask(PROBLEM.evaluate_matrix(matrix).violations).mean() for matrix in (chosen, others)]
     assert shares[0] > 0.85
     assert shares[1] < 0.6

@@ -22,16 +22,16 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.pareto import hypervolume
 from armwright.search.encoding import DesignEncoding
-from armwright.search.survival import Indices, front, leaders, nearest, survivors, thinned
+from armwright.search.survival import Indices, front, leaders, nearest, ranks, survivors, thinned
 from armwright.search.variation import offspring
 from armwright.seeding import derived_seed
 from armwright.spaces.parameters import Parameter
 
 FRONT_LIMITS = (800, 1000)  # designs; a front longer than the second is thinned to the first
-CAPACITIES = (100, 1000)  # designs in the pool: first and final
+CAPACITIES = (50, 1000)  # designs in the pool: first and final
 EVALUATIONS_PER_MEMBER = 200  # the pool grows by one design per so many evaluations
-SMALLEST_BATCH = 100  # designs per generation; later as many as the pool holds
-FIRST_BATCH = 500  # random designs at the start
+SMALLEST_BATCH = 50  # designs per generation; later as many as the pool holds
+FIRST_BATCH = 200  # random designs at the start
 LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
 SIDE_SHARE = 0.25  # of the evaluations after these
@@ -68,7 +68,7 @@ class FrontSearch:
         reference_point: Sequence[float],
         seed: int,
         known: Array | None = None,
-        vary: Callable[[Array, DesignEncoding, int, np.random.Generator], Array] = offspring,
+        vary: Callable[[Array, Indices, DesignEncoding, int, np.random.Generator], Array] = offspring,
     ) -> None:
         self._encoding = DesignEncoding(parameters)
         self._evaluate = evaluate
@@ -129,10 +129,10 @@ class FrontSearch:
         if self._generation == 0:
             return np.vstack([self._known, self._encoding.random(FIRST_BATCH, rng)])
         if not self._is_side_generation:
-            return self._vary(self._matrix, self._encoding, max(SMALLEST_BATCH, self._capacity), rng)
+            return self._offspring(self._matrix, self._values, max(SMALLEST_BATCH, self._capacity), rng)
         if not len(self._side_matrix):
             return self._encoding.random(FIRST_BATCH, rng)
-        return self._vary(self._side_matrix, self._encoding, SMALLEST_BATCH, rng)
+        return self._offspring(self._side_matrix, self._side_values, SMALLEST_BATCH, rng)
 
     def tell(self, matrix: Array, values: Array) -> None:
         """Select from the designs that `ask` returned, given their (N, M) values."""
@@ -185,6 +185,9 @@ class FrontSearch:
     @property
     def _is_side_generation(self) -> bool:
         return self._side_evaluations < SIDE_SHARE * (self._evaluations - SIDE_FROM)
+
+    def _offspring(self, matrix: Array, values: Array, n: int, rng: np.random.Generator) -> Array:
+        return self._vary(matrix, ranks(values, self._reference_point), self._encoding, n, rng)
 
     def _select(self, matrix: Array, values: Array) -> None:
         """Update the front and the main pool with new designs."""

@@ -46,11 +46,9 @@ class Screen:
         plan, parameters = problem.scenes[0].plan, problem.space.parameters
         assert plan is not None
         dof = problem.arms(problem.space.matrix(problem.space.sample(1, 0))).dof
-        joints = {"n_joints", *(f"joint_{j}" for j in range(1, problem.space.max_joints + 1))}
         self._problem = problem
         self._reference_point = reference_point
         self._encoding = DesignEncoding(parameters)
-        self._joints = [column for column, parameter in enumerate(parameters) if parameter.name in joints]
         self._matrix = np.empty((0, len(parameters)))
         self._postures = np.empty((0, len(plan.blocks), dof))
         self._feasible = np.empty(0, dtype=bool)
@@ -62,9 +60,11 @@ class Screen:
         """Designs considered, discarded by bounds, and evaluated although the estimates rejected them."""
         return dict(zip(COUNTS, self._counts.tolist(), strict=True))
 
-    def offspring(self, pool: Array, encoding: DesignEncoding, n: int, rng: np.random.Generator) -> Array:
+    def offspring(
+        self, pool: Array, ranks: Indices, encoding: DesignEncoding, n: int, rng: np.random.Generator
+    ) -> Array:
         """Return an (n, P) matrix of new designs, chosen from many of `variation.offspring`, whose arguments it has."""
-        candidates = offspring(pool, encoding, CANDIDATES * n, rng)
+        candidates = offspring(pool, ranks, encoding, CANDIDATES * n, rng)
         hopeless = self._is_hopeless(lower_bounds(self._problem, candidates))
         left, discarded = np.flatnonzero(~hopeless), np.flatnonzero(hopeless)
         best, rejected = self._ranked(candidates[left], n - math.ceil(REJECTED_SHARE * n), rng)
@@ -118,10 +118,10 @@ class Screen:
         """
         near = np.zeros((len(matrix), *self._postures.shape[1:]))
         own, known = self._encoding.units(matrix), self._encoding.units(self._matrix)
-        joints, of_row = np.unique(matrix[:, self._joints], axis=0, return_inverse=True)
-        for number, sequence in enumerate(joints):
-            rows = np.flatnonzero(of_row.ravel() == number)
-            same = np.all(self._matrix[:, self._joints] == sequence, axis=1)
+        structures, known_structures = self._encoding.structures(matrix), self._encoding.structures(self._matrix)
+        for structure in np.unique(structures):
+            rows = np.flatnonzero(structures == structure)
+            same = known_structures == structure
             same = np.flatnonzero(same & self._feasible if np.any(same & self._feasible) else same)
             if len(same):
                 near[rows] = self._postures[same[KDTree(known[same]).query(own[rows])[1]]]

@@ -34,11 +34,14 @@ def survivors(values: Array, reference_point: Array, capacity: int) -> Indices:
     best = front(values, reference_point)
     if len(best) >= capacity:
         return best[thinned(values[best], reference_point, capacity)]
-    others = np.setdiff1d(np.arange(len(values)), best)
-    excess = np.maximum(values[others] - reference_point, 0.0)
-    outside = np.any(values[others] >= reference_point, axis=1)
-    rank = np.where(outside, moocore.pareto_rank(excess), moocore.pareto_rank(values[others]))
-    return np.concatenate([best, others[np.lexsort((rank, outside))]])[:capacity]
+    return np.argsort(ranks(values, reference_point), kind="stable")[:capacity]
+
+
+def ranks(values: Array, reference_point: Array) -> Indices:
+    """Return the (N,) Pareto ranks of `values` (N, M); points outside the reference box rank behind those within."""
+    outside = np.any(values >= reference_point, axis=1)
+    excess = moocore.pareto_rank(np.maximum(values - reference_point, 0.0))
+    return np.where(outside, len(values) + excess, moocore.pareto_rank(values))
 
 
 def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, n: int) -> Indices:
@@ -59,7 +62,7 @@ def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array
     order = np.argsort(structures, kind="stable")
     starts = np.flatnonzero(np.diff(structures[order], prepend=-1))
     largest = np.maximum.reduceat(boxes[order], starts)
-    leading = np.argsort(-largest, kind="stable")[:n]
+    leading = np.argsort(-largest, kind="stable")[: min(n, np.count_nonzero(largest))]
     sizes = np.diff(starts, append=len(order))
     kept: list[Indices] = []
     for weighted in (boxes, *(boxes[:, None] * gains**2).T):

@@ -6,27 +6,32 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.search.encoding import DesignEncoding
 
-RARE_SHARE = 0.3  # of the parents: drawn with equal probability per structure, however few designs it has
+RARE_SHARE = 0.1  # of the parents: drawn with equal probability per structure, however few designs it has
 CROSSOVER_SHARE = 0.6  # of the batch: two members of any structure are mixed
 CROSSOVER_SPREAD = 0.3  # of the distance between the two
 NEIGHBOURS = 10  # pool members to either side
 DIFFERENCE_SHARE = 0.35  # of the mutations: the difference of two neighbours is added
 LINE_SHARE = 0.3  # of the mutations: on the line to a neighbour, or slightly beyond; the rest are normal steps
-STEP_EXPONENTS = (-4.5, -1.0)  # of ten; length of normal steps, as a share of a parameter's range
+STEP_EXPONENTS = (-3.5, -0.7)  # of ten; length of normal steps, as a share of a parameter's range
 STEP_DENSITIES = (0.15, 0.3, 1.0)  # share of parameters that a normal step changes
-CATEGORY_SHARE = 0.3  # of the mutations: categories change, too
+CATEGORY_SHARE = 0.6  # of the mutations: categories change, too
 
 
-def offspring(pool: Array, encoding: DesignEncoding, n: int, rng: np.random.Generator) -> Array:
+def offspring(
+    pool: Array, ranks: NDArray[np.int64], encoding: DesignEncoding, n: int, rng: np.random.Generator
+) -> Array:
     """Return an (n, P) matrix of new designs.
 
     Args:
         pool: (N, P) designs, sorted so that neighbours resemble each other.
+        ranks: (N,) of the designs; of two that are drawn as a parent, the one with the lower rank is taken.
         encoding: columns of `pool`.
         n: number of new designs.
         rng: source of randomness.
     """
-    parents = _parents(encoding.structures(pool), n, rng)
+    structures = encoding.structures(pool)
+    one, other = _parents(structures, n, rng), _parents(structures, n, rng)
+    parents = np.where(ranks[other] < ranks[one], other, one)
     children, units = pool[parents], encoding.units(pool)
     children[:, encoding.real] = encoding.from_units(_mutate_reals(units, parents, rng))
     children[:, encoding.categorical] = _mutate_categories(children[:, encoding.categorical], encoding.choices, rng)
