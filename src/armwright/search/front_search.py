@@ -4,7 +4,7 @@ The search is elitist and keeps one pool of designs. Each generation varies its 
 batch, and keeps those with the largest hypervolume contributions. The pool starts small, to approach the front quickly,
 and grows, to resolve it.
 
-The combination of categories (the joint sequence of an arm) is the structure of a design. Three rules keep structures
+The structure of a design is its joint sequence. Three rules keep structures
 alive that are not the best at first: a few of the best designs of the leading structures stay in the pool, rare
 structures get more than their share of children, and the pool is sorted by structure and first objective. The
 neighbours of a member then mostly have the same structure and similar values, and the differences between them make
