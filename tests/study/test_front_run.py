@@ -16,7 +16,8 @@ from armwright.report.figures import write_figures
 from armwright.runs.folder import read_run
 from armwright.runs.front_gap import known_front
 from armwright.runs.results import read_summary, verify_run
-from armwright.search.front_search import FrontSearch
+from armwright.search.front_search import FIRST_BATCH, FrontSearch
+from armwright.search.screening import CANDIDATES
 from armwright.spaces.design_space import default_space, paper_space
 from armwright.study.front_run import FrontRun, find_front
 from armwright.study.search_budget import SearchProgress
@@ -117,7 +118,7 @@ def test_resumed_front_run_of_a_cycle_is_screened_identically(tmp_path: Path) ->
     assert np.array_equal(run.history.values, whole.history.values)
     screening = run.summary["search"]["screening"]
     assert screening == whole.summary["search"]["screening"]
-    assert screening["considered"] == 30 * 200
+    assert screening["considered"] == CANDIDATES * (650 - FIRST_BATCH)
     assert screening["evaluated_though_rejected"] >= 0.05 * 200
 
 
@@ -126,7 +127,7 @@ def test_front_run_starts_from_a_run_or_a_proposer(tmp_path: Path) -> None:
     study = optimize(PROBLEM, proposer="rules", n_total=30, seed=0, out=tmp_path / "study")
     run = find_front(PROBLEM, evaluations=500, seed=0, initial_designs=tmp_path / "study", out=tmp_path / "a")
     together = np.vstack([run.history.values, study.history.values])
-    assert hypervolume(together, (5, 5)) == pytest.approx(hypervolume(run.history.values, (5, 5)))  # nothing is lost
+    assert hypervolume(together, (5, 5)) <= run.summary["hypervolume"]["final"] * (1 + 1e-9)  # nothing is lost
     proposed = find_front(PROBLEM, evaluations=500, seed=0, initial_designs=RulesProposer(), out=tmp_path / "b")
     assert proposed.config.method.initial_designs == {"proposer": {"name": "rules"}}
     _, first = read_run(tmp_path / "b" / "proposals")

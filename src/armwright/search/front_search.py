@@ -4,11 +4,10 @@ The search is elitist and keeps one pool of designs. Each generation varies its 
 batch, and keeps those with the largest hypervolume contributions. The pool starts small, to approach the front quickly,
 and grows, to resolve it.
 
-The structure of a design is its joint sequence. Three rules keep structures
-alive that are not the best at first: a few of the best designs of the leading structures stay in the pool, rare
-structures get more than their share of children, and the pool is sorted by structure and first objective. The
-neighbours of a member then mostly have the same structure and similar values, and the differences between them make
-good steps.
+The structure of a design is its joint sequence. Three rules keep structures alive that are not the best at first: a few
+of the best designs of the leading structures stay in the pool, rare structures get more than their share of children,
+and the pool is sorted by structure and first objective. The neighbours of a member then mostly have the same structure
+and similar values, and the differences between them make good steps.
 
 A pool hardly ever recovers a structure it has lost. A part of the evaluations therefore goes to a side pool that starts
 at random, evolves on its own and joins the main pool after a while. Then the next one starts.
