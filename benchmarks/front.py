@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from peers import Nsga2
+from searches import reference_point_of
 
 from armwright.arrays import Array
 from armwright.experiments.plan import suite_tasks
-from armwright.pareto import default_reference_point, hypervolume
+from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
 from armwright.search.front_search import FrontSearch
@@ -59,9 +60,7 @@ def main() -> None:
 def compare(name: str, budgets: list[int], options: argparse.Namespace) -> None:
     """One task's lines: ours, then pymoo's."""
     problem = Problem(load_task(name))
-    reference_point = problem.reference_point or default_reference_point(
-        problem.evaluate(problem.space.sample(10, 0)).values
-    )
+    reference_point = reference_point_of(problem)
     known = known_front(problem)
     assert known is not None
     best = hypervolume(known.values, reference_point)

@@ -9,23 +9,21 @@ makes a front worse. Tasks with a cycle are searched in the spaces of their name
 
 import csv
 import io
-import itertools
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
 from peers import Nsga2
+from searches import by_sequence, reference_point_of, searched
 
 import armwright
 from armwright.arrays import Array
-from armwright.pareto import default_reference_point, hypervolume
+from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
-from armwright.search.front_search import FrontSearch
 from armwright.search.survival import front, thinned
 from armwright.spaces.design_space import default_space
-from armwright.spaces.parameters import FloatParameter
 from armwright.tasks.catalogue import builtin_tasks
 
 SEEDS, CYCLE_SEEDS = range(3), range(2)  # cycles take a hundred times as long to evaluate
@@ -45,7 +43,7 @@ def main() -> None:
 
 def make(problem: Problem) -> None:
     started = time.perf_counter()
-    reference, cycles = reference_point(problem), problem.task.cycle is not None
+    reference, cycles = reference_point_of(problem), problem.task.cycle is not None
     seeds = CYCLE_SEEDS if cycles else SEEDS
     evaluations = CYCLE_EVALUATIONS if cycles else EVALUATIONS
     theirs = PYMOO_CYCLE_EVALUATIONS if cycles else PYMOO_EVALUATIONS
@@ -66,9 +64,10 @@ def make(problem: Problem) -> None:
             (problem.space.matrix(known.designs), problem.evaluate(known.designs).penalised),
         )
     for seed in seeds:
-        take(f"search, seed {seed}, {evaluations:,} evaluations", searched(problem, reference, seed, evaluations))
+        search = searched(problem, reference, seed, evaluations)
+        take(f"search, seed {seed}, {evaluations:,} evaluations", (search.matrix, search.values))
     if not cycles:
-        take(f"search within each sequence, {PER_SEQUENCE:,} evaluations each", by_sequence(problem, reference))
+        take(f"search within each sequence, {PER_SEQUENCE:,} evaluations each", within_sequences(problem, reference))
     for seed in seeds:
         run = Nsga2(problem, seed, population=100, evaluations=theirs)
         take(f"pymoo's NSGA-II, seed {seed}, {theirs:,} evaluations", (run.rows, run.values))
@@ -86,44 +85,15 @@ def make(problem: Problem) -> None:
         write(problem, everything[kept], worth[kept], reference, words)
 
 
-def searched(problem: Problem, reference: tuple[float, ...], seed: int, evaluations: int) -> tuple[Array, Array]:
-    """Return the front that our search finds: designs and values."""
-
-    def evaluate(rows: Array) -> Array:
-        return problem.evaluate_matrix(rows).penalised
-
-    search = FrontSearch(problem.space.parameters, evaluate, reference, seed)
-    while search.evaluations < evaluations:
-        search.step()
-    return search.matrix, search.values
-
-
-def by_sequence(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, Array]:
+def within_sequences(problem: Problem, reference: tuple[float, ...]) -> tuple[Array, Array]:
     """The designs that our search finds within each joint sequence, all together."""
-    space = problem.space
-    real = [i for i, parameter in enumerate(space.parameters) if isinstance(parameter, FloatParameter)]
-    rows, values = [], []
-    for sequence in itertools.product(range(len(space.joint_types)), repeat=space.joints):
-
-        def whole(some: Array, sequence: tuple[int, ...] = sequence) -> Array:
-            full = np.empty((len(some), len(space.parameters)))
-            full[:, real] = some
-            full[:, 3 : 3 + space.joints] = sequence
-            return full
-
-        search = FrontSearch(
-            [space.parameters[i] for i in real], lambda some: problem.evaluate_matrix(whole(some)).values, reference, 0
-        )
-        while search.evaluations < PER_SEQUENCE:
-            search.step()
-        rows.append(whole(search.matrix))
+    rows: list[Array] = []
+    values: list[Array] = []
+    for _, space in by_sequence(problem.space):
+        search = searched(Problem(problem.task, space), reference, 0, PER_SEQUENCE)
+        rows.append(problem.space.matrix(space.designs(search.matrix)))
         values.append(search.values)
     return np.vstack(rows), np.vstack(values)
-
-
-def reference_point(problem: Problem) -> tuple[float, ...]:
-    """The task's, else the one of ten random designs: it only says which part of the front is worth most."""
-    return problem.reference_point or default_reference_point(problem.evaluate(problem.space.sample(10, seed=0)).values)
 
 
 def write(problem: Problem, rows: Array, values: Array, reference: tuple[float, ...], words: list[str]) -> None:

@@ -13,14 +13,12 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
+from searches import new_search
 
-from armwright.arrays import Array
 from armwright.pareto import hypervolume
 from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
-from armwright.search.front_search import FrontSearch
 from armwright.search.screening import Screen, pays
-from armwright.search.variation import offspring
 from armwright.spaces.design_space import default_space
 from armwright.tasks.catalogue import builtin_tasks
 
@@ -86,16 +84,7 @@ def row(problem: Problem, seed: int, budget: int) -> None:
 def run(problem: Problem, seed: int, budget: int, screen: Screen | None) -> Course:
     reference_point = problem.reference_point
     assert reference_point is not None
-    course = Course()
-
-    def evaluate(matrix: Array) -> Array:
-        outcomes = problem.evaluate_matrix(matrix)
-        if screen is not None:
-            screen.learn(matrix, outcomes)
-        return outcomes.penalised
-
-    vary = offspring if screen is None else screen.offspring
-    search = FrontSearch(problem.space.parameters, evaluate, reference_point, seed, vary=vary)
+    course, search = Course(), new_search(problem, reference_point, seed, screen)
     started = time.process_time()
     while search.evaluations < budget:
         search.step()

@@ -45,7 +45,8 @@ from .runs.trial import FinishedTrial as FinishedTrial
 from .spaces.design_space import DesignSpace as DesignSpace, load_space as load_space, paper_space as paper_space
 from .spaces.parameters import Design as Design
 from .study.cluster import Workers as Workers
-from .study.front_run import FrontRun as FrontRun, find_front as find_front
+from .study.direct_search import FrontRun as FrontRun
+from .study.front_run import find_front as find_front
 from .study.progress import StudyResult as StudyResult
 from .study.refine_run import refine_run as refine_run
 from .study.study import optimize as optimize

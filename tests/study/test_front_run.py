@@ -19,7 +19,8 @@ from armwright.runs.results import read_summary, verify_run
 from armwright.search.front_search import FIRST_BATCH, FrontSearch
 from armwright.search.screening import CANDIDATES
 from armwright.spaces.design_space import default_space, paper_space
-from armwright.study.front_run import FrontRun, find_front
+from armwright.study.direct_search import FrontRun
+from armwright.study.front_run import find_front
 from armwright.study.search_budget import SearchProgress
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task

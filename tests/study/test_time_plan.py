@@ -16,7 +16,7 @@ from armwright.problem.problem import Outcomes, Problem
 from armwright.runs.history import History
 from armwright.runs.results import read_summary
 from armwright.runs.verification import Verification
-from armwright.study import front_run
+from armwright.study import direct_search
 from armwright.study.front_run import find_front
 from armwright.study.search_budget import SearchBudget, SearchProgress, read_seconds
 from armwright.study.time_plan import ChunkSize, ResultCosts, TimePlan
@@ -52,7 +52,7 @@ def plan_of(clock: Clock, drawing: bool = False, **budget: Any) -> TimePlan:
 def slow_evaluation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
     """Return a function that sets how long evaluating a design takes by the clock; verifying it takes 35 times that."""
     seconds = 0.0
-    evaluate, verify, verify_front = Problem.evaluate_matrix, front_run.verify, front_run.verify_front
+    evaluate, verify, verify_front = Problem.evaluate_matrix, direct_search.verify, direct_search.verify_front
 
     def slow_evaluate(self: Problem, matrix: Any) -> Outcomes:
         clock.wait(seconds * len(matrix))
@@ -67,9 +67,9 @@ def slow_evaluation(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Callable[[
         return verify_front(history)
 
     monkeypatch.setattr(Problem, "evaluate_matrix", slow_evaluate)
-    monkeypatch.setattr(front_run, "verify", slow_verify)
-    monkeypatch.setattr(front_run, "verify_front", slow_verify_front)
-    monkeypatch.setattr(front_run, "MANY_ARMS", 1)
+    monkeypatch.setattr(direct_search, "verify", slow_verify)
+    monkeypatch.setattr(direct_search, "verify_front", slow_verify_front)
+    monkeypatch.setattr(direct_search, "MANY_ARMS", 1)
 
     def set_seconds(value: float) -> None:
         nonlocal seconds

@@ -22,7 +22,7 @@ from armwright.runs.infeasibility import describe_infeasibility
 from armwright.runs.path_report import describe_extremes
 from armwright.runs.results import REPORT
 from armwright.runs.supply_record import supply_of
-from armwright.study.front_run import FrontRun
+from armwright.study.direct_search import FrontRun
 from armwright.study.progress import StudyResult
 from armwright.study.refine_run import RefinedRun
 from armwright.study.time_plan import MAX_DESIGNS
