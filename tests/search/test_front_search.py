@@ -11,7 +11,7 @@ from armwright.search.encoding import DesignEncoding
 from armwright.search.front_search import CAPACITIES, FIRST_BATCH, SMALLEST_BATCH, FrontSearch
 from armwright.search.survival import leaders, survivors
 from armwright.search.variation import RARE_SHARE, _parents
-from armwright.spaces.design_space import paper_space
+from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.tasks.catalogue import load_task
 
@@ -219,6 +219,16 @@ def test_encoding_round_trips_designs_of_a_space():
         SPACE.design(design.params)
     assert len(np.unique(columns.structures(rows))) > 60
     np.testing.assert_allclose(columns.from_units(columns.units(rows)), rows[:, columns.real], atol=1e-15)
+
+
+def test_structures_are_joint_sequences():
+    space = load_space("desk-sorting")
+    columns = DesignEncoding(space.parameters)
+    rows = columns.random(300, np.random.default_rng(0))
+    sequences = np.array([design.joints for design in space.designs(rows)])
+    structures = columns.structures(rows)
+    np.testing.assert_array_equal(structures[:, None] == structures, sequences[:, None] == sequences)
+    assert 50 < len(np.unique(structures)) < 300
 
 
 def test_units_outside_a_range_are_reflected():

@@ -1,6 +1,5 @@
 """Columns of a design matrix, as the searches vary them: real ones on the unit cube, categories, and structures."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,8 +7,6 @@ from numpy.typing import NDArray
 
 from armwright.arrays import Array
 from armwright.spaces.parameters import GRID_DIGITS, CategoricalParameter, FloatParameter, Parameter
-
-Structures = NDArray[np.int64]
 
 
 class DesignEncoding:
@@ -21,7 +18,6 @@ class DesignEncoding:
         real: (R,) indices of the real columns.
         categorical: (C,) indices of the categorical columns.
         choices: (C,) number of categories of each categorical column.
-        structural: (C,) whether a categorical column is a part of the structure.
     """
 
     def __init__(self, parameters: Sequence[Parameter]) -> None:
@@ -34,15 +30,13 @@ class DesignEncoding:
         self._low, self._high = np.array(ranges).reshape(-1, 2).T
         self._step = np.array([p.step for p in parameters if isinstance(p, FloatParameter)])
 
-        column = {p.name: i for i, p in enumerate(parameters)}
+        column = {parameter.name: i for i, parameter in enumerate(parameters)}
         joints = {column[p.name]: len(p.choices) for p in categories if p.name.startswith("joint_")}
         self._joints = np.array(list(joints), dtype=int)
-        self._bases = np.array(list(joints.values()), dtype=np.int64) + 1
-        self._weights = np.cumprod([1, *self._bases], dtype=np.int64)[: len(joints)]
+        self._strides = np.cumprod([1, *(n + 1 for n in joints.values())], dtype=np.int64)[:-1]
         self._number = column.get("n_joints")
-        counts = next((p.choices for p in categories if p.name == "n_joints"), (len(joints),))
+        counts = next((p.choices for p in categories if p.name == "n_joints"), ())
         self._counts = np.array(counts, dtype=np.int64)
-        self.structural = np.isin(self.categorical, [*joints, self._number or -1])
 
     def __len__(self) -> int:
         return len(self.real) + len(self.categorical)
@@ -64,44 +58,16 @@ class DesignEncoding:
         reflected = 1.0 - np.abs(1.0 - np.abs(units))
         return self._on_grid(np.clip(self._low + reflected * (self._high - self._low), self._low, self._high))
 
-    def structures(self, matrix: Array) -> Structures:
+    def structures(self, matrix: Array) -> NDArray[np.int64]:
         """Return the (N,) structures of designs, each as one number."""
-        types = matrix[:, self._joints].astype(np.int64) + 1
+        types = matrix[:, self._joints].astype(np.int64) + 1  # 0: the arm has no such joint
         types[np.arange(len(self._joints)) >= self._n_joints(matrix)[:, None]] = 0
-        return types @ self._weights
-
-    def n_joints(self, structures: Structures) -> NDArray[np.int64]:
-        """Return the (N,) numbers of joints of structures."""
-        return np.count_nonzero(self._types(structures), axis=1)
-
-    def with_structures(self, matrix: Array, structures: Structures) -> Array:
-        """Return a copy of designs (N, P) with the (N,) given structures."""
-        types = self._types(structures)
-        changed = matrix.copy()
-        changed[:, self._joints] = np.where(types > 0, types - 1, matrix[:, self._joints])
-        if self._number is not None:
-            changed[:, self._number] = np.searchsorted(self._counts, np.count_nonzero(types, axis=1))
-        return changed
-
-    def sample_structures(self, n: int, rng: np.random.Generator) -> Structures:
-        """Return at most `n` different structures; each number of joints has an equal share, if it has as many."""
-        chosen: list[Structures] = []
-        for left, count in zip(range(len(self._counts), 0, -1), self._counts, strict=True):
-            share = (n - sum(map(len, chosen))) // left
-            bases = self._bases[:count]
-            numbers = random_distinct(math.prod((bases - 1).tolist()), share, rng)
-            types = numbers[:, None] // np.cumprod([1, *(bases[:-1] - 1)]) % (bases - 1) + 1
-            chosen.append(types @ self._weights[:count])
-        return np.concatenate(chosen)
+        return types @ self._strides
 
     def _n_joints(self, matrix: Array) -> NDArray[np.int64]:
         if self._number is None:
             return np.full(len(matrix), len(self._joints))
         return self._counts[matrix[:, self._number].astype(np.int64)]
-
-    def _types(self, structures: Structures) -> NDArray[np.int64]:
-        """Return the (N, J) joint types of structures: 0 for a missing joint, else one more than the category."""
-        return structures[:, None] // self._weights % self._bases
 
     def _on_grid(self, reals: Array) -> Array:
         """Round (N, R) real columns to the grid, if they have one."""
@@ -110,8 +76,3 @@ class DesignEncoding:
         step = np.where(self._step > 0.0, self._step, 1.0)
         grid = np.round(self._low + step * np.round((reals - self._low) / step), GRID_DIGITS)
         return np.where(self._step > 0.0, grid, reals)
-
-
-def random_distinct(total: int, n: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return min(n, total) different numbers below `total`."""
-    return rng.permutation(total)[:n] if total <= 100_000 else np.unique(rng.integers(total, size=n))

@@ -27,10 +27,10 @@ from armwright.seeding import derived_seed
 from armwright.spaces.parameters import Parameter
 
 FRONT_LIMITS = (800, 1000)  # designs; a front longer than the second is thinned to the first
-CAPACITIES = (50, 1000)  # designs in the pool: first and final
+CAPACITIES = (100, 1000)  # designs in the pool: first and final
 EVALUATIONS_PER_MEMBER = 200  # the pool grows by one design per so many evaluations
-SMALLEST_BATCH = 50  # designs per generation; later as many as the pool holds
-FIRST_BATCH = 200  # random designs at the start
+SMALLEST_BATCH = 100  # designs per generation; later as many as the pool holds
+FIRST_BATCH = 500  # random designs at the start
 LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
 SIDE_SHARE = 0.25  # of the evaluations after these

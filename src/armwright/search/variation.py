@@ -6,15 +6,15 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.search.encoding import DesignEncoding
 
-RARE_SHARE = 0.1  # of the parents: drawn with equal probability per structure, however few designs it has
+RARE_SHARE = 0.3  # of the parents: drawn with equal probability per structure, however few designs it has
 CROSSOVER_SHARE = 0.6  # of the batch: two members of any structure are mixed
 CROSSOVER_SPREAD = 0.3  # of the distance between the two
 NEIGHBOURS = 10  # pool members to either side
 DIFFERENCE_SHARE = 0.35  # of the mutations: the difference of two neighbours is added
 LINE_SHARE = 0.3  # of the mutations: on the line to a neighbour, or slightly beyond; the rest are normal steps
-STEP_EXPONENTS = (-3.5, -0.7)  # of ten; length of normal steps, as a share of a parameter's range
+STEP_EXPONENTS = (-4.5, -1.0)  # of ten; length of normal steps, as a share of a parameter's range
 STEP_DENSITIES = (0.15, 0.3, 1.0)  # share of parameters that a normal step changes
-CATEGORY_SHARE = 0.6  # of the mutations: categories change, too
+CATEGORY_SHARE = 0.3  # of the mutations: categories change, too
 
 
 def offspring(
