@@ -100,7 +100,10 @@ def test_study_reports_its_conflict() -> None:
 
 
 def test_direct_search_reports_the_conflict_of_all_its_designs_and_of_all_sessions(tmp_path: Path) -> None:
-    problem = Problem(task("worst_error <= 1e-3", "length <= 0.2"))
+    far_apart = task("worst_error <= 1e-3", "length <= 0.2").model_copy(
+        update={"targets": ((0.3, 0, 0.3), (-0.3, 0, 0.3))}
+    )
+    problem = Problem(far_apart)  # no arm of 0.2 m reaches both
     whole = find_front(problem, evaluations=3000, seed=0, stop_at_stall=False)
     conflict = whole.summary["feasibility"]["conflict"]
     assert conflict["designs"] == whole.summary["search"]["evaluations"]
