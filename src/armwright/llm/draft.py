@@ -280,8 +280,8 @@ def _document(content: Any, schema: type[Model], error: type[ArmwrightError], wh
         raise error(f"{where}: expected an object with the keys {', '.join(schema.model_fields)}")
     given = {key: item for key, item in cast("dict[str, Any]", content).items() if item is not None}
     value = check_document(given, schema, error, where)
-    stated = value.model_dump(exclude_defaults=True)
-    text = dump_document({key: item for key, item in given.items() if key in stated})
+    defaults = {key: field.get_default(call_default_factory=True) for key, field in schema.model_fields.items()}
+    text = dump_document({key: item for key, item in given.items() if getattr(value, key) != defaults[key]})
     if parse_document(text, schema, error, where) != value:
         raise error(f"{where}: expected plain text and numbers")
     return value, text
