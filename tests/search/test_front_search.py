@@ -10,7 +10,7 @@ from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
 from armwright.search.front_search import CAPACITIES, FIRST_BATCH, SMALLEST_BATCH, FrontSearch
 from armwright.search.survival import leaders, survivors
-from armwright.search.variation import RARE_SHARE, _parents
+from armwright.search.variation import RARE_SHARE, _parents, offspring
 from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.tasks.catalogue import load_task
@@ -20,17 +20,20 @@ MIXED = (
     FloatParameter("a", -2.0, 3.0, "m"),
     CategoricalParameter("joint_1", ("u", "v", "w")),
     *(FloatParameter(f"x_{i}", 0.0, 1.0, "m") for i in range(4)),
-    FloatParameter("fixed", 0.5, 0.5, "m"),
+    FloatParameter("fixed", 0.3, 0.3, "m"),
 )
 
 
 def dtlz2(n_objectives):
-    """DTLZ2 over the columns of MIXED (Deb et al. 2005): the front is the unit sphere, reached by joint v alone."""
+    """DTLZ2 over the columns of MIXED (Deb et al. 2005): the front is the unit sphere, reached by joint v alone.
+
+    Its optimum is at 0.3 instead of 0.5, because the search tries the middle of every range.
+    """
 
     def evaluate(rows):
         units = np.column_stack([(rows[:, 0] + 2.0) / 5.0, rows[:, 2:]])
         angles, rest = units[:, : n_objectives - 1] * np.pi / 2, units[:, n_objectives - 1 :]
-        radius = 1.0 + np.sum((rest - 0.5) ** 2, axis=1) + 0.3 * (rows[:, 1] != 1)
+        radius = 1.0 + np.sum((rest - 0.3) ** 2, axis=1) + 0.3 * (rows[:, 1] != 1)
         values = np.repeat(radius[:, None], n_objectives, axis=1)
         for m in range(n_objectives):
             values[:, m] *= np.prod(np.cos(angles[:, : n_objectives - 1 - m]), axis=1)
@@ -114,6 +117,15 @@ def test_asked_designs_lie_in_the_space():
         search.tell(rows, dtlz2(2)(rows))
 
 
+def test_children_reach_ends_and_middles_of_ranges_exactly():
+    encoding, rng = DesignEncoding(SPACE.parameters), np.random.default_rng(0)
+    pool = encoding.random(50, rng)
+    units = encoding.units(offspring(pool, np.zeros(50), encoding, 2000, rng))
+    for marked in (0.0, 0.5, 1.0):
+        shares = np.mean(np.abs(units - marked) < 1e-9, axis=0)
+        assert np.all((shares > 1e-3) & (shares < 0.05))
+
+
 def test_space_without_categories_is_searched():
     parameters = [p for p in MIXED if isinstance(p, FloatParameter)]
     search = FrontSearch(parameters, lambda rows: rows[:, :2] ** 2, [10.0, 10.0], seed=0)
@@ -121,7 +133,7 @@ def test_space_without_categories_is_searched():
 
 
 def test_known_designs_join_the_front():
-    perfect = np.array([[0.5, 1, 0.5, 0.5, 0.5, 0.5, 0.5]])
+    perfect = np.array([[0.5, 1, 0.3, 0.3, 0.3, 0.3, 0.3]])
     search = made(known=perfect)
     assert len(search.ask()) == FIRST_BATCH + 1
     assert np.any(np.all(stepped(search, 5).matrix == perfect, axis=1))

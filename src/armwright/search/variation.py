@@ -14,6 +14,7 @@ DIFFERENCE_SHARE = 0.35  # of the mutations: the difference of two neighbours is
 LINE_SHARE = 0.3  # of the mutations: on the line to a neighbour, or slightly beyond; the rest are normal steps
 STEP_EXPONENTS = (-4.5, -1.0)  # of ten; length of normal steps, as a share of a parameter's range
 STEP_DENSITIES = (0.15, 0.3, 1.0)  # share of parameters that a normal step changes
+MARKED_SHARE = 0.2  # of these parameters: moved to an end or to the middle of their range instead
 CATEGORY_SHARE = 0.3  # of the mutations: categories change, too
 
 
@@ -70,6 +71,9 @@ def _mutate_reals(units: Array, parents: NDArray[np.int64], rng: np.random.Gener
     if width:
         changes[np.arange(n), rng.integers(width, size=n)] = True
     by_step = parent + changes * lengths * rng.standard_normal((n, width))
+    # Good arms often have the shortest first link, or a base in the plane of symmetry. Normal steps never end there.
+    marked = changes & (rng.random((n, width)) < MARKED_SHARE)
+    by_step = np.where(marked, rng.choice((0.0, 0.5, 1.0), (n, width)), by_step)
     kind = rng.random((n, 1))
     return np.where(
         kind < DIFFERENCE_SHARE, by_difference, np.where(kind < DIFFERENCE_SHARE + LINE_SHARE, on_line, by_step)
