@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
-from armwright.search.front_search import CAPACITIES, FIRST_BATCH, SMALLEST_BATCH, FrontSearch
-from armwright.search.survival import leaders, survivors
-from armwright.search.variation import RARE_SHARE, _parents, offspring
+from armwright.search.front_search import CAPACITIES, FIRST_BATCH, PER_NUMBER, SMALLEST_BATCH, FrontSearch
+from armwright.search.survival import best_of_each, leaders, ranks, survivors
+from armwright.search.variation import RARE_SHARE, _of_equal_number, _parents, offspring
 from armwright.spaces.design_space import load_space, paper_space
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter
 from armwright.tasks.catalogue import load_task
@@ -209,6 +209,43 @@ def test_leaders_are_best_points_of_best_structures(points, most):
         chosen = [row for row in kept if structures[row] == kind]
         assert 1 <= len(chosen) <= 3
         assert largest[kind] in boxes[chosen]
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0), st.integers(4, 6)), min_size=1, max_size=40),
+    st.integers(1, 4),
+)
+def test_best_of_each_group_stay(points, n):
+    values, groups = np.array(points)[:, :2], np.array([group for _, _, group in points])
+    reference = np.array([1.5, 1.5])
+    kept, rank = best_of_each(values, groups, reference, n), ranks(values, reference)
+    assert len(set(kept.tolist())) == len(kept)
+    for group in set(groups.tolist()):
+        chosen, others = kept[groups[kept] == group], np.setdiff1d(np.flatnonzero(groups == group), kept)
+        assert len(chosen) == min(n, len(chosen) + len(others))
+        assert not len(others) or rank[chosen].max() <= rank[others].min()
+
+
+def test_pairs_have_one_number_of_joints_and_every_number_is_as_likely():
+    numbers = np.array([6] * 80 + [4] + [5] * 19)
+    pairs = _of_equal_number(numbers, 20_000, np.random.default_rng(0))
+    np.testing.assert_array_equal(numbers[pairs[0]], numbers[pairs[1]])
+    for number in (4, 5, 6):
+        assert np.mean(numbers[pairs[0]] == number) == pytest.approx(1 / 3, abs=0.02)
+    assert set(pairs.ravel().tolist()) == set(range(100))
+
+
+def test_few_joints_stay_in_the_pool_until_they_are_feasible():
+    space = load_space("desk-sorting")
+    columns = DesignEncoding(space.parameters)
+
+    def evaluate(rows):  # arms of four joints miss a constraint, though by less from step to step
+        values = 0.1 + columns.units(rows)[:, :2]
+        return np.where(columns.n_joints(rows)[:, None] == 4, 1e6 * (1.0 + values), values)
+
+    search = stepped(FrontSearch(space.parameters, evaluate, [2.0, 2.0], seed=0), 20)
+    assert set(columns.n_joints(search.matrix).tolist()) == {5}
+    assert np.sum(columns.n_joints(search.state()["matrix"]) == 4) >= PER_NUMBER
 
 
 def test_rare_structures_get_more_children():

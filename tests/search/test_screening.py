@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.pareto import feasible_mask
+from armwright.pareto import feasible_mask, total_violation
 from armwright.problem.estimates import lower_bounds
 from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
 from armwright.search.encoding import DesignEncoding
-from armwright.search.screening import CANDIDATES, REJECTED_SHARE, REMEMBERED, Screen, pays
+from armwright.search.screening import CANDIDATES, NEAR_MISSES, REJECTED_SHARE, REMEMBERED, Screen, pays
 from armwright.search.variation import offspring
 from armwright.spaces.design_space import default_space
 from armwright.tasks.catalogue import builtin_tasks, load_task
@@ -73,6 +73,22 @@ def test_designs_that_bounds_discard_are_not_chosen(pool: Any) -> None:
     screen = learnt(pool, point=(limit, 3.0, 1.0))
     assert np.all(lower_bounds(PROBLEM, screened(screen, pool)).values[:, 0] < limit)
     assert screen.counts["discarded_by_bounds"] > 0
+
+
+def test_near_misses_would_enlarge_the_front_and_miss_the_least(pool: Any) -> None:
+    outcomes = PROBLEM.evaluate_matrix(pool)
+    state = learnt(pool).state()
+    near, front = state["screen_near_matrix"], state["screen_front"]
+    assert 0 < len(near) <= NEAR_MISSES
+    found = PROBLEM.evaluate_matrix(near)
+    assert not feasible_mask(found.violations).any()
+    assert not np.any(np.all(front <= found.values[:, None], axis=2))
+    assert np.all(found.values < POINT)
+    # The design with the least violation of all that qualify is among them.
+    infeasible = ~feasible_mask(outcomes.violations) & np.all(outcomes.values < POINT, axis=1)
+    infeasible &= ~np.any(np.all(front <= outcomes.values[:, None], axis=2), axis=1)
+    least = total_violation(outcomes.violations)[infeasible].min()
+    assert total_violation(found.violations).min() == pytest.approx(least)
 
 
 def test_screen_goes_on_if_bounds_discard_all_designs(pool: Any) -> None:

@@ -124,6 +124,19 @@ def test_resumed_front_run_of_a_cycle_is_screened_identically(tmp_path: Path) ->
 
 
 @pytest.mark.slow
+def test_smallest_arms_are_found_among_larger_ones() -> None:
+    """The cheapest known arms of this task have four joints; with five, feasible ones are found much earlier."""
+    problem = Problem(load_task("desk-sorting"), default_space("desk-sorting"))
+    known = known_front(problem)
+    assert known is not None
+    assert problem.reference_point is not None
+    run = find_front(problem, evaluations=1500, seed=0)
+    assert len(run.front[0].design.joints) == len(known.designs[0].joints) == 4
+    assert run.front[0].values[0] <= 1.1 * known.values[0, 0]
+    assert run.summary["hypervolume"]["final"] > 0.95 * hypervolume(known.values, problem.reference_point)
+
+
+@pytest.mark.slow
 def test_front_run_starts_from_a_run_or_a_proposer(tmp_path: Path) -> None:
     study = optimize(PROBLEM, proposer="rules", n_total=30, seed=0, out=tmp_path / "study")
     run = find_front(PROBLEM, evaluations=500, seed=0, initial_designs=tmp_path / "study", out=tmp_path / "a")

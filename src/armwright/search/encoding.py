@@ -61,10 +61,11 @@ class DesignEncoding:
     def structures(self, matrix: Array) -> NDArray[np.int64]:
         """Return the (N,) structures of designs, each as one number."""
         types = matrix[:, self._joints].astype(np.int64) + 1  # 0: the arm has no such joint
-        types[np.arange(len(self._joints)) >= self._n_joints(matrix)[:, None]] = 0
+        types[np.arange(len(self._joints)) >= self.n_joints(matrix)[:, None]] = 0
         return types @ self._strides
 
-    def _n_joints(self, matrix: Array) -> NDArray[np.int64]:
+    def n_joints(self, matrix: Array) -> NDArray[np.int64]:
+        """Return the (N,) numbers of joints of designs."""
         if self._number is None:
             return np.full(len(matrix), len(self._joints))
         return self._counts[matrix[:, self._number].astype(np.int64)]

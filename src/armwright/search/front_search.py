@@ -4,10 +4,11 @@ The search is elitist and keeps one pool of designs. Each generation varies its 
 batch, and keeps those with the largest hypervolume contributions. The pool starts small, to approach the front quickly,
 and grows, to resolve it.
 
-The structure of a design is its joint sequence. Three rules keep structures alive that are not the best at first: a few
-of the best designs of the leading structures stay in the pool, rare structures get more than their share of children,
-and the pool is sorted by structure and first objective. The neighbours of a member then mostly have the same structure
-and similar values, and the differences between them make good steps.
+The structure of a design is its joint sequence. Three rules keep structures alive that are not the best at first. Some
+of the best designs of each number of joints and of the leading structures stay in the pool. Numbers of joints and
+structures with few members have more than their share of children. And the pool is sorted by structure and first
+objective: the neighbours of a member then mostly have the same structure and similar values, so that the differences
+between them make good steps.
 
 A pool hardly ever recovers a structure it has lost. A part of the evaluations therefore goes to a side pool that starts
 at random, evolves on its own and joins the main pool after a while. Then the next one starts.
@@ -21,7 +22,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.pareto import hypervolume
 from armwright.search.encoding import DesignEncoding
-from armwright.search.survival import Indices, front, leaders, nearest, ranks, survivors, thinned
+from armwright.search.survival import Indices, best_of_each, front, leaders, nearest, ranks, survivors, thinned
 from armwright.search.variation import offspring
 from armwright.seeding import derived_seed
 from armwright.spaces.parameters import Parameter
@@ -31,6 +32,7 @@ CAPACITIES = (100, 1000)  # designs in the pool: first and final
 EVALUATIONS_PER_MEMBER = 200  # the pool grows by one design per so many evaluations
 SMALLEST_BATCH = 100  # designs per generation; later as many as the pool holds
 FIRST_BATCH = 500  # random designs at the start
+PER_NUMBER = 20  # designs of each number of joints that stay in the pool, though all may be infeasible
 LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
 SIDE_SHARE = 0.25  # of the evaluations after these
@@ -220,5 +222,8 @@ class FrontSearch:
         best = survivors(values, self._reference_point, capacity)
         leading = leaders(values, structures, self._reference_point, LEADING)
         kept = np.union1d(best, leading)
+        numbers = self._encoding.n_joints(matrix)
+        if np.ptp(numbers):
+            kept = np.union1d(kept, best_of_each(values, numbers, self._reference_point, PER_NUMBER))
         kept = kept[np.lexsort((values[kept, 0], structures[kept]))]
         return matrix[kept], values[kept]

@@ -44,6 +44,14 @@ def ranks(values: Array, reference_point: Array) -> Indices:
     return np.where(outside, len(values) + excess, moocore.pareto_rank(values))
 
 
+def best_of_each(values: Array, groups: NDArray[np.int64], reference_point: Array, n: int) -> Indices:
+    """Return the indices of the n points of the lowest rank of each group, given the (N,) groups of `values` (N, M)."""
+    rank = ranks(values, reference_point)
+    order = np.lexsort((rank, groups))
+    _, starts, sizes = np.unique(groups[order], return_index=True, return_counts=True)
+    return order[np.arange(len(order)) - np.repeat(starts, sizes) < n]
+
+
 def leaders(values: Array, structures: NDArray[np.int64], reference_point: Array, n: int) -> Indices:
     """Return the indices of the best points of the best structures.
 

@@ -7,6 +7,7 @@ from armwright.arrays import Array
 from armwright.search.encoding import DesignEncoding
 
 RARE_SHARE = 0.3  # of the parents: drawn with equal probability per structure, however few designs it has
+NUMBER_SHARE = 0.3  # of the parents: chosen among designs with one number of joints, all numbers being equally likely
 CROSSOVER_SHARE = 0.6  # of the batch: two members of any structure are mixed
 CROSSOVER_SPREAD = 0.3  # of the distance between the two
 NEIGHBOURS = 10  # pool members to either side
@@ -32,6 +33,10 @@ def offspring(
     """
     structures = encoding.structures(pool)
     one, other = _parents(structures, n, rng), _parents(structures, n, rng)
+    numbers = encoding.n_joints(pool)
+    if np.ptp(numbers):
+        pairs = _of_equal_number(numbers, n, rng)
+        one, other = np.where(rng.random(n) < NUMBER_SHARE, pairs, (one, other))
     parents = np.where(ranks[other] < ranks[one], other, one)
     children, units = pool[parents], encoding.units(pool)
     children[:, encoding.real] = encoding.from_units(_mutate_reals(units, parents, rng))
@@ -45,6 +50,17 @@ def _parents(structures: NDArray[np.int64], n: int, rng: np.random.Generator) ->
     rare = np.searchsorted(np.cumsum(1.0 / members[structure]), rng.random(n) * len(members), side="right")
     uniform = rng.integers(len(structures), size=n)
     return np.where(rng.random(n) < RARE_SHARE, np.minimum(rare, len(structures) - 1), uniform)
+
+
+def _of_equal_number(numbers: NDArray[np.int64], n: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draw (2, n) indices of pool members, pairs with as many joints, given the (N,) numbers of joints of the pool.
+
+    Each number is drawn with equal probability, however few designs have it.
+    """
+    _, members = np.unique(numbers, return_counts=True)
+    wanted = rng.integers(len(members), size=n)
+    within = rng.integers(members[wanted], size=(2, n))
+    return np.argsort(numbers, kind="stable")[(np.cumsum(members) - members)[wanted] + within]
 
 
 def _cross(pool: Array, parents: NDArray[np.int64], encoding: DesignEncoding, rng: np.random.Generator) -> Array:
