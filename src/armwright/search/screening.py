@@ -60,8 +60,8 @@ class Screen:
         self._postures = np.empty((0, len(plan.blocks), dof))
         self._feasible = np.empty(0, dtype=bool)
         self._front = np.empty((0, len(problem.objectives)))
-        self._near_matrix = np.empty((0, len(parameters)))
-        self._near_values = np.empty((0, len(problem.objectives) + 1))  # the last one is the violation
+        self._near_matrix: Array = np.empty((0, len(parameters)))
+        self._near_values: Array = np.empty((0, len(problem.objectives) + 1))  # the last one is the violation
         self._counts = np.zeros(len(COUNTS), dtype=np.int64)
 
     @property
