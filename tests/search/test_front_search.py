@@ -8,7 +8,16 @@ from hypothesis import strategies as st
 from armwright.pareto import front_mask, hypervolume
 from armwright.problem.problem import Problem
 from armwright.search.encoding import DesignEncoding
-from armwright.search.front_search import CAPACITIES, FIRST_BATCH, PER_NUMBER, SMALLEST_BATCH, FrontSearch
+from armwright.search.front_search import (
+    CAPACITIES,
+    FIRST_BATCH,
+    LOST_FROM,
+    LOST_LIFE,
+    LOST_SHARE,
+    PER_NUMBER,
+    SMALLEST_BATCH,
+    FrontSearch,
+)
 from armwright.search.survival import best_of_each, leaders, ranks, survivors
 from armwright.search.variation import RARE_SHARE, _of_equal_number, _parents, offspring
 from armwright.spaces.design_space import load_space, paper_space
@@ -166,6 +175,27 @@ def test_side_pools_start_join_and_are_restored(monkeypatch):
     while other.evaluations < 12_000:
         other.step()
     assert np.array_equal(other.matrix, search.matrix)
+
+
+def test_side_pools_come_early_while_nothing_counts():
+    """Designs count in a side pool only, and only late."""
+
+    def evaluate(rows):
+        return dtlz2(2)(rows) + (0.0 if search._is_side_generation and search.evaluations > 9_000 else 10.0)
+
+    ages = []
+    search = FrontSearch(MIXED, evaluate, [1.1, 1.1], seed=0)
+    while search.evaluations < 9_000:
+        search.step()
+        ages.append(int(search.state()["side_age"]))
+    assert search.hypervolume == 0.0
+    assert search.state()["side_evaluations"] == pytest.approx(LOST_SHARE * (9_000 - LOST_FROM), abs=FIRST_BATCH)
+    assert LOST_LIFE / 2 < max(ages) < LOST_LIFE
+    while search.hypervolume == 0.0:
+        search.step()
+        assert search.evaluations < 10_000
+    assert search.state()["side_age"] == 0  # it joined at once
+    assert np.any(np.all(search.state()["values"] < 1.1, axis=1))
 
 
 def test_front_outside_reference_box_moves_into_it():

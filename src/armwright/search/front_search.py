@@ -11,7 +11,8 @@ objective: the neighbours of a member then mostly have the same structure and si
 between them make good steps.
 
 A pool hardly ever recovers a structure it has lost. A part of the evaluations therefore goes to a side pool that starts
-at random, evolves on its own and joins the main pool after a while. Then the next one starts.
+at random, evolves on its own and joins the main pool after a while. Then the next one starts. While nothing is found
+that counts, such as a feasible design, side pools start earlier and live shorter: the main pool may be stuck.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,6 +38,7 @@ LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
 SIDE_SHARE = 0.25  # of the evaluations after these
 SIDE_LIFE = 5_000  # evaluations of a side pool until it joins
+LOST_FROM, LOST_SHARE, LOST_LIFE = 2_000, 0.5, 1_500  # the same while no design lies within the reference box
 RECORD_SPACING = 1.02  # the hypervolume is recorded whenever the evaluations have grown by this factor
 STALL_FROM = 20_000  # evaluations; an early plateau is not a stall
 STALL_SHARE = 0.5  # of the evaluations, the latest
@@ -185,7 +187,13 @@ class FrontSearch:
 
     @property
     def _is_side_generation(self) -> bool:
-        return self._side_evaluations < SIDE_SHARE * (self._evaluations - SIDE_FROM)
+        start, share = (LOST_FROM, LOST_SHARE) if self._is_lost else (SIDE_FROM, SIDE_SHARE)
+        return self._side_evaluations < share * (self._evaluations - start)
+
+    @property
+    def _is_lost(self) -> bool:
+        """True while no design lies within the reference box."""
+        return not np.any(np.all(self._front_values < self._reference_point, axis=1))
 
     def _offspring(self, matrix: Array, values: Array, n: int, rng: np.random.Generator) -> Array:
         return self._vary(matrix, ranks(values, self._reference_point), self._encoding, n, rng)
@@ -198,10 +206,12 @@ class FrontSearch:
 
     def _select_side(self, matrix: Array, values: Array) -> None:
         """Update the front and the side pool, which joins the main pool when it is old enough."""
+        was_lost = self._is_lost
         self._update_front(matrix, values)
         matrix, values = np.vstack([self._side_matrix, matrix]), np.vstack([self._side_values, values])
         self._side_matrix, self._side_values = self._survivors(matrix, values, CAPACITIES[0])
-        if self._side_age >= SIDE_LIFE:
+        is_found = was_lost and not self._is_lost
+        if is_found or self._side_age >= (LOST_LIFE if was_lost else SIDE_LIFE):
             self._select(self._side_matrix, self._side_values)
             self._side_matrix, self._side_values, self._side_age = matrix[:0], values[:0], 0
 
