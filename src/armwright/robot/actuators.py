@@ -9,13 +9,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import SpaceError, did_you_mean
-from armwright.robot.actuator_defaults import ActuatorKind, default_values
+from armwright.robot.actuator_defaults import ActuatorKind, default_shape, default_values
 from armwright.robot.arm import Actuator
+from armwright.robot.motor_body import ActuatorShape, BodyShape
 
 CATALOGUE = "actuators.csv"
 SOURCES = "actuator_sources.csv"
@@ -26,6 +27,11 @@ UNITS: Mapping[str, str] = {
     "viscous_friction": "N m s/rad", "backlash": "rad", "position_gain": "N m/rad", "damping_gain": "N m s/rad",
     "current": "A", "width": "m", "height": "m", "depth": "m", "price": "USD",
 }  # fmt: skip
+
+DIMENSIONS = ("width", "height", "depth")
+BODY_KEYS = ("shape", "shaft_edge", "shaft_offset")
+
+Edge = Literal["width", "height", "depth"]
 
 
 class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -52,6 +58,9 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     width: float | None = Field(default=None, gt=0.0)  # [m]
     height: float | None = Field(default=None, gt=0.0)  # [m]
     depth: float | None = Field(default=None, gt=0.0)  # [m]
+    shape: BodyShape | None = None  # a cylinder is about its shaft
+    shaft_edge: Edge | None = None  # the edge along the shaft
+    shaft_offset: float | None = Field(default=None, ge=0.0)  # of the shaft from the middle, along the longer edge [m]
     price: float | None = Field(default=None, ge=0.0)  # [USD]
     estimates: tuple[str, ...] = ()  # the stated values that are estimated from a source, not stated by it
     source: str = Field(default="", max_length=500)
@@ -73,6 +82,26 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         """Names of the values that are estimates or defaults of the kind, in the order of the catalogue."""
         defaults = self._defaults()
         return tuple(name for name in UNITS if name in self.estimates or name in defaults)
+
+    @property
+    def assumed_shape(self) -> tuple[str, ...]:
+        """Names of the values of its shape that are defaults of the kind."""
+        return tuple(name for name in BODY_KEYS if getattr(self, name) is None)
+
+    @property
+    def body_shape(self) -> ActuatorShape | None:
+        """The shape about its shaft; None if a dimension is missing."""
+        edges = {name: value for name in DIMENSIONS if (value := value_of(self, name)) is not None}
+        if len(edges) < len(DIMENSIONS):
+            return None
+        default = default_shape(self.kind, *edges.values())
+        length = edges.pop(self.shaft_edge or default.shaft_edge)
+        short, long = sorted(edges.values())
+        if (self.shape or default.shape) == "cylinder":
+            return ActuatorShape("cylinder", length, long, long, self.shaft_offset or 0.0)
+        # The rule of servos: the shaft is as far from the near end of the body as from its sides.
+        offset = (long - short) / 2 if self.shaft_offset is None else self.shaft_offset
+        return ActuatorShape("box", length, long, short, offset)
 
     def completed(self) -> "ActuatorRecord":
         """Return the record with the defaults of its kind in place of missing values.
@@ -121,6 +150,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             damping_gain=values.damping_gain,
             voltage=self.voltage,
             current=values.current,
+            shape=self.body_shape,
         )
 
 
