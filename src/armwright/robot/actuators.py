@@ -25,13 +25,12 @@ UNITS: Mapping[str, str] = {
     "voltage": "V", "mass": "kg", "stall_torque": "N m", "rated_torque": "N m", "peak_torque": "N m", "speed": "rad/s",
     "corner_speed": "rad/s", "gear_ratio": "", "rotor_inertia": "kg m²", "coulomb_friction": "N m",
     "viscous_friction": "N m s/rad", "backlash": "rad", "position_gain": "N m/rad", "damping_gain": "N m s/rad",
-    "current": "A", "width": "m", "height": "m", "depth": "m", "price": "USD",
+    "current": "A", "width": "m", "height": "m", "depth": "m", "shaft_offset": "m", "price": "USD",
 }  # fmt: skip
 
-DIMENSIONS = ("width", "height", "depth")
-BODY_KEYS = ("shape", "shaft_edge", "shaft_offset")
-
 Edge = Literal["width", "height", "depth"]
+
+DIMENSIONS: tuple[Edge, ...] = ("width", "height", "depth")
 
 
 class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -84,27 +83,30 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         return tuple(name for name in UNITS if name in self.estimates or name in defaults)
 
     @property
-    def assumed_shape(self) -> tuple[str, ...]:
-        """Names of the values of its shape that are defaults of the kind."""
-        return tuple(name for name in BODY_KEYS if getattr(self, name) is None)
-
-    @property
     def body_shape(self) -> ActuatorShape | None:
         """The shape about its shaft; None if a dimension is missing."""
-        edges = {name: value for name in DIMENSIONS if (value := value_of(self, name)) is not None}
-        if len(edges) < len(DIMENSIONS):
+        shape = self._default_body()
+        if shape is None or self.shaft_offset is None:
+            return shape
+        return replace(shape, shaft_offset=self.shaft_offset)
+
+    def _default_body(self) -> ActuatorShape | None:
+        """Return the shape with the default offset of its shaft: none from the axis of a cylinder.
+
+        The shaft of a box is as far from the near end as from the sides, as that of servos.
+        """
+        if self.width is None or self.height is None or self.depth is None:
             return None
-        default = default_shape(self.kind, *edges.values())
+        edges = {"width": self.width, "height": self.height, "depth": self.depth}
+        default = default_shape(self.kind, **edges)
         length = edges.pop(self.shaft_edge or default.shaft_edge)
         short, long = sorted(edges.values())
         if (self.shape or default.shape) == "cylinder":
-            return ActuatorShape("cylinder", length, long, long, self.shaft_offset or 0.0)
-        # The rule of servos: the shaft is as far from the near end of the body as from its sides.
-        offset = (long - short) / 2 if self.shaft_offset is None else self.shaft_offset
-        return ActuatorShape("box", length, long, short, offset)
+            return ActuatorShape("cylinder", length, long, long)
+        return ActuatorShape("box", length, long, short, (long - short) / 2)
 
     def completed(self) -> "ActuatorRecord":
-        """Return the record with the defaults of its kind in place of missing values.
+        """Return the record with the defaults of its kind in place of missing numbers.
 
         Without a no-load speed or a voltage, the values that depend on it stay missing.
         """
@@ -129,6 +131,8 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         values = default_values(self.kind, reference, self.speed, self.voltage, self.position_gain)
         if self.stall_torque is None:
             values["peak_torque"] = rated
+        if (body := self._default_body()) is not None:
+            values["shaft_offset"] = body.shaft_offset
         return {name: value for name, value in values.items() if getattr(self, name) is None}
 
     def actuator(self) -> Actuator:

@@ -35,6 +35,8 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None) -> Assum
 
 def _values(problem: Problem, record: ActuatorRecord) -> Mapping[str, float]:
     entering = STATIC if problem.task.cycle is None else ALONG_CYCLE
+    if problem.space.motor_bodies:
+        entering = (*entering, "shaft_offset")
     completed = record.completed()
     values = {name: value_of(completed, name) for name in record.assumed if name in entering}
     return {name: value for name, value in values.items() if value is not None}
