@@ -118,6 +118,11 @@ class Link:
         radius: The radius of its round section [m].
         end_mass: A point mass that it carries at its end, such as the next joint's actuator [kg].
         end_shift: Vector from its end to that point [m].
+        bending_stiffness: Young's modulus times the second moment of area of its section, EI [N m²]; infinite if rigid,
+            None if unknown.
+        torsional_stiffness: Shear modulus times the polar second moment of area, GJ [N m²]; likewise.
+        wall: Wall thickness of its tube [m], at most the radius; None if unknown.
+        price: Price of its tube [USD].
     """
 
     offset: Vector
@@ -126,13 +131,26 @@ class Link:
     radius: float
     end_mass: float = 0.0
     end_shift: Vector = (0.0, 0.0, 0.0)
+    bending_stiffness: float | None = None
+    torsional_stiffness: float | None = None
+    wall: float | None = None
+    price: float = 0.0
 
     def __post_init__(self) -> None:
-        values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift)
+        values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift, self.price)
         if not all(math.isfinite(v) for v in values):
             raise ArmError(f"a link's numbers must be finite: {self}")
         if min(self.mass, self.end_mass) < 0.0 or self.radius <= 0.0:
             raise ArmError(f"a link needs mass >= 0 kg and radius > 0 m, not {self.mass} kg and {self.radius} m")
+        stiffness = [value for value in (self.bending_stiffness, self.torsional_stiffness) if value is not None]
+        if not all(value > 0.0 for value in stiffness):
+            raise ArmError(f"stiffness of a link: expected values above 0 N m², or None if unknown, got {stiffness}")
+        if self.wall is not None and not 0.0 < self.wall <= self.radius:
+            raise ArmError(
+                f"wall of a link: expected more than 0 and at most its radius of {self.radius} m, got {self.wall} m"
+            )
+        if self.price < 0.0:
+            raise ArmError(f"price of a link: expected at least 0 USD, got {self.price} USD")
 
     @property
     def total_mass(self) -> float:

@@ -66,6 +66,7 @@ def stack_designs(
     motors = _motors(space, columns, joints) if space.actuators else None
     carried = _carried(space, columns, joints, motors)
     bodies, com = _bodies(space, columns, joints, carried)
+    unknown = np.where(columns.links > 0.0, np.nan, np.inf)
     per_joint = {
         "motion": joints.motion,
         "lower": joints.lower,
@@ -75,6 +76,8 @@ def stack_designs(
         "com": _in_last_slot(com, n_slots),
         "mass": _in_last_slot(bodies.total_mass, n_slots),
         "radius": _in_last_slot(np.where(columns.links > 0.0, space.link_radius, 0.0), n_slots),
+        "bending_stiffness": _in_last_slot(unknown, n_slots, np.inf),
+        "torsional_stiffness": _in_last_slot(unknown, n_slots, np.inf),
     }
     if motors is not None:
         per_joint["ratings"] = motors.ratings
@@ -92,6 +95,8 @@ def stack_designs(
         com=flat["com"].astype(precision),
         mass=flat["mass"].astype(precision),
         radius=flat["radius"].astype(precision),
+        bending_stiffness=flat["bending_stiffness"],
+        torsional_stiffness=flat["torsional_stiffness"],
         tool=tools,
         tool_axis=tools.axis.astype(precision),
         tool_side=tools.side.astype(precision),
@@ -302,10 +307,10 @@ def _mounted(tool: Tool) -> Tools:
     return stack_tools(list(mounted_tools(tool).values()))
 
 
-def _in_last_slot(values: Array, n_slots: int) -> Array:
-    """Return values of modules (N, M, ...) in the last of K slots of each (N, M, K, ...); 0 in the others."""
+def _in_last_slot(values: Array, n_slots: int, fill: float = 0.0) -> Array:
+    """Return values of modules (N, M, ...) in the last of K slots of each (N, M, K, ...); `fill` in the others."""
     n, modules, *size = values.shape
-    slots = np.zeros((n, modules, n_slots, *size))
+    slots = np.full((n, modules, n_slots, *size), fill)
     slots[:, :, -1] = values
     return slots
 
