@@ -22,6 +22,7 @@ from armwright.search.encoding import DesignEncoding
 from armwright.search.variation import offspring
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.spaces.parameters import CategoricalParameter
 from armwright.tasks.catalogue import load_task
 from tests.support.fixed_problem import FixedProblem, fixed_history
 
@@ -74,7 +75,7 @@ def test_section_without_a_material_keeps_the_paper() -> None:
 def test_several_tubes_are_parameters(section: dict[str, Any], names: list[str]) -> None:
     parameters = [p for p in space(link_section=section).parameters if p.name.startswith("tube")]
     assert [p.name for p in parameters] == names
-    assert all(p.choices == ("20x1.5", "30x2") for p in parameters)  # pyright: ignore[reportAttributeAccessIssue]
+    assert all(isinstance(p, CategoricalParameter) and p.choices == ("20x1.5", "30x2") for p in parameters)
 
 
 def test_tubes_of_absent_modules_are_inactive() -> None:
