@@ -54,8 +54,8 @@ class ArmArrays(PerArm):
     n_joints: Ints  # (N,) number of an arm's joints, at most D
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
     length: Array  # (N,) of all links [m]
-    base_mass: Array  # (N,) mass fixed to the base [kg]
-    structure_price: Array  # (N,) of all links [USD]
+    base_mass: Array  # (N,) mass that does not move, the column included [kg]
+    structure_price: Array  # (N,) of all links and of the column [USD]
     bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
 
@@ -158,7 +158,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         n_joints=n_joints,
         travel=travel,
         length=np.array([arm.length for arm in arms]),
-        base_mass=np.array([arm.base_mass for arm in arms]),
+        base_mass=np.array([arm.standing_mass for arm in arms]),
         structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
         actuation=actuation_of(arms, travel),

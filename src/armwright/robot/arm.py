@@ -182,6 +182,31 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
+class Column:
+    """A round tube below the base, which carries the arm and does not move.
+
+    Attributes:
+        length: From its foot to the first joint [m].
+        outer_diameter: [m].
+        wall: Wall thickness [m].
+        mass: [kg].
+        price: [USD].
+    """
+
+    length: float
+    outer_diameter: float
+    wall: float
+    mass: float
+    price: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.length < math.inf or not 0.0 < self.wall <= self.outer_diameter / 2 < math.inf:
+            raise ArmError(f"a column needs a length above 0 m and a wall of at most half its diameter, not {self}")
+        if not (0.0 <= self.mass < math.inf and 0.0 <= self.price < math.inf):
+            raise ArmError(f"a column needs mass >= 0 kg and price >= 0 USD, not {self.mass} kg and {self.price} USD")
+
+
+@dataclass(frozen=True, slots=True)
 class MountedTool:
     """A tool, in a frame at the end of the last link that is parallel to the world frame with all joints at 0.
 
@@ -223,6 +248,7 @@ class Arm:
         tool: The tool on the end of the last link.
         base_mass: Mass that does not move, such as the first joint's actuator [kg].
         safety_factor: Factor of the torque that its actuators have to deliver.
+        column: What the base stands on; None if it stands on the ground or a surface.
 
     Examples:
         >>> import armwright as aw
@@ -239,6 +265,7 @@ class Arm:
     tool: MountedTool = MountedTool()
     base_mass: float = 0.0
     safety_factor: float = 1.0
+    column: Column | None = None
 
     def __post_init__(self) -> None:
         if not self.joints or len(self.joints) != len(self.links):
@@ -251,13 +278,18 @@ class Arm:
 
     @property
     def mass(self) -> float:
-        """The total mass, including the base mass and the tool [kg]."""
-        return self.base_mass + sum(link.total_mass for link in self.links) + self.tool.mass
+        """The total mass, including what stands below the arm and the tool [kg]."""
+        return self.standing_mass + sum(link.total_mass for link in self.links) + self.tool.mass
 
     @property
     def structure_price(self) -> float:
-        """The price of all links [USD]."""
-        return sum(link.price for link in self.links)
+        """The price of all links and of the column [USD]."""
+        return sum(link.price for link in self.links) + (0.0 if self.column is None else self.column.price)
+
+    @property
+    def standing_mass(self) -> float:
+        """The mass that does not move, the column included [kg]."""
+        return self.base_mass + (0.0 if self.column is None else self.column.mass)
 
     @property
     def length(self) -> float:

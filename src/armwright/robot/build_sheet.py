@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.robot.arm import Actuator, Arm
+from armwright.robot.arm import Actuator, Arm, Column
 
 AXIS_NAMES = {"x": "roll (x)", "y": "pitch (y)", "z": "yaw (z)"}
 
@@ -103,8 +103,11 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         cells = [str(row.number), *motion, f"{1e3 * row.length:.1f} mm", _tube(row), f"{1e3 * row.mass:.4g} g"]
         lines.append(f"| {' | '.join(cells)} |")
     length, mass = sum(row.length for row in rows), sum(row.mass for row in rows)
-    price = f", {arm.structure_price:,.2f} USD" if arm.structure_price else ""
+    cost = sum(link.price for link in arm.links)
+    price = f", {cost:,.2f} USD" if cost else ""
     lines += ["", f"Together {1e3 * length:.1f} mm of links, {1e3 * mass:.4g} g{price}."]
+    if arm.column is not None:
+        lines += ["", _column(arm.column)]
     if any(arm.tool.tip):
         shift = ", ".join(f"{1e3 * value:.1f}" for value in arm.tool.tip)
         lines += ["", f"The tool reaches ({shift}) mm from the end of the last link to the tip."]
@@ -121,6 +124,15 @@ def _tube(row: SheetRow) -> str:
         return ""
     wall = "" if row.wall is None else f" x {1e3 * row.wall:g}"
     return f"{1e3 * row.outer_diameter:g}{wall} mm"
+
+
+def _column(column: Column) -> str:
+    """Return what to cut for the column."""
+    price = f", {column.price:,.2f} USD" if column.price else ""
+    return (
+        f"The base stands on a column of {1e3 * column.length:.1f} mm, a tube of {1e3 * column.outer_diameter:g} x "
+        f"{1e3 * column.wall:g} mm, {1e3 * column.mass:.4g} g{price}."
+    )
 
 
 def _actuator_lines(arm: Arm) -> list[str]:

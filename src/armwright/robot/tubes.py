@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field, field_validator
 
 from armwright.exceptions import did_you_mean
 
+MAX_DIAMETER = 1.0  # [m]
 MODULI = 1e6, 2e12  # [Pa], from rubber to diamond; values below are probably in GPa
 
 
@@ -43,6 +44,22 @@ class Tube:
     def mass_per_metre(self, density: float) -> float:
         """Return the mass of a metre [kg/m] of a material of this density [kg/m³]."""
         return density * math.pi * (self.radius**2 - (self.radius - self.wall) ** 2)
+
+
+def check_tube(outer: float, wall: float) -> None:
+    """Raise ValueError for an outer diameter and a wall [m] of no tube."""
+    if outer > MAX_DIAMETER:
+        raise ValueError(
+            f"expected an outer diameter of at most {MAX_DIAMETER:g} m, got {outer:g} m; lengths are in metres: write "
+            f"{outer / 1e3:g} for {outer:g} mm"
+        )
+    if min(outer, wall) <= 0.0:
+        raise ValueError(f"expected an outer diameter and a wall above 0 m, got {outer:g} m and {wall:g} m")
+    if wall > outer / 2:
+        raise ValueError(
+            f"expected a wall of at most the radius, {outer / 2:g} m for an outer diameter of {outer:g} m, got "
+            f"{wall:g} m"
+        )
 
 
 class Material(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):

@@ -39,6 +39,7 @@ class ArmBuilder:
             tool=mounted_tools(self._tool)[self._mount],
             base_mass=self._carried_mass(0),
             safety_factor=self._space.safety_factor,
+            column=None if self._space.column is None else self._space.column.under(self._design.origin[2]),
         )
 
     def _joint(self, i: int, slot: int) -> Joint:

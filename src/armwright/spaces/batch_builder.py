@@ -104,8 +104,9 @@ def stack_designs(
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(columns.links, axis=1)[:, -1],
-        base_mass=carried.mass[:, 0],
-        structure_price=np.cumsum(space.tube_values("price_per_metre")[columns.tubes] * columns.links, axis=1)[:, -1],
+        base_mass=carried.mass[:, 0] + columns.of_column("mass_per_metre"),
+        structure_price=np.cumsum(space.tube_values("price_per_metre")[columns.tubes] * columns.links, axis=1)[:, -1]
+        + columns.of_column("price_per_metre"),
         bodies=_spread(bodies, present, n_slots),
         actuation=None
         if motors is None
@@ -126,7 +127,7 @@ class _Columns:
     """
 
     def __init__(self, space: DesignSpace, matrix: Array) -> None:
-        self._matrix, self._parameters = matrix, space.parameters
+        self._matrix, self._parameters, self._column_below = matrix, space.parameters, space.column
         self._column = {parameter.name: i for i, parameter in enumerate(self._parameters)}
         self.n, self.modules = len(matrix), space.max_joints
         self.present = np.ones((self.n, self.modules), dtype=bool)
@@ -146,6 +147,12 @@ class _Columns:
     def of_links(self, per_tube: Array, without: float) -> Array:
         """Return the (N, M) values of links, from those of the tubes (K,); `without` for links without length."""
         return np.where(self.links > 0.0, per_tube[self.tubes], without)
+
+    def of_column(self, per_metre: str) -> Array:
+        """Return the (N,) values of the columns below the bases, from one per metre; 0 without columns."""
+        if self._column_below is None:
+            return np.zeros(self.n)
+        return getattr(self._column_below, per_metre) * self._column_below.lengths(self._matrix[:, 2])
 
     def _indices(self, name: str, index: Any) -> Any:
         """Return the (N,) `index` of each design's choice."""

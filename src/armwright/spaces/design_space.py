@@ -197,7 +197,8 @@ class DesignSpace(SpaceSchema, frozen=True):
         toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if self.is_toy else ""
         names = ", ".join(record.name for record in self.actuators)
         actuators = f"; actuators: {names}" if self.actuators else ""
-        return f"links: {self.link_description}{toy}{actuators}"
+        column = f"; the base on a column of {self.column.description}" if self.column else ""
+        return f"links: {self.link_description}{toy}{actuators}{column}"
 
 
 def _default_motors(space: SpaceSchema) -> dict[str, str]:

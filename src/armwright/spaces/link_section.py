@@ -2,15 +2,14 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Self
+from typing import Any
 
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator
 
 from armwright.robot.arm import Link, Vector
-from armwright.robot.tubes import Material, Tube, resolve_material
+from armwright.robot.tubes import Material, Tube, check_tube, resolve_material
 
 MAX_TUBES = 20
-MAX_DIAMETER = 1.0  # [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,25 +64,15 @@ class LinkSection(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     def _look_up_material(cls, value: Any) -> Any:
         return resolve_material(value)
 
-    @model_validator(mode="after")
-    def _check_tubes(self) -> Self:
-        for outer, wall in self.tubes:
-            if outer > MAX_DIAMETER:
-                raise ValueError(
-                    f"tubes: expected an outer diameter of at most {MAX_DIAMETER:g} m, got {outer:g} m; lengths are in "
-                    f"metres: write {outer / 1e3:g} for {outer:g} mm"
-                )
-            if min(outer, wall) <= 0.0:
-                raise ValueError(f"tubes: expected an outer diameter and a wall above 0 m, got [{outer:g}, {wall:g}]")
-            if wall > outer / 2:
-                raise ValueError(
-                    f"tubes: expected a wall of at most the radius, {outer / 2:g} m for an outer diameter of {outer:g} "
-                    f"m, got {wall:g} m; tubes are [outer diameter, wall]"
-                )
-        names = [tube.name for tube in self.options]
+    @field_validator("tubes")
+    @classmethod
+    def _check_tubes(cls, tubes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        for outer, wall in tubes:
+            check_tube(outer, wall)
+        names = [Tube(*tube).name for tube in tubes]
         if len(set(names)) != len(names):
-            raise ValueError(f"tubes: duplicates among {', '.join(names)} (outer diameter x wall in mm)")
-        return self
+            raise ValueError(f"duplicates among {', '.join(names)} (outer diameter x wall in mm)")
+        return tubes
 
     @property
     def options(self) -> tuple[LinkTube, ...]:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field, field_serializer, field_validator, model_
 
 from armwright.robot.actuators import ActuatorRecord, resolve_actuator
 from armwright.robot.arm import Actuator
+from armwright.spaces.column import ColumnKeys
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
 from armwright.spaces.link_mass import Length, MassModel, MassPerMetre
 from armwright.spaces.link_section import LinkSection
@@ -49,6 +50,10 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     """Range of the base position along z [m]."""
     mount: tuple[Mount, ...] = Field(default=("floor",), min_length=1)
     """Surface that the arm is mounted on; several choices add the parameter mount."""
+    column: ColumnKeys | None = None
+    """Tube on which a floor-mounted base stands; {} for the default one."""
+    base_on: str = Field(default="", max_length=40)
+    """Obstacle of the task on whose top face a floor-mounted base stands."""
     link: Range = (0.03, 0.30)
     """Range of the length of each link [m]."""
     link_directions: tuple[Direction, ...] = Field(default=("+z",), min_length=1)
@@ -103,6 +108,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         _check_joint_ranges(self)
         _check_duplicates(self)
         _check_mass(self)
+        _check_support(self)
         return self
 
     @property
@@ -191,6 +197,13 @@ def _check_mass(space: SpaceSchema) -> None:
             "mass: expected no value beside link_section.material, which implies the mass of the links; remove one of "
             "the two"
         )
+
+
+def _check_support(space: SpaceSchema) -> None:
+    keys = {"column": space.column is not None, "base_on": bool(space.base_on)}
+    for key, stated in keys.items():
+        if stated and space.mount != ("floor",):
+            raise ValueError(f"{key}: expected mount: floor, got {', '.join(space.mount)}; remove {key} or the mounts")
 
 
 def _check_modules(space: SpaceSchema) -> None:

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
+
 from armwright.problem.checks.finding import PROVEN, Finding
 from armwright.problem.constraints import Constraint
 from armwright.problem.objectives import CLEARANCES, FAR, OBJECTIVES
@@ -85,6 +87,11 @@ def intervals_by_modules(problem: Problem) -> dict[int, dict[str, Interval]]:
     known = {parameter.name: parameter for parameter in space.parameters}
     totals = {"joints": NOTHING, "length": NOTHING, "price": NOTHING, "mass": NOTHING}
     totals["mass"] = Interval(problem.task.tool.mass, problem.task.tool.mass)
+    if space.column is not None:
+        heights = cast("FloatParameter", known["origin_z"])
+        low, high = space.column.lengths(np.array([heights.low, heights.high])).tolist()
+        totals["mass"] += Interval(space.column.mass_per_metre * low, space.column.mass_per_metre * high)
+        totals["price"] += Interval(space.column.price_per_metre * low, space.column.price_per_metre * high)
     found: dict[int, dict[str, Interval]] = {}
     for module in range(1, space.max_joints + 1):
         letters = cast("CategoricalParameter", known[f"joint_{module}"]).choices
