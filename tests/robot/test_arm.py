@@ -1,7 +1,7 @@
 """Validation and properties of Arm, Joint and Link."""
 
 import math
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
@@ -85,3 +85,17 @@ def test_arms_are_hashable_values() -> None:
     for value, name in ((one, "base"), (TURN, "lower"), (LINK, "mass")):
         with pytest.raises(FrozenInstanceError):
             setattr(value, name, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"bending_stiffness": 0.0}, "stiffness of a link: expected values above 0 N m²"),
+        ({"torsional_stiffness": math.nan}, "stiffness of a link: expected values above 0 N m²"),
+        ({"wall": 0.02}, "at most its radius of 0.015 m, got 0.02 m"),
+        ({"price": -1.0}, "price of a link: expected at least 0 USD"),
+    ],
+)
+def test_link_refuses_impossible_tube(values: dict[str, float], message: str) -> None:
+    with pytest.raises(ArmError, match=message):
+        replace(uniform_link((0.0, 0.0, 0.2), 0.1, 0.015), **values)

@@ -1,5 +1,6 @@
 """Arms stacked into arrays, the input of the kernels."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, cast, get_args
@@ -12,7 +13,7 @@ from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.kinematics.actuation import Actuation, actuation_of
 from armwright.kinematics.motor_bodies import MotorBodies, stack_bodies
 from armwright.kinematics.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
-from armwright.robot.arm import AXES, Arm, Joint, MountedTool
+from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
 from armwright.tasks.payload import POINT_LOAD, LoadShape
 
 MAX_JOINTS = 16
@@ -44,6 +45,8 @@ class ArmArrays(PerArm):
     com: Floats  # (N, D, 3) from a joint to the centre of mass of what it carries up to the next, or the tool [m]
     mass: Floats  # (N, D) [kg]; of the last link with the tool
     radius: Floats  # (N, D) of the link after a joint [m]; 0 if there is none
+    bending_stiffness: Array  # (N, D) EI of the link after a joint [N m²]; infinite without length, NaN if unknown
+    torsional_stiffness: Array  # (N, D) GJ likewise [N m²]
     tool: Tools  # included in the last link's `offset`, `com` and `mass`
     tool_axis: Floats  # (N, 3) the tool's own z in the world with all joints at 0, and so in the last local frame
     tool_side: Floats  # (N, 3) likewise the tool's own x
@@ -52,7 +55,8 @@ class ArmArrays(PerArm):
     n_joints: Ints  # (N,) number of an arm's joints, at most D
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
     length: Array  # (N,) of all links [m]
-    base_mass: Array  # (N,) mass fixed to the base [kg]
+    base_mass: Array  # (N,) mass that does not move, the column included [kg]
+    structure_price: Array  # (N,) of all links and of the column [USD]
     bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
     motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
@@ -118,6 +122,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
     lower, upper, travel = np.full((3, n, dof), 1.0)
     lower *= -1.0
     mass, radius = np.zeros((2, n, dof))
+    stiffness = np.full((2, n, dof), np.inf)  # bending and torsional
     offset, com = np.zeros((2, n, dof, 3))
     bodies = Bodies(*(np.zeros((n, dof, *size)) for size in ((), (3,), (3,), (), (), (3,))))
     for i, arm in enumerate(arms):
@@ -130,6 +135,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         com[i, own] = [link.total_com for link in arm.links]
         mass[i, own] = [link.total_mass for link in arm.links]
         radius[i, own] = [link.radius if link.length > 0.0 else 0.0 for link in arm.links]
+        stiffness[:, i, own] = np.transpose([_stiffness(link) for link in arm.links])
         for part in fields(Bodies):
             getattr(bodies, part.name)[i, own] = [getattr(link, part.name) for link in arm.links]
     n_joints = np.array([len(arm.joints) for arm in arms], dtype=np.int32)
@@ -144,6 +150,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         com=com.astype(precision),
         mass=mass.astype(precision),
         radius=radius.astype(precision),
+        bending_stiffness=stiffness[0],
+        torsional_stiffness=stiffness[1],
         tool=tool,
         tool_axis=tool.axis.astype(precision),
         tool_side=tool.side.astype(precision),
@@ -152,7 +160,8 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         n_joints=n_joints,
         travel=travel,
         length=np.array([arm.length for arm in arms]),
-        base_mass=np.array([arm.base_mass for arm in arms]),
+        base_mass=np.array([arm.standing_mass for arm in arms]),
+        structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
         actuation=actuation_of(arms, travel),
         motor_bodies=stack_bodies(arms, dof, precision),
@@ -208,6 +217,14 @@ def _check(arm: Arm) -> None:
             raise ArmError(
                 f"joint {number}: limits [{joint.lower:g}, {joint.upper:g}] rad are outside [-2π, 2π]; narrow them"
             )
+
+
+def _stiffness(link: Link) -> tuple[float, float]:
+    """Return EI and GJ of a link [N m²]; infinite without length, NaN if unknown."""
+    if link.length == 0.0:
+        return math.inf, math.inf
+    bending, torsional = link.bending_stiffness, link.torsional_stiffness
+    return math.nan if bending is None else bending, math.nan if torsional is None else torsional
 
 
 def _motion(joint: Joint) -> int:

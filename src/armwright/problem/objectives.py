@@ -105,7 +105,7 @@ TORQUE_UTILISATION = Objective(
 PRICE = Objective(
     name="price",
     unit="USD",
-    description="the price of all actuators",
+    description="the price of all actuators, and of links and column if the space states one",
     each=drives.price,
     over="arm",
 )

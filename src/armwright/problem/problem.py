@@ -24,6 +24,7 @@ from armwright.problem.objectives import (
     named_objectives,
 )
 from armwright.robot.arm import Arm
+from armwright.spaces.base_support import supported_space
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, paper_space
 from armwright.spaces.parameters import Design
@@ -126,12 +127,14 @@ class Problem:
     constraints: tuple[Constraint, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
-        """Resolve device, objectives and constraints.
+        """Resolve what the base stands on, device, objectives and constraints.
 
         Raises:
+            SpaceError: the base cannot stand on the obstacle that the space names.
             TaskError: reference point or resolution are for other objectives, or a constraint cannot be parsed.
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
+        object.__setattr__(self, "space", supported_space(self.space, self.task.obstacles))
         implied = implied_constraints(self.task, self.has_drives, self.space.motor_bodies)
         texts = (*self.task.constraints, *implied)
         object.__setattr__(self, "constraints", read_constraints(texts))

@@ -124,6 +124,11 @@ class Link:
         radius: The radius of its round section [m].
         end_mass: A point mass that it carries at its end, such as the next joint's actuator [kg].
         end_shift: Vector from its end to that point [m].
+        bending_stiffness: Young's modulus times the second moment of area of its section, EI [N m²]; infinite if rigid,
+            None if unknown.
+        torsional_stiffness: Shear modulus times the polar second moment of area, GJ [N m²]; likewise.
+        wall: Wall thickness of its tube [m], at most the radius; None if unknown.
+        price: Price of its tube [USD].
     """
 
     offset: Vector
@@ -132,13 +137,26 @@ class Link:
     radius: float
     end_mass: float = 0.0
     end_shift: Vector = (0.0, 0.0, 0.0)
+    bending_stiffness: float | None = None
+    torsional_stiffness: float | None = None
+    wall: float | None = None
+    price: float = 0.0
 
     def __post_init__(self) -> None:
-        values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift)
+        values = (*self.offset, *self.com, self.mass, self.radius, self.end_mass, *self.end_shift, self.price)
         if not all(math.isfinite(v) for v in values):
             raise ArmError(f"a link's numbers must be finite: {self}")
         if min(self.mass, self.end_mass) < 0.0 or self.radius <= 0.0:
             raise ArmError(f"a link needs mass >= 0 kg and radius > 0 m, not {self.mass} kg and {self.radius} m")
+        stiffness = [value for value in (self.bending_stiffness, self.torsional_stiffness) if value is not None]
+        if not all(value > 0.0 for value in stiffness):
+            raise ArmError(f"stiffness of a link: expected values above 0 N m², or None if unknown, got {stiffness}")
+        if self.wall is not None and not 0.0 < self.wall <= self.radius:
+            raise ArmError(
+                f"wall of a link: expected more than 0 and at most its radius of {self.radius} m, got {self.wall} m"
+            )
+        if self.price < 0.0:
+            raise ArmError(f"price of a link: expected at least 0 USD, got {self.price} USD")
 
     @property
     def total_mass(self) -> float:
@@ -167,6 +185,31 @@ class Link:
     def length(self) -> float:
         """The distance from this joint to the next [m]."""
         return math.hypot(*self.offset)
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A round tube below the base, which carries the arm and does not move.
+
+    Attributes:
+        length: From its foot to the first joint [m].
+        outer_diameter: [m].
+        wall: Wall thickness [m].
+        mass: [kg].
+        price: [USD].
+    """
+
+    length: float
+    outer_diameter: float
+    wall: float
+    mass: float
+    price: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.length < math.inf or not 0.0 < self.wall <= self.outer_diameter / 2 < math.inf:
+            raise ArmError(f"a column needs a length above 0 m and a wall of at most half its diameter, not {self}")
+        if not (0.0 <= self.mass < math.inf and 0.0 <= self.price < math.inf):
+            raise ArmError(f"a column needs mass >= 0 kg and price >= 0 USD, not {self.mass} kg and {self.price} USD")
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +254,7 @@ class Arm:
         tool: The tool on the end of the last link.
         base_mass: Mass that does not move, such as the first joint's actuator [kg].
         safety_factor: Factor of the torque that its actuators have to deliver.
+        column: What the base stands on; None if it stands on the ground or a surface.
 
     Examples:
         >>> import armwright as aw
@@ -227,6 +271,7 @@ class Arm:
     tool: MountedTool = MountedTool()
     base_mass: float = 0.0
     safety_factor: float = 1.0
+    column: Column | None = None
 
     def __post_init__(self) -> None:
         if not self.joints or len(self.joints) != len(self.links):
@@ -239,8 +284,18 @@ class Arm:
 
     @property
     def mass(self) -> float:
-        """The total mass, including the base mass and the tool [kg]."""
-        return self.base_mass + sum(link.total_mass for link in self.links) + self.tool.mass
+        """The total mass, including what stands below the arm and the tool [kg]."""
+        return self.standing_mass + sum(link.total_mass for link in self.links) + self.tool.mass
+
+    @property
+    def structure_price(self) -> float:
+        """The price of all links and of the column [USD]."""
+        return sum(link.price for link in self.links) + (0.0 if self.column is None else self.column.price)
+
+    @property
+    def standing_mass(self) -> float:
+        """The mass that does not move, the column included [kg]."""
+        return self.base_mass + (0.0 if self.column is None else self.column.mass)
 
     @property
     def length(self) -> float:

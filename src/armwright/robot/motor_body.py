@@ -29,6 +29,11 @@ class ActuatorShape:
     short: float
     shaft_offset: float = 0.0
 
+    @property
+    def reach(self) -> float:
+        """The largest distance from the joint to a face [m]."""
+        return max(self.length / 2, self.long / 2 + self.shaft_offset)
+
 
 @dataclass(frozen=True, slots=True)
 class MotorBody:

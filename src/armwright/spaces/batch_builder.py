@@ -76,8 +76,10 @@ def stack_designs(
         "offset": _in_last_slot(bodies.offset, n_slots),
         "com": _in_last_slot(com, n_slots),
         "mass": _in_last_slot(bodies.total_mass, n_slots),
-        "radius": _in_last_slot(np.where(columns.links > 0.0, space.link_radius, 0.0), n_slots),
+        "radius": _in_last_slot(columns.of_links(space.tube_values("radius"), 0.0), n_slots),
     }
+    for name in ("bending_stiffness", "torsional_stiffness"):
+        per_joint[name] = _in_last_slot(columns.of_links(space.tube_values(name), np.inf), n_slots, np.inf)
     if motors is not None:
         per_joint["ratings"] = motors.ratings
     if space.motor_bodies:
@@ -98,6 +100,8 @@ def stack_designs(
         com=flat["com"].astype(precision),
         mass=flat["mass"].astype(precision),
         radius=flat["radius"].astype(precision),
+        bending_stiffness=flat["bending_stiffness"],
+        torsional_stiffness=flat["torsional_stiffness"],
         tool=tools,
         tool_axis=tools.axis.astype(precision),
         tool_side=tools.side.astype(precision),
@@ -106,7 +110,9 @@ def stack_designs(
         n_joints=n_joints,
         travel=flat["travel"],
         length=np.cumsum(columns.links, axis=1)[:, -1],
-        base_mass=carried.mass[:, 0],
+        base_mass=carried.mass[:, 0] + columns.of_column("mass_per_metre"),
+        structure_price=np.cumsum(space.tube_values("price_per_metre")[columns.tubes] * columns.links, axis=1)[:, -1]
+        + columns.of_column("price_per_metre"),
         bodies=_spread(bodies, present, n_slots),
         actuation=None
         if motors is None
@@ -124,21 +130,36 @@ class _Columns:
         present: (N, M) True for the modules that a design has.
         mount: (N,) index of the mount.
         links: (N, M) link lengths, 0 for absent modules [m].
+        tubes: (N, M) indices of the tubes of links and rails.
     """
 
     def __init__(self, space: DesignSpace, matrix: Array) -> None:
-        self._matrix, self._parameters = matrix, space.parameters
+        self._matrix, self._parameters, self._column_below = matrix, space.parameters, space.column
         self._column = {parameter.name: i for i, parameter in enumerate(self._parameters)}
         self.n, self.modules = len(matrix), space.max_joints
         self.present = np.ones((self.n, self.modules), dtype=bool)
         if "n_joints" in self._column:
             counts = self._indices("n_joints", int)
             self.present = np.arange(self.modules) < counts[:, None]
-        names = tuple(MOUNTS)
-        self.mount = np.full(self.n, names.index(space.mount[0]))
+        mounts = tuple(MOUNTS)
+        self.mount = np.full(self.n, mounts.index(space.mount[0]))
         if "mount" in self._column:
-            self.mount = self._indices("mount", names.index)
+            self.mount = self._indices("mount", mounts.index)
         self.links = np.where(self.present, self.reals("link"), 0.0)
+        names = space.tube_names
+        self.tubes = self.choices("tube", names.index, names[0])
+        if "tube" in self._column:
+            self.tubes = np.repeat(self._indices("tube", names.index)[:, None], self.modules, axis=1)
+
+    def of_links(self, per_tube: Array, without: float) -> Array:
+        """Return the (N, M) values of links, from those of the tubes (K,); `without` for links without length."""
+        return np.where(self.links > 0.0, per_tube[self.tubes], without)
+
+    def of_column(self, per_metre: str) -> Array:
+        """Return the (N,) values of the columns below the bases, from one per metre; 0 without columns."""
+        if self._column_below is None:
+            return np.zeros(self.n)
+        return getattr(self._column_below, per_metre) * self._column_below.lengths(self._matrix[:, 2])
 
     def _indices(self, name: str, index: Any) -> Any:
         """Return the (N,) `index` of each design's choice."""
@@ -250,7 +271,7 @@ def _motor_bodies(flat: dict[str, Any], precision: Precision) -> MotorBodies:
 def _carried(space: DesignSpace, columns: _Columns, joints: _Joints, motors: _Motors | None) -> _Carried:
     """Return the masses of rails and actuators."""
     stroke = columns.reals("stroke", space.min_stroke)
-    rails = np.where(joints.prismatic[..., -1], space.mass.mass(stroke), 0.0)
+    rails = np.where(joints.prismatic[..., -1], space.link_mass(stroke, columns.tubes), 0.0)
     if motors is not None:
         return _Carried(rails + motors.mass, rails)
     return _Carried(rails + (joints.plan < FIXED).sum(axis=2) * space.bracket_mass, rails)
@@ -270,7 +291,7 @@ def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array]:
 def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Carried) -> tuple[Bodies, Array]:
     """Return the links as bodies, (N, M, ...) each, and (N, M, 3) their centres of mass from the joint [m]."""
     links = columns.links
-    mass = np.where(columns.present, space.mass.mass(links), 0.0)
+    mass = np.where(columns.present, space.link_mass(links, columns.tubes), 0.0)
     end_mass = np.concatenate([carried.mass[:, 1:], np.zeros((columns.n, 1))], axis=1)
     direction = _rotate(_VECTORS[_link_directions(space, columns)], columns.mount)  # (N, M, 3)
     middle = direction * (links / 2)[..., None]
@@ -280,7 +301,7 @@ def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Ca
     carried_com = (mass[..., None] * middle + end_mass[..., None] * end_mass_position) / np.where(
         total > 0.0, total, 1.0
     )[..., None]
-    radius = np.where(columns.present, space.link_radius, 0.0)
+    radius = np.where(columns.present, space.tube_values("radius")[columns.tubes], 0.0)
     com = np.where(end_mass[..., None] > 0.0, carried_com, middle)
     return Bodies(mass, middle, offset, radius, end_mass, end_mass_position), com
 
@@ -325,10 +346,10 @@ def _mounted(tool: Tool) -> Tools:
     return stack_tools(list(mounted_tools(tool).values()))
 
 
-def _in_last_slot(values: Array, n_slots: int) -> Array:
-    """Return values of modules (N, M, ...) in the last of K slots of each (N, M, K, ...); 0 in the others."""
+def _in_last_slot(values: Array, n_slots: int, fill: float = 0.0) -> Array:
+    """Return values of modules (N, M, ...) in the last of K slots of each (N, M, K, ...); `fill` in the others."""
     n, modules, *size = values.shape
-    slots = np.zeros((n, modules, n_slots, *size))
+    slots = np.full((n, modules, n_slots, *size), fill)
     slots[:, :, -1] = values
     return slots
 

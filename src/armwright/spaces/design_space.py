@@ -189,7 +189,7 @@ class DesignSpace(SpaceSchema, frozen=True):
     def is_toy(self) -> bool:
         """True if even the heaviest arm is nearly massless, as in the paper."""
         heaviest = max((record.mass for record in self.actuators), default=0.0)
-        return self.max_joints * (self.mass.mass(self.link[1]) + heaviest + self.bracket_mass) < TOY_MASS
+        return self.max_joints * (self.heaviest_link + heaviest + self.bracket_mass) < TOY_MASS
 
     @property
     def mass_note(self) -> str:
@@ -198,7 +198,8 @@ class DesignSpace(SpaceSchema, frozen=True):
         names = ", ".join(record.name for record in self.actuators)
         actuators = f"; actuators: {names}" if self.actuators else ""
         brackets = f"; brackets: {self.bracket_mass:g} kg for each joint that moves" if self.bracket_mass else ""
-        return f"links: {self.mass.description}{toy}{actuators}{brackets}"
+        column = f"; the base on a column of {self.column.description}" if self.column else ""
+        return f"links: {self.link_description}{toy}{actuators}{brackets}{column}"
 
 
 def _default_motors(space: SpaceSchema) -> dict[str, str]:
