@@ -5,6 +5,7 @@ A value is assumed if it is an estimate or the default of the actuator's kind (`
 
 from collections.abc import Iterable, Mapping
 
+from armwright.problem.objectives import BACKLASH_ERROR, STIFFNESS_QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
 from armwright.robot.arm import Arm
@@ -34,7 +35,9 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None) -> Assum
 
 
 def _values(problem: Problem, record: ActuatorRecord) -> Mapping[str, float]:
-    entering = STATIC if problem.task.cycle is None else ALONG_CYCLE
+    entering = set(STATIC if problem.task.cycle is None else ALONG_CYCLE)
+    entering |= {"joint_stiffness"} if problem.uses(*STIFFNESS_QUANTITIES) else set()
+    entering |= {"backlash"} if problem.uses(BACKLASH_ERROR) else set()
     completed = record.completed()
     values = {name: value_of(completed, name) for name in record.assumed if name in entering}
     return {name: value for name, value in values.items() if value is not None}
