@@ -33,7 +33,7 @@ REAL = Task.model_validate(
 SPACE = DesignSpace.model_validate(
     {
         "name": "real", "joints": 6, "actuators": ["XL430-W250", "XM430-W350", "XM540-W270"], "safety_factor": 1.0,
-        "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
+        "link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"},
     }
 )  # fmt: skip
 

@@ -14,7 +14,7 @@ from armwright.files import read_text
 Schema = TypeVar("Schema", bound=BaseModel)
 
 MAX_BYTES = 4 * 1024 * 1024  # [bytes]; a task of 10,000 targets has about 0.3 MB
-RENAMED = {"jitter": "target_noise"}  # former keys of files
+RENAMED = {"jitter": "target_noise", "link_radius": "link_section"}  # former keys of files
 MAX_NODES = 400_000  # values in a document; 10,000 targets with all their keys have 240,000
 
 

@@ -351,7 +351,7 @@ def test_unwritable_output_folder_exits_with_1(in_folder: Path, place: str) -> N
 
 
 def test_terminal_without_unicode_shows_the_remaining_text(in_folder: Path) -> None:
-    (in_folder / "space.yaml").write_text("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}")
+    (in_folder / "space.yaml").write_text("link_section: {tubes: [[0.03, 0.002]], material: aluminium}")
     done = armwright("optimize", "target-1", "--space", "space.yaml", *SHORT, encoding="ascii")
     assert done.returncode == 0, done.stderr
     assert "kg/m?" in done.stdout

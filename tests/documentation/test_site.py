@@ -14,8 +14,10 @@ import armwright as aw
 from armwright.experiments.plan import ExperimentPlan, FigurePlan, MethodPlan
 from armwright.problem.objectives import QUANTITIES
 from armwright.robot.actuators import ActuatorRecord
+from armwright.robot.tubes import Material
 from armwright.spaces.design_space import DesignSpace
-from armwright.spaces.link_mass import MassOfTube, MassPerLink, MassPerMetre
+from armwright.spaces.link_mass import MassPerLink, MassPerMetre
+from armwright.spaces.link_section import LinkSection
 from armwright.tasks.obstacles import Box, Cylinder, Ground, Sphere
 from armwright.tasks.targets import Target
 from armwright.tasks.task import Task
@@ -26,7 +28,7 @@ from tests.support.documentation import code_spans
 
 KEYS: dict[str, tuple[type[BaseModel], ...]] = {
     "tasks.md": (Task, Target, Region, Box, Sphere, Cylinder, Ground),
-    "spaces.md": (DesignSpace, MassPerMetre, MassPerLink, MassOfTube, ActuatorRecord),
+    "spaces.md": (DesignSpace, MassPerMetre, MassPerLink, LinkSection, Material, ActuatorRecord),
     "experiments.md": (ExperimentPlan, MethodPlan, FigurePlan),
     "language-models.md": (aw.ModelOptions,),
 }

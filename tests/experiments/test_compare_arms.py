@@ -44,7 +44,7 @@ SPACE = DesignSpace(
     origin_z=(0.0, 0.0),
     origin_x=(-0.5, 0.5),
     link=(0.05, 0.4),
-    mass={"kind": "tube", "density": 2700, "outer_diameter": 0.06, "wall": 0.004},  # type: ignore[arg-type]
+    link_section={"tubes": [[0.06, 0.004]], "material": "aluminium"},  # type: ignore[arg-type]
 )
 UR5, PANDA = robot("ur5_robot"), robot("panda")
 

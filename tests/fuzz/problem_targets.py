@@ -70,8 +70,7 @@ origin_z: [0.0, 0.0]
 mount: [floor, ceiling, wall+x]
 link: [0.05, 0.40]
 link_directions: [+z, +x, -y]
-link_radius: 0.02
-mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}
+link_section: {tubes: [[0.02, 0.001], [0.03, 0.002]], material: {density: 2700, youngs: 7.0e+10, shear: 2.7e+10}}
 actuators:
   - XM540-W270
   - XL430-W250

@@ -107,7 +107,7 @@ def test_unreadable_template_is_refused(tmp_path: Path, template: str, message: 
         ("{{ (task.target_positions | attr('tofile'))('x') }}", "tofile cannot be called in a template"),
         ("{{ task.parse_raw('', proto='pickle', allow_pickle=true) }}", "parse_raw cannot be called"),
         ("{{ task.model_dump_json() }}", "model_dump_json cannot be called"),
-        ("{{ space.mass.mass(1) }}", "mass cannot be called"),
+        ("{{ space.link_mass(1) }}", "link_mass cannot be called"),
     ],
 )
 def test_unrenderable_template_is_refused(template: str, message: str) -> None:

@@ -29,9 +29,13 @@ SPACES = {
     "motors": {"joints": [2, 5], "joint_types": ["R", "O", "S", "F"], "actuators": MOTORS, "stroke": [0.1, 0.4]},
     "restricted": {"joints": 3, "restrict": {"link_1": [0.1, 0.2], "joint_2": ["O"], "motor_3": ["XL430-W250"]},
                    "joint_types": ["R", "O", "X"], "actuators": MOTORS,
-                   "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002}},
+                   "link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"}},
     "slides": {"joints": [1, 4], "joint_types": ["X", "T", "S"], "stroke": 0.5, "grid": {"link": 0.02},
                "mass": {"kind": "per_link", "kg": 0.3}},
+    "tubes": {"joints": [1, 4], "joint_types": ["R", "O", "S"], "stroke": [0.1, 0.4], "actuators": MOTORS,
+              "restrict": {"tube_1": "30x2"},
+              "link_section": {"tubes": [[0.03, 0.002], [0.02, 0.001]],
+                               "material": {"density": 2700, "youngs": 7e10, "shear": 2.7e10, "price_per_kg": 30.0}}},
 }  # fmt: skip
 
 
@@ -199,7 +203,7 @@ def test_designs_lie_within_the_intervals_of_their_size(keys: dict[str, Any]) ->
         "mass": arms.mass.sum(axis=1, dtype=np.float64) + arms.base_mass,
         "length": arms.length,
         "joints": (arms.motion < 6).sum(axis=1),
-        **({} if arms.actuation is None else {"price": arms.actuation.price}),
+        **({} if arms.actuation is None else {"price": arms.actuation.price + arms.structure_price}),
     }
     known = intervals_by_modules(checked)
     for row, design in enumerate(designs):

@@ -10,6 +10,7 @@ from armwright.kinematics.arm_arrays import stack_arms
 from armwright.kinematics.compliance import Stiffness, backlash_errors
 from armwright.kinematics.forward import forward_kinematics
 from armwright.problem.checks.requirements import check_requirements
+from armwright.problem.estimates import lower_bounds
 from armwright.problem.evaluation import evaluate
 from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
 from armwright.problem.problem import Problem
@@ -25,6 +26,15 @@ TARGETS = [[0.3, 0.2, 0.1], [-0.2, 0.4, 0.3]]
 PAYLOADS = (0.2, 0.6)  # [kg]
 MOTOR = named_actuator("XM540-W270").actuator()
 SPACE = DesignSpace.model_validate({"joints": 4, "actuators": ["XM540-W270", "XM430-W350"], "origin_z": [0.0, 0.0]})
+TUBES = DesignSpace.model_validate(
+    {
+        "joints": [2, 4],
+        "joint_types": ["R", "P", "Y", "S", "O", "F"],
+        "actuators": ["XM540-W270", "FHA-14C-100"],
+        "origin_z": [0.0, 0.0],
+        "link_section": {"tubes": [[0.020, 0.0015], [0.030, 0.002]], "per_link": True, "material": "aluminium"},
+    }
+)
 TASK = {"name": "shelf", "targets": TARGETS, "payload": 0.2}
 
 
@@ -72,6 +82,42 @@ def test_payload_deflection_is_proportional_to_the_payload() -> None:
     none, one, two = (PAYLOAD_DEFLECTION(evaluate(arms, TARGETS, payload=payload)) for payload in (0.0, 0.4, 0.8))
     assert not none.any()
     assert two == pytest.approx(2.0 * one)
+
+
+def test_designs_of_a_batch_yield_like_single_arms_to_the_bit() -> None:
+    bounds = ["payload_deflection <= 0.001", "payload_capacity >= 0.5"]
+    task = Task.model_validate(TASK | {"objectives": ["deflection", "backlash_error"], "constraints": bounds})
+    tubes = Problem(task, TUBES)
+    designs = TUBES.sample(60, 5)
+    outcomes = tubes.evaluate(designs)
+    assert len({design.params[f"tube_{j}"] for design in designs for j in (1, 2)}) == 2
+    for i, design in enumerate(designs):
+        evaluation = evaluate([tubes.arm(design)], TARGETS, payload=0.2)
+        assert outcomes.values[i].tolist() == [DEFLECTION(evaluation)[0], BACKLASH_ERROR(evaluation)[0]]
+        assert outcomes.violations[i].tolist() == [constraint(evaluation)[0] for constraint in tubes.constraints]
+
+
+def test_arms_of_thicker_tubes_yield_less_under_the_payload() -> None:
+    thin, thick = (
+        TUBES.model_copy(update={"link_section": TUBES.link_section.model_copy(update={"tubes": (tube,)})})
+        for tube in TUBES.link_section.tubes
+    )
+    designs = thin.sample(40, 6)
+    task = Task.model_validate(TASK)
+    one, other = (PAYLOAD_DEFLECTION(Problem(task, space).physics(designs)) for space in (thin, thick))
+    loaded = one > 1e-9  # [m]; upright arms do not bend
+    assert loaded.sum() > 30
+    assert (other < one)[loaded].all()
+
+
+def test_bounds_of_screening_hold_for_deflection() -> None:
+    bounds = ["payload_deflection <= 0.001", "payload_capacity >= 0.5"]
+    task = Task.model_validate(TASK | {"objectives": ["deflection", "mass"], "constraints": bounds})
+    tubes = Problem(task, TUBES)
+    matrix = TUBES.matrix(TUBES.sample(60, 7))
+    found, outcomes = lower_bounds(tubes, matrix), tubes.evaluate_matrix(matrix)
+    assert (found.values <= outcomes.values).all()
+    assert (found.violations <= outcomes.violations).all()
 
 
 def test_backlash_error_reads_the_backlash_of_the_actuators() -> None:

@@ -95,16 +95,16 @@ def test_evaluation_of_no_arms_is_empty() -> None:
 
 
 @pytest.mark.parametrize(
-    "mass",
+    "links",
     [
-        {"kind": "per_metre"},
-        {"kind": "per_link", "kg": 0.002},
-        {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
+        {"mass": {"kind": "per_metre"}},
+        {"mass": {"kind": "per_link", "kg": 0.002}},
+        {"link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"}},
     ],
 )
 @pytest.mark.parametrize("joints", [1, 4, 8])
-def test_matrix_evaluation_equals_design_evaluation(joints: int, mass: dict[str, Any]) -> None:
-    space = DesignSpace.model_validate({"joints": joints, "mass": mass, "joint_types": ("Y", "R")})
+def test_matrix_evaluation_equals_design_evaluation(joints: int, links: dict[str, Any]) -> None:
+    space = DesignSpace.model_validate({"joints": joints, **links, "joint_types": ("Y", "R")})
     problem = Problem(load_task("target-2"), space)
     designs = space.sample(200, seed=joints)
     matrix = space.matrix(designs)

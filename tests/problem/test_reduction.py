@@ -24,9 +24,12 @@ EVERYTHING: dict[str, Any] = {
     "limit": [0.5, 2.4],
     "actuators": ["XL430-W250", "XM430-W350"],
 }
+TUBES: dict[str, Any] = {"tubes": [[0.03, 0.002], [0.02, 0.001]], "material": "aluminium"}
 SPACES = {
     "everything": EVERYTHING,
     "without-fixed": {**EVERYTHING, "joint_types": ["R", "P", "Y"]},
+    "tubes": {**EVERYTHING, "link_section": TUBES},
+    "one-tube": {**EVERYTHING, "link_section": {**TUBES, "per_link": False}},
     "constant-number": {**EVERYTHING, "joints": 4},
     "straight-on-a-grid": {**EVERYTHING, "joint_types": ["P", "Y"], "link_directions": "+z", "grid": {"link": 0.03}},
 }
@@ -82,6 +85,15 @@ def test_the_price_falls_by_the_removed_actuator() -> None:
                 assert sorted([*names, joint.actuator.name]) == sorted(
                     o.actuator.name for o in arm.joints if o.actuator
                 )
+
+
+def test_merged_link_has_the_tube_of_the_link_before() -> None:
+    keys = {"joints": [1, 2], "joint_types": ["P"], "link": [0.03, 0.6], "link_section": TUBES}
+    space = DesignSpace.model_validate(keys)
+    params = {"origin_x": 0.0, "origin_y": 0.0, "origin_z": 0.0, "n_joints": "2", "joint_1": "P", "joint_2": "P"}
+    design = space.design({**params, "link_1": 0.1, "link_2": 0.2, "tube_1": "20x1", "tube_2": "30x2"})
+    (candidate,) = without_joints(space, design, np.array([False, True]))
+    assert (candidate.params["tube_1"], candidate.params["link_1"]) == ("20x1", pytest.approx(0.3))
 
 
 @pytest.mark.parametrize(("cycle", "least"), [({}, 20), ({"cycle": "in_order"}, 5)])

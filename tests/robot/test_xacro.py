@@ -93,25 +93,26 @@ def test_xacro_arguments_change_the_arm(arm: Arm) -> None:
     )
 
 
-MASSES = (
-    {"kind": "per_metre", "kg": 0.8},
-    {"kind": "per_link", "kg": 0.2},
-    {"kind": "tube", "density": 2700.0, "outer_diameter": 0.03, "wall": 0.002},
-)
+LINKS: dict[str, dict[str, object]] = {
+    "per_metre": {"mass": {"kind": "per_metre", "kg": 0.8}},
+    "per_link": {"mass": {"kind": "per_link", "kg": 0.2}},
+    "tubes": {"link_section": {"tubes": [[0.02, 0.0015], [0.03, 0.002]], "material": "aluminium"}},
+}
 
 
 def test_xacro_cases_cover_all_mass_models() -> None:
     models = get_args(get_args(MassModel)[0])
-    assert {get_args(model.model_fields["kind"].annotation)[0] for model in models} == {m["kind"] for m in MASSES}
+    assert {get_args(model.model_fields["kind"].annotation)[0] for model in models} == LINKS.keys() - {"tubes"}
 
 
-@pytest.mark.parametrize("mass", MASSES, ids=lambda mass: mass["kind"])
-def test_xacro_length_matches_the_design_space(mass: dict[str, object]) -> None:
+@pytest.mark.parametrize("kind", LINKS)
+def test_xacro_length_matches_the_design_space(kind: str) -> None:
     """A design's xacro with the lengths and the base of another is the arm that the space builds of that other."""
-    space = DesignSpace.model_validate({"mass": mass, "actuators": ["XM430-W350"], "joints": 5})
+    space = DesignSpace.model_validate({**LINKS[kind], "actuators": ["XM430-W350"], "joints": 5})
     one, other = space.sample(2, 46)
-    other = Design({**other.params, **{f"joint_{j}": one.params[f"joint_{j}"] for j in range(1, 6)}})
-    text = to_xacro(space.arm(one), "arm", mass_per_metre(space))
+    same = [name for name in one.params if name.startswith(("joint_", "tube_"))]
+    other = Design({**other.params, **{name: one.params[name] for name in same}})
+    text = to_xacro(space.arm(one), "arm", mass_per_metre(space, one))
     arguments: dict[str, object] = {f"link_{n}_length": length for n, length in enumerate(other.links, start=1)}
     arguments |= {f"base_{axis}": value for axis, value in zip("xyz", other.origin, strict=True)}
     assert_same(processed(text), space.arm(one))

@@ -29,7 +29,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of a space with motors and a mass that grows with length."""
     folder = tmp_path_factory.mktemp("exporting") / "run"
     content = {
-        "mass": {"kind": "tube", "density": 2700.0, "outer_diameter": 0.03, "wall": 0.002},
+        "link_section": {"tubes": [[0.02, 0.0015], [0.03, 0.002]], "material": "aluminium"},
         "actuators": ["XM430-W350", "XL430-W250"],
     }
     task = Task.model_validate({"name": HOSTILE, "targets": [[0.4, 0.0, 0.2]]})

@@ -13,10 +13,12 @@ from armwright.exceptions import DesignError, SpaceError
 from armwright.kinematics.arm_arrays import FLOATS, stack_arms
 from armwright.llm.prompt import load_prompt
 from armwright.problem.problem import Problem
+from armwright.robot.tubes import MATERIALS
 from armwright.runs.folder import read_run
 from armwright.spaces.batch_builder import stack_designs
 from armwright.spaces.design_space import DesignSpace, load_space, paper_space
-from armwright.spaces.link_mass import MassOfTube, MassPerLink
+from armwright.spaces.link_mass import MassPerLink
+from armwright.spaces.link_section import LinkSection
 from armwright.spaces.parameters import Design, FloatParameter
 from armwright.study.front_run import find_front
 from armwright.study.study import optimize
@@ -58,10 +60,11 @@ def test_mass_model_sets_link_masses() -> None:
     design = paper_space().clipped((0, 0, 0), "YPRP", (0.1, 0.2, 0.05, 0.3))
     per_link = paper_space().model_copy(update={"mass": MassPerLink(kind="per_link")})
     assert [link.mass for link in per_link.arm(design).links] == [0.002] * 4
-    tube = MassOfTube(kind="tube", density=2700, outer_diameter=0.03, wall=0.002)
-    assert tube.mass(1.0) == pytest.approx(2700 * math.pi * (0.015**2 - 0.013**2))
+    tubes = LinkSection(tubes=((0.03, 0.002),), material=MATERIALS["aluminium"])
+    of_tubes = paper_space().model_copy(update={"link_section": tubes})
+    assert of_tubes.link_mass(1.0) == pytest.approx(2700 * math.pi * (0.015**2 - 0.013**2))
     assert "a toy" in paper_space().mass_note
-    assert "a toy" not in paper_space().model_copy(update={"mass": tube}).mass_note
+    assert "a toy" not in of_tubes.mass_note
 
 
 @given(seed=st.integers(0, 2**31), joints=st.integers(1, 8))
@@ -110,7 +113,7 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
     file = tmp_path / "space.yaml"
     file.write_text(
         "name: six\njoints: 6\nlink: [0.1, 0.5]\norigin_z: [0, 0]\n"
-        "mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.002}\n"
+        "link_section: {tubes: [[0.03, 0.002]], material: aluminium}\n"
     )
     space = load_space(file)
     assert (space.joints, space.link, space.origin_z, space.origin_x) == (6, (0.1, 0.5), (0.0, 0.0), (-1.0, 1.0))
@@ -133,9 +136,17 @@ def test_space_file_keeps_defaults_of_missing_keys(tmp_path: Path) -> None:
         ("joint_types: [R, Q]", "joint_types"),
         ("links: [0.03, 0.3]", 'unknown key "links".'),
         ("mass: {kind: lead}", "mass"),
-        ("mass: {kg: 3}", "kind is missing: expected per_metre, per_link or tube"),
+        ("mass: {kg: 3}", "kind is missing: expected per_metre or per_link"),
         ("joint_range: [-7, 2.4]", "exceeds ±2π"),
-        ("mass: {kind: tube, density: 2700, outer_diameter: 0.03, wall: 0.02}", "more than half"),
+        ("link_section: {tubes: [[0.03, 0.02]]}", "expected a wall of at most the radius, 0.015 m"),
+        ("link_section: {tubes: [[20, 1.5]]}", "got 20 m; lengths are in metres: write 0.02 for 20 mm"),
+        ("link_section: {tubes: [[0.03, 0.0]]}", "above 0 m, got [0.03, 0]"),
+        ("link_section: {tubes: []}", "link_section.tubes"),
+        ("link_section: {tubes: [[0.03, 0.002], [0.03, 0.002]]}", "duplicates among 30x2, 30x2"),
+        ("link_section: {material: aluminum}", 'unknown material "aluminum". Did you mean "aluminium"?'),
+        ("link_section: {material: {density: 1, youngs: 70, shear: 27}}", "got 70 Pa; 70 GPa is 70.0e+9"),
+        ("link_section: {material: steel}\nmass: {kind: per_link}", "beside link_section.material"),
+        ("link_radius: 0.02", 'It is now called "link_section".'),
         ("origin_x: [-.inf, 1]", "finite"),
         ("origin_x: [-1.0e308, 1]", "exceeds ±1000"),
         ("- a\n- list", "keys and values"),

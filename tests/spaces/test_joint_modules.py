@@ -37,8 +37,15 @@ EVERYTHING: dict[str, Any] = {
     "limit": [0.5, 2.4],
     "travel": 0.004,
     "actuators": ["XL430-W250", "XM430-W350", "XM540-W270"],
-    "mass": {"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},
+    "link_section": {
+        "tubes": [[0.03, 0.002], [0.02, 0.0015], [0.04, 0.02]],
+        "material": {"density": 2700, "youngs": 70e9, "shear": 27e9, "price_per_kg": 12.5},
+    },
 }
+ONE_TUBE = {
+    "name": "one-tube", "joints": [2, 4], "joint_types": ["R", "O", "S"], "restrict": {"tube": ["20x1", "40x1"]},
+    "link_section": {"tubes": [[0.03, 0.002], [0.02, 0.001], [0.04, 0.001]], "per_link": False, "material": "carbon"},
+}  # fmt: skip
 TOOL = Tool(
     tip=(0.05, -0.02, 0.1), rpy=(0.3, -0.7, 2.0), mass=0.4, center=(0.01, 0.03, 0.06), inertia=(3e-4, 2e-4, 1e-4)
 )
@@ -53,8 +60,12 @@ def moving_arms(space: DesignSpace, n: int, seed: int) -> list[Arm]:
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
-@pytest.mark.parametrize("space", [MIXED, *map(load_space, builtin_spaces())], ids=lambda space: space.name)
-@pytest.mark.fast_cases(3)
+@pytest.mark.parametrize(
+    "space",
+    [MIXED, DesignSpace.model_validate(ONE_TUBE), *map(load_space, builtin_spaces())],
+    ids=lambda space: space.name,
+)
+@pytest.mark.fast_cases(4)
 def test_stacked_designs_equal_stacked_arms_to_the_bit(space: DesignSpace, precision: Any) -> None:
     designs = space.sample(300, 7)
     one = stack_designs(space, space.matrix(designs), TOOL, precision)

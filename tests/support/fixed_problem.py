@@ -38,7 +38,7 @@ class FixedProblem(Problem):
         lower, upper = self.space.joint_range
         steps = 0.4 * np.arange(1, d + 1) * (1 + np.arange(t)[:, None] % 3) - 1.5  # (T, D)
         q = np.broadcast_to(np.clip(steps, lower, upper), (n, t, d)).copy()
-        mass = self.space.max_joints * self.space.mass.mass(self.space.link[1])
+        mass = self.space.max_joints * self.space.heaviest_link
         lever = np.hypot(away[..., 0], away[..., 1])[..., None] * reach[:, None, None]
         torques = 9.81 * mass * lever / (1.0 + np.arange(d)) ** 2 * np.where(np.arange(d) % 2, -1.0, 1.0)
         arms = self.arms(rows)
@@ -126,7 +126,7 @@ SIX_AXIS = DesignSpace(
     origin_y=(0.0, 0.0),
     origin_z=(0.125, 0.125),
     link=(0.05, 0.4),
-    mass={"kind": "tube", "density": 2700, "outer_diameter": 0.03, "wall": 0.002},  # type: ignore[arg-type]
+    link_section={"tubes": [[0.03, 0.002]], "material": {"density": 2700, "youngs": 70e9, "shear": 27e9}},  # type: ignore[arg-type]
 )
 ONE_JOINT = paper_space(1).model_copy(update={"joint_types": ("P",), "link": (0.2, 0.2)})
 TWO_JOINTS = paper_space(2)

@@ -281,6 +281,6 @@ def test_signed_distances_are_those_of_the_kernels() -> None:
         problem = Problem(task)
         physics = problem.physics(problem.space.sample(200, 0))
         at_tip = task.obstacles[0].solid.signed_distance(physics.reached[:, 0])
-        bound = at_tip - problem.space.link_radius
+        bound = at_tip - problem.space.tube_values("radius")[0]
         assert (physics.obstacle_clearance[:, 0] <= bound + 1e-5).all()
         assert np.isclose(physics.obstacle_clearance[:, 0], bound, atol=1e-5).sum() > 10  # where the tip is nearest

@@ -195,8 +195,9 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
         links = ", ".join(f"{length:.3f}" for length in member.design.links)
         console.print(Text(f"#{member.number}", style="bold") + Text(f" ({look(member.source).label}): {values}"))
         motors = f", motors {', '.join(member.design.motors)}" if member.design.motors else ""
+        tubes = f", tubes {', '.join(member.design.tubes)}" if member.design.tubes else ""
         base = format_point([round(value, 3) for value in member.design.origin])
-        console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}")
+        console.print(f"  joints {member.design.joints}, links {links} m, base {base} m{motors}{tubes}")
         evaluation = history.evaluation([member.number])
         if along := describe_extremes(evaluation, 0):
             console.print(f"  worst along its cycle: {along}")

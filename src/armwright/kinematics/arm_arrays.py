@@ -55,6 +55,7 @@ class ArmArrays(PerArm):
     travel: Array  # (N, D) of a joint for each radian of its actuator: 1 for revolute joints [m/rad]
     length: Array  # (N,) of all links [m]
     base_mass: Array  # (N,) mass fixed to the base [kg]
+    structure_price: Array  # (N,) of all links [USD]
     bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
 
@@ -158,6 +159,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         travel=travel,
         length=np.array([arm.length for arm in arms]),
         base_mass=np.array([arm.base_mass for arm in arms]),
+        structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
         actuation=actuation_of(arms, travel),
     )

@@ -102,7 +102,8 @@ def backlash_errors(arms: ArmArrays, frames: Frames, backlash: Array) -> Array:
         backlash: (N, D) of joints [rad], or of slides [m]; 0 for fixed joints.
     """
     lever = np.linalg.norm(jacobian_of(arms, frames), axis=2)  # (N, K, D)
-    return (lever * (backlash / 2.0)[:, None]).sum(axis=-1)
+    # A running sum has the same bits whatever the number of joints of other arms.
+    return np.cumsum(lever * (backlash / 2.0)[:, None], axis=-1)[..., -1]
 
 
 def _of_links(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Stiffness) -> Array:
@@ -120,7 +121,8 @@ def _of_links(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Stiffnes
     rotation = (bent * length + by_force * (length**2 / 2.0) + by_weight * (length**3 / 6.0)) / bending
     rotation += twisting * length / torsional
     curve = (bent * (length**2 / 2.0) + by_force * (length**3 / 3.0) + by_weight * (length**4 / 8.0)) / bending
-    return (np.cross(curve, direction) + np.cross(rotation, frames.tip[:, :, None] - ends)).sum(axis=2)
+    moved = np.cross(curve, direction) + np.cross(rotation, frames.tip[:, :, None] - ends)
+    return np.cumsum(moved, axis=2)[:, :, -1]
 
 
 def _of_joints(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Array) -> Array:
@@ -129,7 +131,7 @@ def _of_joints(arms: ArmArrays, frames: Frames, loads: Loads, stiffness: Array) 
     moment = _moments(mass, loads.moment + loads.link_moment, frames.position)
     torque, force = (moment * frames.axis).sum(axis=-1), mass * (frames.axis @ DOWN)  # 0 for fixed joints
     motion = np.where(arms.prismatic[:, None], force, torque) / stiffness[:, None]  # (N, K, D)
-    return (jacobian_of(arms, frames) @ motion[..., None])[..., 0]
+    return np.cumsum(jacobian_of(arms, frames) * motion[:, :, None], axis=-1)[..., -1]
 
 
 def _moments(mass: Array, moment: Array, points: Array) -> Array:

@@ -11,10 +11,11 @@ from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
 
 AXES = ("x", "y", "z")
 LISTS = {  # lists with a value per module, and the prefix of their parameters
-    "joints": "joint", "links": "link", "motors": "motor", "directions": "direction", "strokes": "stroke",
-    "ranges": "limit",
+    "joints": "joint", "links": "link", "tubes": "tube", "motors": "motor", "directions": "direction",
+    "strokes": "stroke", "ranges": "limit",
 }  # fmt: skip
-GROUPS = ("origin", "mount", *LISTS)
+SINGLE = ("mount", "tube")  # choices of a whole arm, under the names of their parameters
+GROUPS = ("origin", *SINGLE, *LISTS)
 NOTHING = "-"  # in a list, for a module without such a value
 JOINT_NAMES = {description.partition(",")[0]: kind for kind, description in JOINT_DESCRIPTIONS.items()}  # "yaw": "Y"
 MAX_LINE_LENGTH = 2000  # characters; longer lines are ignored
@@ -25,7 +26,7 @@ _PLAIN = re.compile(_NUMBER, re.IGNORECASE)
 _ITEM = re.compile(rf"({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
 _NAMED = re.compile(rf"((?:origin|link|stroke|limit)_\w+)\s*[:=]\s*({_NUMBER})[ ]?([A-Za-zµ°%]*)", re.IGNORECASE)
 _NAMES_ALONE = re.compile(
-    r"\((?:(?:origin|link|joint|stroke|limit|direction|motor)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE
+    r"\((?:(?:origin|link|joint|stroke|limit|direction|tube|motor)_\w++|\.\.\.|…|[,\s])++\)\s*[:=]", re.IGNORECASE
 )
 _BRACKETS = re.compile(r"[(\[{]([^()\[\]{}]*)[)\]}]")
 _LATEX = re.compile(r"\\(?:[A-Za-z]+|[,;:! ()\[\]])")
@@ -110,6 +111,10 @@ def _values(name: str, text: str) -> dict[str, Any] | None:
     if name == "mount":
         mounts = re.findall(r"[A-Za-z]+(?:[-+][xy])?", text)
         return {"mount": mounts[0].lower()} if len(mounts) == 1 else None
+    if name in ("tube", "tubes"):
+        sizes = re.findall(r"(?<!\S)-(?!\S)|[\d.]+ ?[x×] ?[\d.]*\d", _spaced(re.sub(r"tube_\d+\s*[:=]", "", text)))
+        sizes = [size.replace("×", "x").replace(" ", "") for size in sizes]
+        return _listed(name, sizes) if name == "tubes" else {"tube": sizes[0]} if len(sizes) == 1 else None
     if name == "motors":
         names = re.findall(r"(?<!\S)-(?!\S)|[A-Za-z0-9][A-Za-z0-9._-]*", _spaced(re.sub(r"motor_\d+\s*[:=]", "", text)))
         return _listed(name, [motor.rstrip(".") for motor in names])

@@ -51,7 +51,7 @@ def draft_prompt(description: str) -> str:
         "most_targets": MAX_TARGETS,
         "reach": space.max_reach,
         "bases": ", ".join(f"{low:g} <= {axis} <= {high:g}" for axis, (low, high) in zip("xyz", ranges, strict=True)),
-        "toy": space.mass.description,
+        "toy": space.link_description,
         "most_objectives": MAX_OBJECTIVES,
         "paper_objectives": " and ".join(objective.name for objective in PAPER_OBJECTIVES),
         "objectives": tuple(OBJECTIVES.values()),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.llm.answer import MAX_REASON_LENGTH
-from armwright.llm.answer_format import NOTHING, module_lists
+from armwright.llm.answer_format import NOTHING, SINGLE, module_lists
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
 from armwright.robot.arm import GRAVITY
@@ -53,7 +53,7 @@ class Digits:
         space = history.problem.space
         reach = history.problem.max_reach
         task = history.problem.task
-        weight = space.max_joints * space.mass.mass(space.link[1]) + task.tool.mass + 2.0 * float(task.payloads.max())
+        weight = space.max_joints * space.heaviest_link + task.tool.mass + 2.0 * float(task.payloads.max())
         heaviest = GRAVITY * reach * weight  # [N m], more than any torque
         largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres
@@ -225,9 +225,9 @@ def _violated(history: History, number: int) -> str:
 
 
 def _extras(space: DesignSpace, design: Design, decimals: int) -> list[tuple[str, str]]:
-    """Return a design's mount and lists besides joints and links, as name and value of an answer's lines."""
+    """Return the choices of a whole design and its lists besides joints and links, as lines of an answer."""
     names = {parameter.name for parameter in space.parameters}
-    extras = [("MOUNT", design.mount)] if design.mount is not None else []
+    extras = [(name.upper(), str(design.params[name])) for name in SINGLE if name in design.params]
     for group, kind in module_lists(names).items():
         values = [design.params.get(f"{kind}_{j}", NOTHING) for j in range(1, len(design.joints) + 1)]
         shown = [value if isinstance(value, str) else f"{value:.{decimals}f}" for value in values]

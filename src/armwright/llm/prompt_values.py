@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from armwright.kinematics.ik import UPDATES
-from armwright.llm.answer_format import module_lists
+from armwright.llm.answer_format import SINGLE, module_lists
 from armwright.llm.feedback import MAX_PROPOSED, MIN_PROPOSED, Feedback, Record, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
 from armwright.problem.objective import Objective
@@ -75,6 +75,8 @@ VARIABLES = {
     "prismatic_types": "joint types that slide",
     "straight": "true if all links form one vertical line in the start posture",
     "extra_groups": "parameters besides base, joints and links: name in capitals, and prefix of the parameters",
+    "single": "names of the parameters that are choices of a whole arm",
+    "bar_radius": "radius of the links, as text",
     "n_copies": "number of copies of a design that a build tolerance adds",
     "joint_descriptions": "description of each joint type, by its letter",
     "mount_descriptions": "description of each mount",
@@ -172,12 +174,21 @@ def _space_values(space: DesignSpace) -> dict[str, Any]:
         "revolute_types": [kind for kind in space.joint_types if MODULES[kind].is_revolute],
         "prismatic_types": [kind for kind in space.joint_types if MODULES[kind].is_prismatic],
         "straight": space.mount == ("floor",) and space.link_directions == ("+z",),
-        "extra_groups": [("MOUNT", "mount"), *lists] if "mount" in names else lists,
+        "extra_groups": [*((name.upper(), name) for name in SINGLE if name in names), *lists],
+        "single": SINGLE,
+        "bar_radius": _describe_radius(space),
         "n_copies": len(length_columns(space)) * 2,
         "joint_descriptions": JOINT_DESCRIPTIONS,
         "mount_descriptions": MOUNT_DESCRIPTIONS,
         "restricted": [p for p in space.parameters if p.name in dict(space.restrict)],
     }
+
+
+def _describe_radius(space: DesignSpace) -> str:
+    """Describe the radius of the links."""
+    if len(space.tube_names) > 1:
+        return f"half the outer diameter of {'its tube' if space.link_section.per_link else 'the tube'}"
+    return f"radius {space.tube_values('radius')[0]:g} m"
 
 
 def _task_values(problem: Problem) -> dict[str, Any]:

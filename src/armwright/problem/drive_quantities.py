@@ -87,8 +87,8 @@ def voltages(evaluation: Evaluation) -> Array:
 
 
 def price(evaluation: Evaluation) -> Array:
-    """Return the (N,) prices of all actuators [USD]."""
-    return require_ratings(evaluation.arms.actuation, "price").price
+    """Return the (N,) prices of actuators and links [USD]."""
+    return require_ratings(evaluation.arms.actuation, "price").price + evaluation.arms.structure_price
 
 
 def peak_current(evaluation: Evaluation) -> Array:

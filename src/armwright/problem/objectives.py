@@ -106,7 +106,7 @@ TORQUE_UTILISATION = Objective(
 PRICE = Objective(
     name="price",
     unit="USD",
-    description="the price of all actuators",
+    description="the price of all actuators, and of the links if their material states one",
     each=drives.price,
     over="arm",
 )

@@ -19,7 +19,7 @@ from armwright.spaces.joint_modules import DIRECTIONS, MODULES, mounted_vector
 from armwright.spaces.parameters import Design, FloatParameter, ParameterValue
 
 IDLE = 1e-3  # [rad]; a joint that stays nearer to 0 along the task is removed
-KINDS = ("joint", "link", "direction", "motor", "stroke", "limit")  # parameters of a module
+KINDS = ("joint", "link", "direction", "tube", "motor", "stroke", "limit")  # parameters of a module
 
 
 def reduced(problem: Problem, matrix: Array) -> Array:
@@ -86,7 +86,8 @@ def without_joints(space: DesignSpace, design: Design, idle: NDArray[np.bool_]) 
 def _merged(space: DesignSpace, design: Design, i: int) -> dict[str, ParameterValue]:
     """Return the values of a design whose module `i` is gone and whose link before it also spans the one after it.
 
-    Where the two links have different directions there is no such link: the values then lack the one before.
+    It has the tube of the link before. Where the two links have different directions there is no such link: the values
+    then lack the one before.
     """
     count = len(design.modules)
     columns = {kind: [design.params.get(f"{kind}_{j}") for j in range(1, count + 1)] for kind in KINDS}
@@ -102,7 +103,8 @@ def _merged(space: DesignSpace, design: Design, i: int) -> dict[str, ParameterVa
         for j, value in enumerate(values[:i] + values[i + 1 :], start=1)
         if value is not None
     }
-    arm = {name: value for name, value in design.params.items() if name.partition("_")[0] not in KINDS}
+    names = {f"{kind}_{j}" for kind in KINDS for j in range(1, count + 1)}
+    arm = {name: value for name, value in design.params.items() if name not in names}
     arm |= {f"origin_{axis}": value for axis, value in zip("xyz", base, strict=True)}
     merged = {**arm, **numbered, "n_joints": str(count - 1)}
     ranges = {p.name: p for p in space.parameters if isinstance(p, FloatParameter)}

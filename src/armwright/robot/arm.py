@@ -264,6 +264,11 @@ class Arm:
         return self.base_mass + sum(link.total_mass for link in self.links) + self.tool.mass
 
     @property
+    def structure_price(self) -> float:
+        """The price of all links [USD]."""
+        return sum(link.price for link in self.links)
+
+    @property
     def length(self) -> float:
         """The total length of the links [m]."""
         return sum(link.length for link in self.links)

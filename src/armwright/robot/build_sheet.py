@@ -18,6 +18,8 @@ class SheetRow:
     Attributes:
         length: Length of the link, from joint to joint [m].
         mass: Mass of the link [kg].
+        outer_diameter: Outer diameter of its tube [m].
+        wall: Wall thickness of its tube [m]; None if unknown.
         lower: Lower limit of the joint [rad] or [m].
         upper: Upper limit of the joint [rad] or [m].
         used: Smallest and largest value at the targets [rad] or [m].
@@ -33,6 +35,8 @@ class SheetRow:
     axis: str
     length: float
     mass: float
+    outer_diameter: float
+    wall: float | None
     lower: float
     upper: float
     used: tuple[float, float]
@@ -56,6 +60,8 @@ def sheet_rows(arm: Arm, q: Array, torques: Array) -> list[SheetRow]:
                 axis=AXIS_NAMES[joint.axis],
                 length=link.length,
                 mass=link.mass,
+                outer_diameter=2.0 * link.radius,
+                wall=link.wall,
                 lower=joint.lower,
                 upper=joint.upper,
                 used=(float(q[:, j].min()), float(q[:, j].max())),
@@ -78,8 +84,8 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         f"Base, the first joint's place: ({base}) mm. With all joints at 0 the links stand as listed, along their own "
         "axes. Lengths are from joint to joint, the last one to the tip.",
         "",
-        "| # | joint | actuator | limits | used at the targets | holds at most | at target | link | mass |",
-        "|--:|---|---|---|---|--:|--:|--:|--:|",
+        "| # | joint | actuator | limits | used at the targets | holds at most | at target | link | tube | mass |",
+        "|--:|---|---|---|---|--:|--:|--:|--:|--:|",
     ]
     for row in rows:
         unit, force = ("m", "N") if row.kind == "prismatic" else ("rad", "N m")
@@ -94,10 +100,11 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
         ]
         if row.kind == "fixed":
             motion = ["fixed", row.actuator or "–", "", "", "", ""]
-        cells = [str(row.number), *motion, f"{1e3 * row.length:.1f} mm", f"{1e3 * row.mass:.4g} g"]
+        cells = [str(row.number), *motion, f"{1e3 * row.length:.1f} mm", _tube(row), f"{1e3 * row.mass:.4g} g"]
         lines.append(f"| {' | '.join(cells)} |")
     length, mass = sum(row.length for row in rows), sum(row.mass for row in rows)
-    lines += ["", f"Together {1e3 * length:.1f} mm of links, {1e3 * mass:.4g} g."]
+    price = f", {arm.structure_price:,.2f} USD" if arm.structure_price else ""
+    lines += ["", f"Together {1e3 * length:.1f} mm of links, {1e3 * mass:.4g} g{price}."]
     if any(arm.tool.tip):
         shift = ", ".join(f"{1e3 * value:.1f}" for value in arm.tool.tip)
         lines += ["", f"The tool reaches ({shift}) mm from the end of the last link to the tip."]
@@ -106,6 +113,14 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
     lines += _actuator_lines(arm)
     lines += [f"\n{note}" for note in notes]
     return "\n".join(lines) + "\n"
+
+
+def _tube(row: SheetRow) -> str:
+    """Return the outer diameter and, if known, the wall of a link's tube; empty without length."""
+    if row.length == 0.0:
+        return ""
+    wall = "" if row.wall is None else f" x {1e3 * row.wall:g}"
+    return f"{1e3 * row.outer_diameter:g}{wall} mm"
 
 
 def _actuator_lines(arm: Arm) -> list[str]:

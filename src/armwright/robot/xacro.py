@@ -29,7 +29,7 @@ NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
   link_N_end_mass        a point at its end, such as the next joint's actuator [kg] """
 
 
-def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float = 0.0) -> str:
+def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float | Sequence[float] = 0.0) -> str:
     """Return the URDF of an arm as xacro, with its numbers as arguments whose defaults give this arm.
 
     A link that is made longer keeps its direction, and its centre of mass the same fraction of its length; its inertia
@@ -38,8 +38,8 @@ def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float = 0.0) -> str:
     Args:
         arm: The arm.
         name: The name of the robot.
-        mass_per_metre: The mass that a link gains per metre of length [kg/m]; the rest of its mass is constant. A link
-            without length has a constant mass.
+        mass_per_metre: The mass that a link gains per metre of length [kg/m], one number for all links or one for each.
+            The rest of its mass is constant. A link without length has a constant mass.
     """
     robot = Element("robot", {"xmlns:xacro": NAMESPACE, "name": _literal(name)})
     robot.append(Comment(NOTE))
@@ -80,19 +80,20 @@ def _evaluated(terms: Sequence[str]) -> str:
     return " ".join(f"${{{term}}}" if term != "0" else term for term in terms)
 
 
-def _add_arguments(robot: Element, arm: Arm, mass_per_metre: float) -> None:
+def _add_arguments(robot: Element, arm: Arm, mass_per_metre: float | Sequence[float]) -> None:
     SubElement(robot, "xacro:arg", name="prefix", default="")
     values = {f"base_{axis}": value for axis, value in zip("xyz", arm.base, strict=True)}
     values |= {f"tool_{axis}": value for axis, value in zip("xyz", arm.tool.tip, strict=True)}
-    for n, link in enumerate(arm.links, start=1):
-        growing = mass_per_metre * link.length
+    gains = [mass_per_metre] * len(arm.links) if isinstance(mass_per_metre, (int, float)) else mass_per_metre
+    for n, (link, gain) in enumerate(zip(arm.links, gains, strict=True), start=1):
+        growing = gain * link.length
         # If all of the mass is proportional to the length, do not leave a rounding error as a constant part.
         rest = 0.0 if math.isclose(growing, link.mass, rel_tol=1e-12) else link.mass - growing
         values |= {
             f"link_{n}_length": link.length,
             f"link_{n}_radius": link.radius,
             f"link_{n}_mass": rest,
-            f"link_{n}_mass_per_metre": mass_per_metre if link.length > 0.0 else 0.0,
+            f"link_{n}_mass_per_metre": gain if link.length > 0.0 else 0.0,
             f"link_{n}_end_mass": link.end_mass,
         }
     for name, value in values.items():

@@ -24,6 +24,7 @@ from armwright.runs.selection import pick
 from armwright.runs.supply_record import supply_of
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
+from armwright.spaces.parameters import Design
 
 OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
 SHEET_VALUES = ("backlash", "joint_stiffness")  # of actuators, which a sheet depends on whatever the objectives
@@ -79,13 +80,14 @@ def _sheet_csv(history: History, member: FrontMember) -> str:
     return to_csv(rows)
 
 
-def mass_per_metre(space: DesignSpace) -> float:
-    """By how much a link gets heavier with its length [kg/m]; every mass model is a straight line over it."""
-    return space.mass.mass(1.0) - space.mass.mass(0.0)
+def mass_per_metre(space: DesignSpace, design: Design) -> list[float]:
+    """Return by how much each link gets heavier with its length [kg/m]; every mass model is a straight line over it."""
+    tubes = [space.tube_of(design, module) for module in design.module_of_joint]
+    return [float(space.link_mass(1.0, tube) - space.link_mass(0.0, tube)) for tube in tubes]
 
 
 def _xacro(history: History, member: FrontMember) -> str:
-    return to_xacro(member.arm, _name(history, member), mass_per_metre(history.problem.space))
+    return to_xacro(member.arm, _name(history, member), mass_per_metre(history.problem.space, member.design))
 
 
 FORMATS: dict[str, Callable[[History, FrontMember], str]] = {

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import cast
 
-from armwright.robot.arm import Actuator, Arm, Joint, Link, Vector, uniform_link
+from armwright.robot.arm import Actuator, Arm, Joint, Link, Vector
 from armwright.spaces.joint_modules import (
     DIRECTIONS,
     Direction,
@@ -63,11 +63,15 @@ class ArmBuilder:
     def _links(self, i: int) -> list[Link]:
         """Return the links of a module: massless ones between its joints, then its own."""
         x, y, z = mounted_vector(DIRECTIONS[self._direction(i)], self._mount)
-        length, radius = self._lengths[i], self._space.link_radius
-        link = uniform_link((x * length, y * length, z * length), self._space.mass.mass(length), radius)
+        length, tube = self._lengths[i], self._space.link_section.options[self._space.tube_of(self._design, i)]
+        link = tube.link((x * length, y * length, z * length), self._link_mass(i, length), length)
         if i + 1 < len(self._modules):
             link = replace(link, end_mass=self._carried_mass(i + 1), end_shift=self._carried_shift(i + 1))
-        return [uniform_link(ORIGIN, 0.0, radius)] * (len(self._modules[i].joints) - 1) + [link]
+        return [tube.link(ORIGIN, 0.0, 0.0)] * (len(self._modules[i].joints) - 1) + [link]
+
+    def _link_mass(self, i: int, length: float) -> float:
+        """Return the mass of this length of a module's tube [kg]."""
+        return float(self._space.link_mass(length, self._space.tube_of(self._design, i)))
 
     def _direction(self, i: int) -> Direction:
         return cast("Direction", self._params.get(f"direction_{i + 1}", self._space.link_directions[0]))
@@ -88,7 +92,7 @@ class ArmBuilder:
         return self._rail_mass(i) + len(module.joints) * (0.0 if actuator is None else actuator.mass)
 
     def _rail_mass(self, i: int) -> float:
-        return self._space.mass.mass(self._stroke(i)) if self._modules[i].is_prismatic else 0.0
+        return self._link_mass(i, self._stroke(i)) if self._modules[i].is_prismatic else 0.0
 
     def _carried_shift(self, i: int) -> Vector:
         """Return the vector from the start of a module to the centre of the mass there: a rail's is at its middle."""

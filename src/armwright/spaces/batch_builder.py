@@ -66,7 +66,6 @@ def stack_designs(
     motors = _motors(space, columns, joints) if space.actuators else None
     carried = _carried(space, columns, joints, motors)
     bodies, com = _bodies(space, columns, joints, carried)
-    unknown = np.where(columns.links > 0.0, np.nan, np.inf)
     per_joint = {
         "motion": joints.motion,
         "lower": joints.lower,
@@ -75,10 +74,10 @@ def stack_designs(
         "offset": _in_last_slot(bodies.offset, n_slots),
         "com": _in_last_slot(com, n_slots),
         "mass": _in_last_slot(bodies.total_mass, n_slots),
-        "radius": _in_last_slot(np.where(columns.links > 0.0, space.link_radius, 0.0), n_slots),
-        "bending_stiffness": _in_last_slot(unknown, n_slots, np.inf),
-        "torsional_stiffness": _in_last_slot(unknown, n_slots, np.inf),
+        "radius": _in_last_slot(columns.of_links(space.tube_values("radius"), 0.0), n_slots),
     }
+    for name in ("bending_stiffness", "torsional_stiffness"):
+        per_joint[name] = _in_last_slot(columns.of_links(space.tube_values(name), np.inf), n_slots, np.inf)
     if motors is not None:
         per_joint["ratings"] = motors.ratings
     present = _flatten(present)
@@ -106,6 +105,7 @@ def stack_designs(
         travel=flat["travel"],
         length=np.cumsum(columns.links, axis=1)[:, -1],
         base_mass=carried.mass[:, 0],
+        structure_price=np.cumsum(space.tube_values("price_per_metre")[columns.tubes] * columns.links, axis=1)[:, -1],
         bodies=_spread(bodies, present, n_slots),
         actuation=None
         if motors is None
@@ -122,6 +122,7 @@ class _Columns:
         present: (N, M) True for the modules that a design has.
         mount: (N,) index of the mount.
         links: (N, M) link lengths, 0 for absent modules [m].
+        tubes: (N, M) indices of the tubes of links and rails.
     """
 
     def __init__(self, space: DesignSpace, matrix: Array) -> None:
@@ -132,11 +133,19 @@ class _Columns:
         if "n_joints" in self._column:
             counts = self._indices("n_joints", int)
             self.present = np.arange(self.modules) < counts[:, None]
-        names = tuple(MOUNTS)
-        self.mount = np.full(self.n, names.index(space.mount[0]))
+        mounts = tuple(MOUNTS)
+        self.mount = np.full(self.n, mounts.index(space.mount[0]))
         if "mount" in self._column:
-            self.mount = self._indices("mount", names.index)
+            self.mount = self._indices("mount", mounts.index)
         self.links = np.where(self.present, self.reals("link"), 0.0)
+        names = space.tube_names
+        self.tubes = self.choices("tube", names.index, names[0])
+        if "tube" in self._column:
+            self.tubes = np.repeat(self._indices("tube", names.index)[:, None], self.modules, axis=1)
+
+    def of_links(self, per_tube: Array, without: float) -> Array:
+        """Return the (N, M) values of links, from those of the tubes (K,); `without` for links without length."""
+        return np.where(self.links > 0.0, per_tube[self.tubes], without)
 
     def _indices(self, name: str, index: Any) -> Any:
         """Return the (N,) `index` of each design's choice."""
@@ -233,7 +242,7 @@ def _motors(space: DesignSpace, columns: _Columns, joints: _Joints) -> _Motors:
 def _carried(space: DesignSpace, columns: _Columns, joints: _Joints, motors: _Motors | None) -> _Carried:
     """Return the masses of rails and actuators."""
     stroke = columns.reals("stroke", space.min_stroke)
-    rails = np.where(joints.prismatic[..., -1], space.mass.mass(stroke), 0.0)
+    rails = np.where(joints.prismatic[..., -1], space.link_mass(stroke, columns.tubes), 0.0)
     return _Carried(rails if motors is None else rails + motors.mass, rails)
 
 
@@ -251,7 +260,7 @@ def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array]:
 def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Carried) -> tuple[Bodies, Array]:
     """Return the links as bodies, (N, M, ...) each, and (N, M, 3) their centres of mass from the joint [m]."""
     links = columns.links
-    mass = np.where(columns.present, space.mass.mass(links), 0.0)
+    mass = np.where(columns.present, space.link_mass(links, columns.tubes), 0.0)
     end_mass = np.concatenate([carried.mass[:, 1:], np.zeros((columns.n, 1))], axis=1)
     directions = columns.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
     direction = _rotate(_VECTORS[directions], columns.mount)  # (N, M, 3)
@@ -262,7 +271,7 @@ def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Ca
     carried_com = (mass[..., None] * middle + end_mass[..., None] * end_mass_position) / np.where(
         total > 0.0, total, 1.0
     )[..., None]
-    radius = np.where(columns.present, space.link_radius, 0.0)
+    radius = np.where(columns.present, space.tube_values("radius")[columns.tubes], 0.0)
     com = np.where(end_mass[..., None] > 0.0, carried_com, middle)
     return Bodies(mass, middle, offset, radius, end_mass, end_mass_position), com
 

@@ -79,6 +79,10 @@ def _unrestricted(space: SpaceSchema) -> tuple[ConditionalParameter, ...]:
     entries += _per_module(space, "link", space.link, "m")
     if len(space.link_directions) > 1:
         entries += _per_module(space, "direction", space.link_directions)
+    if len(space.tube_names) > 1 and space.link_section.per_link:
+        entries += _per_module(space, "tube", space.tube_names)
+    elif len(space.tube_names) > 1:
+        entries.append(ConditionalParameter(CategoricalParameter("tube", space.tube_names)))
     if len(space.actuators) > 1:
         names = tuple(record.name for record in space.actuators)
         entries += _per_module(space, "motor", names, types=revolute + prismatic)

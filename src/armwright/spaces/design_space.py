@@ -189,7 +189,7 @@ class DesignSpace(SpaceSchema, frozen=True):
     def is_toy(self) -> bool:
         """True if even the heaviest arm is nearly massless, as in the paper."""
         heaviest = max((record.mass for record in self.actuators), default=0.0)
-        return self.max_joints * (self.mass.mass(self.link[1]) + heaviest) < TOY_MASS
+        return self.max_joints * (self.heaviest_link + heaviest) < TOY_MASS
 
     @property
     def mass_note(self) -> str:
@@ -197,7 +197,7 @@ class DesignSpace(SpaceSchema, frozen=True):
         toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if self.is_toy else ""
         names = ", ".join(record.name for record in self.actuators)
         actuators = f"; actuators: {names}" if self.actuators else ""
-        return f"links: {self.mass.description}{toy}{actuators}"
+        return f"links: {self.link_description}{toy}{actuators}"
 
 
 def _default_motors(space: SpaceSchema) -> dict[str, str]:

@@ -182,6 +182,11 @@ class Design:
         """The names of the modules' actuators in order; empty if they are not parameters of the space."""
         return tuple(str(value) for value in self._numbered("motor"))
 
+    @property
+    def tubes(self) -> tuple[str, ...]:
+        """The names of the links' tubes in order, or of the one of all links; empty if they are not parameters."""
+        return (str(self.params["tube"]),) if "tube" in self.params else tuple(map(str, self._numbered("tube")))
+
     def _numbered(self, kind: str) -> list[ParameterValue]:
         """Return the values of kind_1, kind_2, …, in the order of the modules."""
         modules = takewhile(lambda number: f"joint_{number}" in self.params, count(1))

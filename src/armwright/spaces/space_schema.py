@@ -4,12 +4,14 @@ import math
 from functools import lru_cache
 from typing import Any, Self, cast
 
+import numpy as np
 from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
 
 from armwright.robot.actuators import ActuatorRecord, resolve_actuator
 from armwright.robot.arm import Actuator
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
-from armwright.spaces.link_mass import MassModel, MassPerMetre
+from armwright.spaces.link_mass import Length, MassModel, MassPerMetre
+from armwright.spaces.link_section import LinkSection
 from armwright.spaces.parameters import Design, Range
 
 Restriction = float | str | Range | tuple[str, ...]
@@ -51,10 +53,10 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     """Range of the length of each link [m]."""
     link_directions: tuple[Direction, ...] = Field(default=("+z",), min_length=1)
     """Direction of a link in the frame of its joint; several choices add the parameters direction_j."""
-    link_radius: float = Field(default=0.015, gt=0.0, le=1.0)
-    """Radius of all links [m]."""
-    mass: MassModel = MassPerMetre()
-    """Mass of the links."""
+    link_section: LinkSection = LinkSection()
+    """Tubes and material of the links; several tubes add the parameters tube_j, or the parameter tube."""
+    mass: MassModel | None = None
+    """Mass of the links without a material; 0.0121 kg per metre if not stated. A material implies the mass."""
     actuators: tuple[ActuatorRecord, ...] = Field(default=(), max_length=MAX_ACTUATORS)
     """Names from the catalogue, or records; several add the parameters motor_j. Empty: joints without mass."""
     safety_factor: float = Field(default=1.5, gt=0.0, le=100.0)
@@ -91,7 +93,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     @classmethod
     def _require_kind(cls, value: Any) -> Any:
         if isinstance(value, dict) and "kind" not in cast("dict[str, Any]", value):
-            raise ValueError("kind is missing: expected per_metre, per_link or tube")
+            raise ValueError("kind is missing: expected per_metre or per_link")
         return cast("Any", value)
 
     @model_validator(mode="after")
@@ -100,6 +102,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         _check_ranges(self)
         _check_joint_ranges(self)
         _check_duplicates(self)
+        _check_mass(self)
         return self
 
     @property
@@ -122,9 +125,46 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         """The actuators as an arm has them, in the order of the file."""
         return _arm_actuators(self)
 
+    def link_mass(self, length: Length, tube: Any = 0) -> Length:
+        """Return the mass of links or rails [kg].
+
+        Args:
+            length: Their lengths [m].
+            tube: The indices of their tubes.
+        """
+        if self.link_section.material is None:
+            return (self.mass or MassPerMetre()).mass(length)
+        return self.tube_values("mass_per_metre")[tube] * length
+
+    @property
+    def tube_names(self) -> tuple[str, ...]:
+        """The names of the tubes, in the order of the file: `30x2`."""
+        return tuple(tube.name for tube in self.link_section.options)
+
+    @property
+    def heaviest_link(self) -> float:
+        """The mass of the longest link of the heaviest tube [kg]."""
+        return max(float(self.link_mass(self.link[1], tube)) for tube in range(len(self.link_section.tubes)))
+
+    @property
+    def link_description(self) -> str:
+        """The mass of the links in a few words."""
+        if self.link_section.material is not None:
+            return self.link_section.description
+        return (self.mass or MassPerMetre()).description
+
+    def tube_values(self, name: str) -> Any:
+        """Return a (K,) value of `LinkTube` for each of the K tubes; NaN where it is None."""
+        return _tube_values(self.link_section, name)
+
     def mount_of(self, design: Design) -> Mount:
         """Return the surface that the arm of a design is mounted on."""
         return cast("Mount", design.mount or self.mount[0])
+
+    def tube_of(self, design: Design, module: int) -> int:
+        """Return the index of the tube of a design's module, counted from 0."""
+        name = design.params.get(f"tube_{module + 1}", design.params.get("tube", self.tube_names[0]))
+        return self.tube_names.index(str(name))
 
     @property
     def max_reach(self) -> float:
@@ -137,6 +177,20 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
 @lru_cache(maxsize=64)
 def _arm_actuators(space: SpaceSchema) -> tuple[Actuator, ...]:
     return tuple(record.actuator() for record in space.actuators)
+
+
+@lru_cache(maxsize=512)
+def _tube_values(section: LinkSection, name: str) -> Any:
+    values = [getattr(tube, name) for tube in section.options]
+    return np.array([math.nan if value is None else value for value in values])
+
+
+def _check_mass(space: SpaceSchema) -> None:
+    if space.mass is not None and space.link_section.material is not None:
+        raise ValueError(
+            "mass: expected no value beside link_section.material, which implies the mass of the links; remove one of "
+            "the two"
+        )
 
 
 def _check_modules(space: SpaceSchema) -> None:

@@ -16,7 +16,7 @@ from armwright.problem.problem import Problem
 from armwright.robot.arm import Actuator
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import MODULES, JointType
-from armwright.spaces.parameters import CategoricalParameter, FloatParameter
+from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter
 from armwright.tasks.moments import MAX_MASS
 
 ROUNDING = 1e-5  # relative, of quantities in single precision
@@ -96,11 +96,14 @@ def intervals_by_modules(problem: Problem) -> dict[int, dict[str, Interval]]:
         strokes = (
             (stroke.low, stroke.high) if isinstance(stroke, FloatParameter) else (space.min_stroke, space.min_stroke)
         )
-        choices = [_of_letter(space, cast("JointType", x), [actuators[name] for name in names], strokes)
+        tubes = _tubes(space, known, module)
+        choices = [_of_letter(space, cast("JointType", x), [actuators[name] for name in names], strokes, tubes)
                    for x in letters]  # fmt: skip
         own = {name: _hull([choice[name] for choice in choices]) for name in ("joints", "price", "mass")}
         own["length"] = Interval(link.low, link.high)
-        own["mass"] += Interval(space.mass.mass(link.low), space.mass.mass(link.high))
+        own["mass"] += _mass(space, (link.low, link.high), tubes)
+        prices = [space.link_section.options[tube].price_per_metre for tube in tubes]
+        own["price"] += Interval(min(prices) * link.low, max(prices) * link.high)
         totals = {name: totals[name] + own[name] for name in totals}
         if module >= space.min_joints:
             found[module] = totals
@@ -109,19 +112,32 @@ def intervals_by_modules(problem: Problem) -> dict[int, dict[str, Interval]]:
     return found
 
 
+def _tubes(space: DesignSpace, known: Mapping[str, Parameter], module: int) -> list[int]:
+    """Return the indices of the tubes that a module may have, given the parameters of the space."""
+    parameter = known.get(f"tube_{module}", known.get("tube"))
+    names = parameter.choices if isinstance(parameter, CategoricalParameter) else space.tube_names[:1]
+    return [space.tube_names.index(name) for name in names]
+
+
+def _mass(space: DesignSpace, lengths: tuple[float, float], tubes: list[int]) -> Interval:
+    """Return the interval of the mass of links or rails of these lengths [m] and tubes [kg]."""
+    low, high = ([float(space.link_mass(length, tube)) for tube in tubes] for length in lengths)
+    return Interval(min(low), max(high))
+
+
 def _of_letter(
-    space: DesignSpace, letter: JointType, motors: list[Actuator], strokes: tuple[float, float]
+    space: DesignSpace, letter: JointType, motors: list[Actuator], strokes: tuple[float, float], tubes: list[int]
 ) -> dict[str, Interval]:
     """Return the intervals of a module of this type, without its link."""
     module = MODULES[letter]
     n = len(module.joints) if module.is_actuated else 0
     prices = [n * (motor.price or 0.0) for motor in motors] or [0.0]
     masses = [n * motor.mass for motor in motors] or [0.0]
-    rail = [space.mass.mass(stroke) if module.is_prismatic else 0.0 for stroke in strokes]
+    rail = _mass(space, strokes, tubes) if module.is_prismatic else NOTHING
     return {
         "joints": Interval(n, n),
         "price": Interval(min(prices), max(prices)),
-        "mass": Interval(min(masses) + rail[0], max(masses) + rail[1]),
+        "mass": Interval(min(masses), max(masses)) + rail,
     }
 
 

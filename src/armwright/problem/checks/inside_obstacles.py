@@ -27,7 +27,7 @@ def check_obstacles(problem: Problem) -> list[Finding]:
     has_other_links = problem.space.min_joints > 1
     for obstacle in task.obstacles:
         distance = obstacle.solid.signed_distance(task.target_positions)
-        nearest = distance + error + task.tool.length - problem.space.link_radius  # of the last link
+        nearest = distance + error + task.tool.length - min(problem.space.tube_values("radius"))  # of the last link
         impossible = nearest + slack < clearance if has_other_links else np.zeros(len(distance), dtype=np.bool_)
         inside = (distance < -task.target_arrays.tolerance) & ~impossible
         for found, evidence in ((impossible, PROVEN), (inside, SUSPECTED)):
@@ -69,7 +69,7 @@ def _finding(problem: Problem, obstacle: Obstacle, distance: Array, found: NDArr
             "surface",
             evidence,
         )
-    radius, tool = 1e3 * problem.space.link_radius, 1e3 * task.tool.length
+    radius, tool = 1e3 * min(problem.space.tube_values("radius")), 1e3 * task.tool.length
     remedy = "move the target or the obstacle" + ("" if depth > 0.0 else ", or state a longer tool")
     return Finding(
         f"{who} {verb} {where} an obstacle: {obstacle.describe()}; the last link, of radius {radius:g} mm and with a "

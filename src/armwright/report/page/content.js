@@ -100,7 +100,7 @@ export class Content {
   // The value of a parameter; undefined if it is not active.
   param(i, name) { return this.params(i).find((p) => p.name === name)?.value; }
 
-  // The choices of KIND_1, KIND_2, … in order; KIND is "motor" or "direction".
+  // The choices of KIND_1, KIND_2, … in order; KIND is "motor", "tube" or "direction".
   chosen(i, kind) {
     return this.params(i).filter((p) => p.choices && p.name.startsWith(`${kind}_`)).map((p) => p.value);
   }

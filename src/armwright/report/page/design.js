@@ -75,11 +75,13 @@ export function drawDesign() {
   });
   const feasible = head.constraints.length ? ` ${describeConstraints(i)}` : "";
   const motors = content.chosen(i, "motor").length ? ` Motors: ${content.chosen(i, "motor").join(", ")}.` : "";
+  const tube = content.param(i, "tube"), chosenTubes = tube ? [tube] : content.chosen(i, "tube");
+  const tubes = chosenTubes.length ? ` Tubes: ${chosenTubes.join(", ")}.` : "";
   const supply = head.cycles[i]?.supply ? ` Supply along the cycle: ${head.cycles[i].supply}.` : "";
   const mount = content.param(i, "mount");
   const onFront = head.front.includes(i) ? "On the Pareto front." : "Not on the Pareto front.";
   const base = Array.from(arm.base, metres).join(", ");
-  $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${describeRecommended(i)}${feasible}${iteration}${motors}${supply}`;
+  $("design-summary").textContent = `${objectives.join("; ")}. Base at (${base}) m${mount ? `, ${mount}` : ""}. ${onFront}${describeRecommended(i)}${feasible}${iteration}${motors}${tubes}${supply}`;
   drawLinks(arm);
   drawPostures(arm, posed);
   const hasFiles = head.files[i] !== undefined || fetchFile !== null;

@@ -28,10 +28,11 @@ function columns() {
     made.push({ key: "robust", name: "robustness", text: true, value: (i) => (content.isRobust(i) ? "robust" : "sensitive") });
   }
   made.push({ key: "joints", name: "joints", text: true, value: (i) => content.joints(i) });
-  if (head.parameters.some((p) => p.name === "mount")) {
-    made.push({ key: "mount", name: "mount", text: true, value: (i) => content.param(i, "mount") });
+  for (const name of ["mount", "tube"]) {
+    if (!head.parameters.some((p) => p.name === name)) continue;
+    made.push({ key: name, name, text: true, value: (i) => content.param(i, name) });
   }
-  for (const kind of ["direction", "motor"]) {
+  for (const kind of ["direction", "tube", "motor"]) {
     if (!head.parameters.some((p) => p.name.startsWith(`${kind}_`))) continue;
     made.push({ key: kind, name: `${kind}s`, text: true, value: (i) => content.chosen(i, kind).join(", ") });
   }

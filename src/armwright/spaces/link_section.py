@@ -1,0 +1,124 @@
+"""The sections that links may have: round tubes of one material."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Self
+
+from pydantic import BaseModel, Field, field_validator, model_validator
+
+from armwright.robot.arm import Link, Vector
+from armwright.robot.tubes import Material, Tube, resolve_material
+
+MAX_TUBES = 20
+MAX_DIAMETER = 1.0  # [m]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkTube:
+    """A tube as a link has it.
+
+    Attributes:
+        name: The choice of a parameter: `30x2`.
+        radius: The outer radius [m].
+        wall: Wall thickness [m]; None without a material.
+        mass_per_metre: [kg/m]; 0 without a material, which leaves the mass to another key.
+        bending_stiffness: EI [N m²]; None without a material.
+        torsional_stiffness: GJ [N m²]; None without a material.
+        price_per_metre: [USD/m].
+    """
+
+    name: str
+    radius: float
+    wall: float | None = None
+    mass_per_metre: float = 0.0
+    bending_stiffness: float | None = None
+    torsional_stiffness: float | None = None
+    price_per_metre: float = 0.0
+
+    def link(self, offset: Vector, mass: float, length: float) -> Link:
+        """Return a link of this tube, with its centre of mass halfway along `offset` [m]."""
+        x, y, z = offset
+        return Link(
+            offset,
+            mass,
+            (x / 2, y / 2, z / 2),
+            self.radius,
+            bending_stiffness=self.bending_stiffness,
+            torsional_stiffness=self.torsional_stiffness,
+            wall=self.wall,
+            price=self.price_per_metre * length,
+        )
+
+
+class LinkSection(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
+    """The round sections that links may have, and their material."""
+
+    tubes: tuple[tuple[float, float], ...] = Field(default=((0.03, 0.015),), min_length=1, max_length=MAX_TUBES)
+    """Outer diameter and wall of each tube [m]; a solid bar if the wall is half the diameter."""
+    per_link: bool = True
+    """True if each link has a tube of its own, the parameters tube_j; else the parameter tube is that of all links."""
+    material: Material | None = None
+    """A name, or a record. None: masses as in `mass`, stiffness unknown."""
+
+    @field_validator("material", mode="before")
+    @classmethod
+    def _look_up_material(cls, value: Any) -> Any:
+        return resolve_material(value)
+
+    @model_validator(mode="after")
+    def _check_tubes(self) -> Self:
+        for outer, wall in self.tubes:
+            if outer > MAX_DIAMETER:
+                raise ValueError(
+                    f"tubes: expected an outer diameter of at most {MAX_DIAMETER:g} m, got {outer:g} m; lengths are in "
+                    f"metres: write {outer / 1e3:g} for {outer:g} mm"
+                )
+            if min(outer, wall) <= 0.0:
+                raise ValueError(f"tubes: expected an outer diameter and a wall above 0 m, got [{outer:g}, {wall:g}]")
+            if wall > outer / 2:
+                raise ValueError(
+                    f"tubes: expected a wall of at most the radius, {outer / 2:g} m for an outer diameter of {outer:g} "
+                    f"m, got {wall:g} m; tubes are [outer diameter, wall]"
+                )
+        names = [tube.name for tube in self.options]
+        if len(set(names)) != len(names):
+            raise ValueError(f"tubes: duplicates among {', '.join(names)} (outer diameter x wall in mm)")
+        return self
+
+    @property
+    def options(self) -> tuple[LinkTube, ...]:
+        """The tubes in the order of the file."""
+        return _options(self)
+
+    @property
+    def description(self) -> str:
+        """The tubes and their masses in a few words; needs a material."""
+        if self.material is None:
+            raise ValueError("a section without a material has no mass")
+        name = f"{self.material.name}, " if self.material.name else ""
+        shown = [f"{1e3 * o:.6g} mm outer diameter and {1e3 * w:.6g} mm wall" for o, w in self.tubes]
+        masses = [f"{tube.mass_per_metre:.3g} kg per metre" for tube in self.options]
+        if len(shown) == 1:
+            return f"a tube of {shown[0]}, {name}{self.material.density:g} kg/m³ ({masses[0]})"
+        each = " or ".join(f"{tube} ({mass})" for tube, mass in zip(shown, masses, strict=True))
+        return f"tubes of {each}, {name}{self.material.density:g} kg/m³"
+
+
+@lru_cache(maxsize=64)
+def _options(section: LinkSection) -> tuple[LinkTube, ...]:
+    return tuple(_option(Tube(outer, wall), section.material) for outer, wall in section.tubes)
+
+
+def _option(tube: Tube, material: Material | None) -> LinkTube:
+    if material is None:
+        return LinkTube(tube.name, tube.radius)
+    kg = tube.mass_per_metre(material.density)
+    return LinkTube(
+        name=tube.name,
+        radius=tube.radius,
+        wall=tube.wall,
+        mass_per_metre=kg,
+        bending_stiffness=material.youngs * tube.second_moment,
+        torsional_stiffness=material.shear * (2.0 * tube.second_moment),
+        price_per_metre=material.price_per_kg * kg,
+    )
