@@ -105,9 +105,8 @@ def test_arms_of_thicker_tubes_yield_less_under_the_payload() -> None:
     designs = thin.sample(40, 6)
     task = Task.model_validate(TASK)
     one, other = (PAYLOAD_DEFLECTION(Problem(task, space).physics(designs)) for space in (thin, thick))
-    loaded = one > 1e-9  # [m]; upright arms do not bend
-    assert loaded.sum() > 30
-    assert (other < one)[loaded].all()
+    assert (other <= one * (1.0 + 1e-9)).all()
+    assert (other < 0.99 * one).mean() > 0.8  # in some postures only joints yield
 
 
 def test_bounds_of_screening_hold_for_deflection() -> None:
