@@ -7,7 +7,7 @@ import pytest
 import armwright as aw
 from armwright.exceptions import SettingsError
 from armwright.kinematics.payload_limits import payloads_over_reach
-from armwright.problem.objectives import BACKLASH_ERROR, PAYLOAD_CAPACITY
+from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
 from armwright.runs.assumptions import assumed_values
 from armwright.runs.compliance_notes import compliance_notes
 from armwright.runs.folder import read_run
@@ -38,6 +38,17 @@ def test_notes_state_backlash_and_payload() -> None:
     assert payload.startswith(f"The actuators hold {capacity:.3g} kg at all targets, ")
     found = payloads_over_reach(desk.arm)
     assert payload.endswith(f"{found.payloads[1]:.3g} kg at 100% of the reach of {found.reach:.3g} m.")
+
+
+def test_notes_of_arms_with_sections_state_the_deflection() -> None:
+    desk = Desk(space=SPACE | {"link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"}})
+    (by_weight,), (by_payload,) = DEFLECTION(desk.evaluation), PAYLOAD_DEFLECTION(desk.evaluation)
+    assert 0.0 < by_payload < by_weight
+    first, *_ = compliance_notes(desk.arm, desk.evaluation)
+    assert first == (
+        f"The weight of arm and load moves the tip by {1e3 * by_weight:.2f} mm at most at the targets, "
+        f"{1e3 * by_payload:.2f} mm by the payload alone."
+    )
 
 
 def test_nothing_is_noted_without_actuators() -> None:
