@@ -76,7 +76,8 @@ def test_payload_at_full_reach_has_the_closed_form() -> None:
     found = payloads_over_reach(planar_arm(12.0), (1.0,))
     assert found.reach == pytest.approx(0.5, rel=1e-3)
     own = 0.2 * GRAVITY * (0.15 + 0.4)
-    assert found.payloads[0] == pytest.approx((12.0 / FACTOR - own) / (0.5 * GRAVITY), rel=2e-3)
+    # The tip may be 1 % of the reach off.
+    assert found.payloads[0] == pytest.approx((12.0 / FACTOR - own) / (0.5 * GRAVITY), rel=5e-3)
 
 
 def test_payload_grows_towards_the_base() -> None:
@@ -85,6 +86,17 @@ def test_payload_grows_towards_the_base() -> None:
     assert np.isnan(folded), "the elbow does not fold so far"
     assert others == sorted(others, reverse=True)
     assert 1.5 * others[2] < others[0] < 12.0 / FACTOR / (0.25 * GRAVITY)
+
+
+def test_payload_at_full_reach_is_that_of_the_worst_posture() -> None:
+    """A shoulder of two axes may hold the arm by one that stands upright, which carries nothing."""
+    arm = planar_arm(12.0)
+    shoulder = tuple(Joint("revolute", axis, -2.4, 2.4, arm.joints[0].actuator) for axis in ("y", "x"))
+    universal = replace(arm, joints=(*shoulder, *arm.joints[1:]), links=(arm.links[0], uniform_link((0, 0, 0), 0, 0.01),
+                                                                       *arm.links[1:]))  # fmt: skip
+    (found,) = payloads_over_reach(universal, (1.0,)).payloads
+    own = 0.2 * GRAVITY * (0.05 + 0.25 + 0.5)
+    assert found == pytest.approx((12.0 / FACTOR - own) / (0.6 * GRAVITY), rel=5e-2)
 
 
 def test_weak_motors_hold_nothing_over_the_reach() -> None:

@@ -12,10 +12,11 @@ from armwright.kinematics.ik import solve_postures
 from armwright.kinematics.restarts import random_starts
 from armwright.robot.arm import GRAVITY, Arm
 from armwright.tasks.moments import MAX_MASS
-from armwright.tasks.targets import REACHED
 
-N_DIRECTIONS, N_STARTS = 16, 16  # horizontal directions, and random starts, that are searched for the reach
+N_DIRECTIONS, N_STARTS = 16, 16  # horizontal directions, and random starts, that are searched for postures
 FAR = 100.0  # times the reach: a point towards which an arm stretches
+WIDE = 0.9  # of the largest reach: directions in which an arm reaches less do not count
+NEAR = 0.01  # of the reach: the tip is where it should be
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class ReachPayloads:
 
     Attributes:
         reach: The largest horizontal distance of the tip from the first joint [m].
-        payloads: The largest payload held at each fraction [kg]; NaN where no posture was found.
+        payloads: The payload held in all postures found at each fraction [kg]; NaN where none was found.
     """
 
     reach: float
@@ -61,8 +62,9 @@ def torques_by_payload(arms: ArmArrays, frames: Frames) -> Array:
 def payloads_over_reach(arm: Arm, fractions: Sequence[float] = (0.5, 1.0)) -> ReachPayloads:
     """Return the payloads that an arm holds at fractions of its horizontal reach, with its safety factor.
 
-    The reach is that of the widest posture found. For each fraction, the tip is in the direction and at the height of
-    that posture, and the best posture found counts. The payload is a point at the tip.
+    The reach in a direction is that of the widest posture found, and the tip stays at the height of that posture.
+    Directions in which the arm reaches nearly as far as in any count, and in them all postures found: the least payload
+    is the one that the arm holds however it gets there. The payload is a point at the tip.
 
     Args:
         arm: An arm with actuators.
@@ -72,20 +74,34 @@ def payloads_over_reach(arm: Arm, fractions: Sequence[float] = (0.5, 1.0)) -> Re
     # From the first joint at the origin, so that far points keep their precision.
     arms = replace(arms, base=np.zeros_like(arms.base))
     assert arms.actuation is not None, "expected an arm with actuators"
-    angles = 2.0 * np.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
-    far = FAR * arm.reach * np.stack([np.cos(angles), np.sin(angles), np.zeros(N_DIRECTIONS)], axis=1)
-    starts: list[Array] = [np.zeros((1, 1, arms.dof)), *random_starts(arms, N_STARTS)]
-    stretched = [solve_postures(arms, far, initial_q=start, precision=arms.precision) for start in starts]
-    tips = np.concatenate([found.reached[0] for found in stretched]).astype(np.float64)
-    widest = int(np.hypot(tips[:, 0], tips[:, 1]).argmax())
-    starts.append(np.concatenate([found.q[0] for found in stretched])[widest][None, None].astype(np.float64))
-    targets = tips[widest] * np.array([[fraction, fraction, 1.0] for fraction in fractions])
-    best = np.full(len(fractions), np.nan)
+    allowed = arms.actuation.peak / arms.actuation.safety_factor[:, None]
+    starts = [np.zeros((1, 1, arms.dof)), *random_starts(arms, N_STARTS)]
+    widest, stretched = _stretched(arms, FAR * arm.reach, starts)
+    reach = np.hypot(widest[:, 0], widest[:, 1])
+    counts = reach >= WIDE * reach.max()
+    scale = np.stack([fractions, fractions, np.ones(len(fractions))], axis=1)[:, None]  # (F, 1, 3)
+    targets = (scale * widest[counts]).reshape(-1, 3)  # (F W, 3)
+    starts += [np.tile(q[:, counts], (1, len(fractions), 1)) for q in stretched]
+    least = np.full(len(targets), np.nan)
     for start in starts:
         found = solve_postures(arms, targets, initial_q=start, precision=arms.precision)
         frames = forward_kinematics(arms, found.q.astype(np.float64))
-        peak = arms.actuation.peak / arms.actuation.safety_factor[:, None]
-        held = payload_limits(arms, frames, found.torque.astype(np.float64), peak)[0]
-        reached = np.linalg.norm(found.reached[0] - targets, axis=1) < REACHED
-        best = np.fmax(best, np.where(reached, held, np.nan))
-    return ReachPayloads(float(np.hypot(*tips[widest, :2])), tuple(best.tolist()))
+        held = payload_limits(arms, frames, found.torque.astype(np.float64), allowed)[0]
+        is_there = np.linalg.norm(found.reached[0] - targets, axis=1) < NEAR * reach.max()
+        least = np.fmin(least, np.where(is_there, held, np.nan))
+    payloads = np.fmin.reduce(least.reshape(len(fractions), -1), axis=1)
+    return ReachPayloads(float(reach.max()), tuple(payloads.tolist()))
+
+
+def _stretched(arms: ArmArrays, distance: float, starts: Sequence[Array]) -> tuple[Array, list[Array]]:
+    """Stretch an arm in horizontal directions, towards points at a distance [m].
+
+    Returns:
+        (W, 3) tip of the widest posture in each direction [m], and the (1, W, D) postures from each start.
+    """
+    angles = 2.0 * np.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
+    directions = np.stack([np.cos(angles), np.sin(angles), np.zeros(N_DIRECTIONS)], axis=1)
+    found = [solve_postures(arms, distance * directions, initial_q=q, precision=arms.precision) for q in starts]
+    tips = np.concatenate([postures.reached for postures in found]).astype(np.float64)  # (S, W, 3)
+    best = (tips * directions).sum(axis=-1).argmax(axis=0)
+    return tips[best, np.arange(N_DIRECTIONS)], [postures.q.astype(np.float64) for postures in found]
