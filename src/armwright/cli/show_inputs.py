@@ -16,6 +16,7 @@ from armwright.problem.checks.reach import distance_to_bases
 from armwright.problem.constraints import implied_constraints
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
+from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
@@ -76,6 +77,15 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
             shown = f"assumed: estimate from {shown}" if found else f"assumed: default of a {record.kind}"
         table.add_row(name, f"{value:.4g}", unit, Text(shown))
     console.print(table)
+    if record.body_shape is not None:
+        console.print(Text(f"body: {_describe_body(record, record.body_shape)}"))
+
+
+def _describe_body(record: ActuatorRecord, body: ActuatorShape) -> str:
+    across = f"{1e3 * body.long:g} mm" if body.shape == "cylinder" else f"{1e3 * body.long:g} x {1e3 * body.short:g} mm"
+    assumed = [name for name in ("shape", "shaft_edge") if getattr(record, name) is None]
+    note = f"; assumed: {', '.join(assumed)}" if assumed else ""
+    return f"a {body.shape}, {1e3 * body.length:g} mm along its shaft, {across} across{note}"
 
 
 def show_task(

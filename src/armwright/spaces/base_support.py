@@ -16,8 +16,9 @@ LEVEL = 1e-9  # sine of the largest tilt of a top face
 def supported_space(space: DesignSpace, obstacles: Sequence[Obstacle]) -> DesignSpace:
     """Return the space with its bases on what they stand on in a task.
 
-    With `base_on`, the base position is restricted to the top face of that obstacle: at its height, above it if there
-    is a column, or above it by no more than the reach of a motor if motors are bodies. The column stands on it, else on the highest ground, else at z = 0. Applied twice, nothing changes.
+    With `base_on`, the base position is restricted to the top face of that obstacle: at its height, or above if there
+    is a column, or above by at most the reach of a motor if motors are bodies. The column stands on it, else on the
+    highest ground, else at z = 0. Applied twice, nothing changes.
 
     Args:
         space: The design space.
