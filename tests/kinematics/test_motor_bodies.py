@@ -152,7 +152,7 @@ def turning_motor(rng: np.random.Generator, shape: Any, axis: Any) -> Arm:
 
 def test_depth_of_overlapping_boxes_is_the_least_translation_apart() -> None:
     """Two boxes on a slide: their overlap shrinks as the second is moved out."""
-    bodies = MotorBody("box", "x", (0.06, 0.05, 0.04)), MotorBody("box", "y", (0.04, 0.06, 0.05))
+    bodies = MotorBody("box", "x", (0.06, 0.05, 0.04)), MotorBody("box", "x", (0.04, 0.06, 0.05))
     joints = tuple(Joint("prismatic", "x", 0.0, 1.0, body=body) for body in bodies)
     arm = Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.01), 0.1, 0.001),) * 2)
     shifts = np.array([0.0, 0.01, 0.02, 0.04, 0.05, 0.1, 0.2])

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from armwright.kinematics.rigid_bodies import PerArm
 from armwright.robot.arm import AXES, Arm
+from armwright.robot.axes import Vector
 from armwright.robot.motor_body import MotorBody, shaft_order
 from armwright.tasks.obstacles import SHAPES
 
@@ -29,7 +30,7 @@ class MotorBodies(PerArm):
     centre: NDArray[np.floating[Any]]  # (N, D, 3) from the joint at displacement 0, in the frame of the link before [m]
 
 
-def body_values(body: MotorBody) -> tuple[int, int, tuple[float, ...], tuple[float, ...]]:
+def body_values(body: MotorBody) -> tuple[int, int, Vector, Vector]:
     """Return shape, axis, half and centre of a body, as `MotorBodies` has them."""
     length, width, depth = shaft_order(body.axis, body.size)
     return SHAPES.index(body.shape), AXES.index(body.axis), (width / 2, depth / 2, length / 2), body.centre

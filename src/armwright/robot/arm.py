@@ -99,6 +99,8 @@ class Joint:
             raise ArmError(f'joint axis "{self.axis}" is not one of {", ".join(AXES)}')
         if self.kind == "fixed" and self.body is not None:
             raise ArmError("a fixed joint has no actuator, so no body of one")
+        if self.body is not None and self.body.axis != self.axis:
+            raise ArmError(f"motor body: expected its shaft along the joint's axis {self.axis}, got {self.body.axis}")
         unit = "m" if self.kind == "prismatic" else "rad"
         if not (math.isfinite(self.lower) and math.isfinite(self.upper)):
             raise ArmError(f"joint limits must be finite: [{self.lower}, {self.upper}] {unit}")
