@@ -185,9 +185,9 @@ def _space_values(space: DesignSpace) -> dict[str, Any]:
 
 
 def _describe_radius(space: DesignSpace) -> str:
-    """Describe the radius of the links."""
+    """Describe the radius of the links, as in "a bar of …"."""
     if len(space.tube_names) > 1:
-        return f"half the outer diameter of {'its tube' if space.link_section.per_link else 'the tube'}"
+        return f"the outer diameter of {'tube_j' if space.link_section.per_link else 'tube'}"
     return f"radius {space.tube_values('radius')[0]:g} m"
 
 
