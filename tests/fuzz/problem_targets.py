@@ -178,7 +178,8 @@ def actuator_seeds() -> list[bytes]:
               "rated_torque": 2.0, "peak_torque": 7.0, "speed": 5.0, "width": 0.03, "height": 0.05, "depth": 0.04,
               "price": 120.0, "source": "https://example.org", "note": "so",
               "corner_speed": 1.0, "gear_ratio": 200.0, "rotor_inertia": 0.01, "coulomb_friction": 0.1,
-              "viscous_friction": 0.05, "backlash": 0.004, "position_gain": 20.0, "damping_gain": 1.0, "current": 2.5,
+              "viscous_friction": 0.05, "backlash": 0.004, "joint_stiffness": 200.0, "position_gain": 20.0,
+              "damping_gain": 1.0, "current": 2.5,
               "estimates": ["rotor_inertia"]}  # fmt: skip
     plain = {"name": "plain", "mass": 0.1}
     records = ([record], [record, plain | {"rated_torque": 3.0, "kind": "harmonic"}], [plain | {"peak_torque": 3.0}])

@@ -32,7 +32,7 @@ def drives(n: int, d: int, rng: np.random.Generator) -> Actuation:
     corner = no_load * rng.choice([0.0, 0.3, 0.9, 1.0], (n, d))
     columns = (rng.uniform(0.5, 5.0, (n, d)), np.ones((n, d)), corner, no_load, rng.uniform(0.0, 0.2, (n, d)))
     friction = (rng.uniform(0.0, 0.4, (n, d)), rng.uniform(0.0, 0.3, (n, d)) * rng.choice([1, 20], (n, d)))
-    ratings = np.stack([*columns, *friction, np.ones((n, d)), np.ones((n, d))], axis=-1)
+    ratings = np.stack([*columns, *friction, *np.ones((4, n, d))], axis=-1)
     return actuation_at_joints(ratings, np.ones((n, d)), np.zeros(n), rng.uniform(1.0, 2.0, n))
 
 
@@ -82,7 +82,7 @@ def test_least_time_is_the_least_of_all_times(samples: int, joints: int) -> None
 def test_least_time_may_be_impossible_at_lower_speeds() -> None:
     """Friction adds to gravity, inertia helps: the least time is possible, and 1.5 times as much, but 1 s is not."""
     shape = (1, 1, 1)
-    ratings = np.array([[[2.0, 1.0, 0.0, 100.0, 0.0, 0.5, 0.0, 1.0, 1.0]]])
+    ratings = np.array([[[2.0, 1.0, 0.0, 100.0, 0.0, 0.5, 0.0, 1.0, 1.0, 0.0, 1.0]]])
     motors = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
     load = motion_load(np.full(shape, 1.9), np.full(shape, -0.03), np.ones(shape), np.zeros(shape), motors)
     (time,) = least_time(load, motors)
@@ -92,7 +92,7 @@ def test_least_time_may_be_impossible_at_lower_speeds() -> None:
 
 def test_least_time_is_found_between_times_that_are_excluded() -> None:
     """The first joint alone could do it in 1 s; the second excludes all times from 0.14 to 21.8 s."""
-    ratings = np.tile([2.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0], (1, 2, 1)).astype(float)
+    ratings = np.tile([2.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0], (1, 2, 1)).astype(float)
     motors = actuation_at_joints(ratings, np.ones((1, 2)), np.zeros(1), np.ones(1))
     gravity, inertial = np.array([[[0.0, -1.9]]]), np.array([[[0.0, 0.0]]])
     load = motion_load(gravity, inertial, np.array([[[1.0, 0.0]]]), np.zeros((1, 1, 2)), motors)
@@ -122,7 +122,8 @@ def test_least_time_of_a_slide_is_that_of_its_motor() -> None:
     travel = 0.02
     joint = actuation_at_joints(
         np.stack([motors.peak, motors.continuous, motors.corner_speed, motors.no_load_speed, motors.rotor_inertia,
-                  motors.coulomb, motors.viscous, motors.voltage, motors.current], axis=-1),
+                  motors.coulomb, motors.viscous, motors.voltage, motors.current, motors.backlash,
+                  motors.joint_stiffness], axis=-1),
         np.full((N, D), travel), motors.price, motors.safety_factor,
     )  # fmt: skip
     force = (load.gravity / travel, load.coulomb / travel, load.viscous / travel, load.inertial / travel)
@@ -155,7 +156,7 @@ def test_unknown_ratings_give_no_number(name: str) -> None:
 
 def test_available_torque_of_servos_and_drives() -> None:
     """A servo of 4 N m and 5 rad/s, a drive with the corner speed 3 rad/s, and one with a constant torque."""
-    ratings = np.array([[[4.0, 1.0, corner, 5.0, 0.0, 0.0, 0.0, 1.0, 1.0] for corner in (0.0, 3.0, 5.0)]])
+    ratings = np.array([[[4.0, 1.0, corner, 5.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0] for corner in (0.0, 3.0, 5.0)]])
     motors = actuation_at_joints(ratings, np.ones((1, 3)), np.zeros(1), np.array([2.0]))
     speeds = np.array([0.0, 1.0, 3.0, 4.0, 5.0, 6.0])
     velocity = np.tile(speeds[None, :, None], (1, 1, 3))

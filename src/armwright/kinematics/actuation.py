@@ -9,14 +9,14 @@ from armwright.arrays import Array
 from armwright.kinematics.rigid_bodies import PerArm
 from armwright.robot.arm import Actuator, Arm
 
-FIXED_RATINGS = (np.inf, np.inf, np.inf, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0)
+FIXED_RATINGS = (np.inf, np.inf, np.inf, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.inf)
 
 
 @dataclass(frozen=True)
 class Actuation(PerArm):
     """Actuators of N arms of up to D joints, by the motion of their joints: of a slide in m, N and kg.
 
-    NaN where a value is unknown. A fixed joint has infinite torques and speeds; its other values are 0.
+    NaN where a value is unknown. A fixed joint has infinite torques, speeds and stiffness; its other values are 0.
     """
 
     peak: Array  # (N, D) largest torque, at rest and up to the corner speed [N m] or [N]
@@ -28,6 +28,8 @@ class Actuation(PerArm):
     viscous: Array  # (N, D) friction by speed [N m s/rad] or [N s/m]
     voltage: Array  # (N, D) of the supply [V]
     current: Array  # (N, D) from the supply at the peak torque [A]
+    backlash: Array  # (N, D) [rad] or [m]
+    joint_stiffness: Array  # (N, D) from the motor to the joint [N m/rad] or [N/m]
     price: Array  # (N,) of all actuators of an arm [USD]; NaN if one has no price
     safety_factor: Array  # (N,) by which required torques are multiplied
 
@@ -36,12 +38,13 @@ def actuation_at_joints(ratings: Array, travel: Array, price: Array, safety_fact
     """Return the actuation of joints by the ratings of their actuators.
 
     Args:
-        ratings: (N, D, 9) as from `ratings_of`; FIXED_RATINGS for fixed joints.
+        ratings: (N, D, R) as from `ratings_of`; FIXED_RATINGS for fixed joints.
         travel: (N, D) of a joint for each radian of its actuator [m/rad]; 1 for revolute joints.
         price: (N,) of all actuators of an arm [USD].
         safety_factor: (N,) by which required torques are multiplied.
     """
-    peak, continuous, corner, no_load, inertia, coulomb, viscous, voltage, current = np.moveaxis(ratings, -1, 0)
+    peak, continuous, corner, no_load, inertia, coulomb, viscous, *others = np.moveaxis(ratings, -1, 0)
+    voltage, current, backlash, stiffness = others
     return Actuation(
         peak=peak / travel,
         continuous=continuous / travel,
@@ -52,6 +55,8 @@ def actuation_at_joints(ratings: Array, travel: Array, price: Array, safety_fact
         viscous=viscous / travel**2,
         voltage=voltage.copy(),
         current=current.copy(),
+        backlash=backlash * travel,
+        joint_stiffness=stiffness / travel**2,
         price=price,
         safety_factor=safety_factor,
     )
@@ -69,6 +74,8 @@ def ratings_of(actuator: Actuator) -> tuple[float, ...]:
         actuator.viscous_friction,
         actuator.voltage,
         actuator.current,
+        actuator.backlash,
+        actuator.joint_stiffness,
     )
     return tuple(np.nan if value is None else value for value in stated)
 

@@ -119,8 +119,11 @@ def least_time(load: MotionLoad, drives: Actuation) -> Array:
         A motor of 2 N m and 10 rad/s turns a disc of 0.1 kg m² by 1 rad at a constant speed.
 
         >>> import numpy as np
-        >>> from armwright.kinematics.actuation import actuation_at_joints
-        >>> ratings = np.array([[[2.0, 1.0, 0.0, 10.0, 0.1, 0.0, 0.0, 12.0, 2.0]]])
+        >>> from armwright.kinematics.actuation import actuation_at_joints, ratings_of
+        >>> from armwright.robot.arm import Actuator
+        >>> motor = Actuator("servo", 0.1, peak_torque=2.0, speed=10.0, corner_speed=0.0, rotor_inertia=0.1,
+        ...                  coulomb_friction=0.0, viscous_friction=0.0)
+        >>> ratings = np.array([[ratings_of(motor)]])
         >>> drives = actuation_at_joints(ratings, np.ones((1, 1)), np.zeros(1), np.ones(1))
         >>> still, turn = np.zeros((1, 1, 1)), np.ones((1, 1, 1))
         >>> float(least_time(motion_load(still, still, turn, still, drives), drives)[0])

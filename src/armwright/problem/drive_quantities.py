@@ -22,6 +22,10 @@ RATINGS: Mapping[str, tuple[str, ...]] = {
     "voltages": ("voltage",),
     "peak_current": ("peak", "voltage", "current"),
     "mean_current": ("peak", "voltage", "current"),
+    "deflection": ("joint_stiffness",),
+    "payload_deflection": ("joint_stiffness",),
+    "backlash_error": ("backlash",),
+    "payload_capacity": ("peak",),
 }
 
 

@@ -14,8 +14,9 @@ from armwright.kinematics.clearance import clearances
 from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads, holding_torques
 from armwright.kinematics.cycle_path import CyclePaths, find_paths, rough_paths
 from armwright.kinematics.devices import Device
+from armwright.kinematics.forward import Frames, forward_kinematics
 from armwright.kinematics.ik import UPDATES, Postures, solve_postures
-from armwright.kinematics.jacobian import jacobians
+from armwright.kinematics.jacobian import jacobian_of
 from armwright.kinematics.restarts import nearer_postures, random_starts
 from armwright.kinematics.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
@@ -149,6 +150,11 @@ class Evaluation(Scene):
             worst[:, target] = np.maximum(worst[:, target], along[:, index])
         return worst
 
+    @cached_property
+    def frames(self) -> Frames:
+        """Joint frames in the kept postures, in float64."""
+        return forward_kinematics(self.arms, self.q)
+
     @property
     def manipulability(self) -> Array:
         """(N, T) sqrt(det J Jᵀ) of the position Jacobian J in the kept posture (Yoshikawa 1985) [m³]."""
@@ -163,7 +169,7 @@ class Evaluation(Scene):
     @cached_property
     def _singular_values(self) -> Array:
         """(N, T, 3) of J, from the largest on."""
-        jacobian = jacobians(self.arms, self.q)
+        jacobian = jacobian_of(self.arms, self.frames)
         return np.sqrt(np.maximum(np.linalg.eigvalsh(jacobian @ jacobian.swapaxes(-1, -2))[..., ::-1], 0.0))
 
     @cached_property

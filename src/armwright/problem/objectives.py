@@ -7,6 +7,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, did_you_mean
 from armwright.kinematics.arm_arrays import FIXED
+from armwright.problem import compliance_quantities as compliance
 from armwright.problem import drive_quantities as drives
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
@@ -240,12 +241,37 @@ MEAN_CURRENT = Objective(
     each=drives.mean_current,
     over="arm",
 )
+DEFLECTION = Objective(
+    name="deflection",
+    unit="m",
+    description="how far the arm's own weight and the payload move the tip in the kept posture, because links bend and "
+    "twist and joints yield",
+    each=compliance.deflection,
+    over="max",
+)
+PAYLOAD_DEFLECTION = Objective(
+    name="payload_deflection",
+    unit="m",
+    symbol="E_payload",
+    description="how far the payload alone moves the tip in the kept posture, because links bend and twist and joints "
+    "yield",
+    each=compliance.payload_deflection,
+    over="max",
+)
+BACKLASH_ERROR = Objective(
+    name="backlash_error",
+    unit="m",
+    symbol="E_backlash",
+    description="how far half of the backlash of all actuators together moves the tip in the kept posture at most",
+    each=compliance.backlash_error,
+    over="max",
+)
 PAPER_OBJECTIVES = (POSITION_ERROR, TORQUE)
 _ALL = (
     *PAPER_OBJECTIVES, WORST_ERROR, UNREACHED_TARGETS, PEAK_TORQUE, RMS_TORQUE, TORQUE_UTILISATION, MASS, LENGTH,
     PRICE, JOINTS, ORIENTATION_ERROR, WORST_ANGLE, COLLISION, CLEARANCE_SHORTFALL, PATH_ERROR, PATH_ANGLE,
     JUMPS, CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION,
-    PEAK_CURRENT, MEAN_CURRENT, UNCOVERED_FRACTION, ANISOTROPY,
+    PEAK_CURRENT, MEAN_CURRENT, UNCOVERED_FRACTION, ANISOTROPY, DEFLECTION, PAYLOAD_DEFLECTION, BACKLASH_ERROR,
 )  # fmt: skip
 OBJECTIVES: Mapping[str, Objective] = {objective.name: objective for objective in _ALL}
 RENAMED = {
@@ -286,6 +312,14 @@ MANIPULABILITY = Objective(
     each=lambda e: e.manipulability,
     over="min",
 )
+PAYLOAD_CAPACITY = Objective(
+    name="payload_capacity",
+    unit="kg",
+    symbol="payload_capacity",
+    description="the largest payload that all actuators hold in the kept posture, with the safety factor",
+    each=compliance.payload_capacity,
+    over="min",
+)
 VOLTAGES = Objective(
     name="voltages",
     unit="voltages",
@@ -293,8 +327,9 @@ VOLTAGES = Objective(
     each=drives.voltages,
     over="arm",
 )
-# What constraints can bound. Of clearances and manipulability more is better, so they are no objectives.
-QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*CLEARANCES, MANIPULABILITY, VOLTAGES)}}
+# More of these is better, so constraints can bound them, but they are no objectives.
+BENEFITS = (*CLEARANCES, MANIPULABILITY, PAYLOAD_CAPACITY)
+QUANTITIES: Mapping[str, Objective] = {**OBJECTIVES, **{q.name: q for q in (*BENEFITS, VOLTAGES)}}
 
 # Quantities by what they depend on.
 ORIENTATION_QUANTITIES = (ORIENTATION_ERROR, WORST_ANGLE)
@@ -303,6 +338,7 @@ PATH_QUANTITIES = (*CLEARANCE_QUANTITIES, PEAK_TORQUE, TORQUE_UTILISATION)  # th
 TIMED_QUANTITIES = (
     CYCLE_TIME, DYNAMIC_TORQUE, DYNAMIC_UTILISATION, SPEED_UTILISATION, THERMAL_UTILISATION, PEAK_CURRENT, MEAN_CURRENT,
 )  # fmt: skip
+STIFFNESS_QUANTITIES = (DEFLECTION, PAYLOAD_DEFLECTION)
 MOTION_QUANTITIES = (*PATH_QUANTITIES, PATH_ERROR, PATH_ANGLE, JUMPS, *TIMED_QUANTITIES)
 
 

@@ -18,7 +18,8 @@ class KindDefaults:
         viscous: Viscous friction x ω / τ.
         corner: Corner speed / ω.
         backlash: Backlash [rad].
-        stiffness: Position gain / τ [1/rad].
+        joint_stiffness: Joint stiffness / τ [1/rad].
+        gain: Position gain / τ [1/rad].
         damping: Damping gain / position gain [s]; None for τ / ω, the back-EMF of a motor driven by a voltage.
         current: Supply current at the peak torque x V / (τ ω).
         continuous: Continuous torque / τ.
@@ -29,19 +30,20 @@ class KindDefaults:
     viscous: float
     corner: float
     backlash: float
-    stiffness: float
+    joint_stiffness: float
+    gain: float
     damping: float | None
     current: float
     continuous: float = 0.25
 
 
-_GEARED = KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 4.0, 0.05, 2.5)
+_GEARED = KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.1), 100.0, 4.0, 0.05, 2.5)
 DEFAULTS: Mapping[ActuatorKind, KindDefaults] = {
-    "servo": KindDefaults(0.047, 0.025, 0.09, 0.0, math.radians(0.5), 4.6, None, 1.6),
-    "coreless servo": KindDefaults(0.016, 0.025, 0.09, 0.0, math.radians(0.25), 4.6, None, 1.6),
+    "servo": KindDefaults(0.047, 0.025, 0.09, 0.0, math.radians(0.5), 40.0, 4.6, None, 1.6),
+    "coreless servo": KindDefaults(0.016, 0.025, 0.09, 0.0, math.radians(0.25), 40.0, 4.6, None, 1.6),
     "geared drive": _GEARED,
-    "quasi-direct-drive": KindDefaults(0.007, 0.02, 0.045, 0.3, math.radians(0.2), 1.6, 0.05, 1.0),
-    "harmonic": KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.005), 4.0, 0.05, 2.5),
+    "quasi-direct-drive": KindDefaults(0.007, 0.02, 0.045, 0.3, math.radians(0.2), 100.0, 1.6, 0.05, 1.0),
+    "harmonic": KindDefaults(0.017, 0.07, 0.25, 0.3, math.radians(0.005), 190.0, 4.0, 0.05, 2.5),
 }
 
 
@@ -58,11 +60,12 @@ def default_values(
         position_gain: Its position gain [N m/rad]; None for the default.
     """
     ratios = DEFAULTS[kind]
-    gain = ratios.stiffness * torque if position_gain is None else position_gain
+    gain = ratios.gain * torque if position_gain is None else position_gain
     values = {
         "rated_torque": ratios.continuous * torque,
         "coulomb_friction": ratios.coulomb * torque,
         "backlash": ratios.backlash,
+        "joint_stiffness": ratios.joint_stiffness * torque,
         "position_gain": gain,
     }
     if ratios.damping is not None:

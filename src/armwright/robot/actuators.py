@@ -23,8 +23,8 @@ ESTIMATE = "~"  # before the code of a source from which a value is estimated
 UNITS: Mapping[str, str] = {
     "voltage": "V", "mass": "kg", "stall_torque": "N m", "rated_torque": "N m", "peak_torque": "N m", "speed": "rad/s",
     "corner_speed": "rad/s", "gear_ratio": "", "rotor_inertia": "kg m²", "coulomb_friction": "N m",
-    "viscous_friction": "N m s/rad", "backlash": "rad", "position_gain": "N m/rad", "damping_gain": "N m s/rad",
-    "current": "A", "width": "m", "height": "m", "depth": "m", "price": "USD",
+    "viscous_friction": "N m s/rad", "backlash": "rad", "joint_stiffness": "N m/rad", "position_gain": "N m/rad",
+    "damping_gain": "N m s/rad", "current": "A", "width": "m", "height": "m", "depth": "m", "price": "USD",
 }  # fmt: skip
 
 
@@ -46,6 +46,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     coulomb_friction: float | None = Field(default=None, ge=0.0, le=1e6)  # [N m]
     viscous_friction: float | None = Field(default=None, ge=0.0, le=1e6)  # [N m s/rad]
     backlash: float | None = Field(default=None, ge=0.0)  # [rad]
+    joint_stiffness: float | None = Field(default=None, gt=0.0)  # of gear and output at rest [N m/rad]
     position_gain: float | None = Field(default=None, gt=0.0)  # of its position control [N m/rad]
     damping_gain: float | None = Field(default=None, ge=0.0)  # of its position control [N m s/rad]
     current: float | None = Field(default=None, gt=0.0)  # drawn from the supply at the peak torque [A]
@@ -117,6 +118,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             coulomb_friction=values.coulomb_friction,
             viscous_friction=values.viscous_friction,
             backlash=values.backlash,
+            joint_stiffness=values.joint_stiffness,
             position_gain=values.position_gain,
             damping_gain=values.damping_gain,
             voltage=self.voltage,

@@ -31,6 +31,7 @@ class Actuator:
         coulomb_friction: Friction at any speed [N m].
         viscous_friction: Friction that is proportional to the speed [N m s/rad].
         backlash: Backlash of its gear [rad].
+        joint_stiffness: Torsional stiffness from its motor to its output [N m/rad].
         position_gain: Gain of its position control [N m/rad].
         damping_gain: Damping of its position control [N m s/rad].
         voltage: Its supply voltage [V].
@@ -48,6 +49,7 @@ class Actuator:
     coulomb_friction: float | None = None
     viscous_friction: float | None = None
     backlash: float | None = None
+    joint_stiffness: float | None = None
     position_gain: float | None = None
     damping_gain: float | None = None
     voltage: float | None = None
@@ -55,8 +57,15 @@ class Actuator:
 
     def __post_init__(self) -> None:
         numbers = [value for value in astuple(self)[1:] if value is not None]
-        if not all(0.0 <= value < math.inf for value in numbers) or self.peak_torque == 0.0 or self.speed == 0.0:
-            raise ArmError(f"an actuator needs peak_torque > 0, speed > 0, and no value below 0, all finite: {self}")
+        if not all(0.0 <= value < math.inf for value in numbers) or 0.0 in (
+            self.peak_torque,
+            self.speed,
+            self.joint_stiffness,
+        ):
+            raise ArmError(
+                "an actuator needs peak_torque, speed and joint_stiffness > 0, and no value below 0, all finite: "
+                f"{self}"
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,9 @@
 A value is assumed if it is an estimate or the default of the actuator's kind (`ActuatorRecord.assumed`).
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 
+from armwright.problem.objectives import BACKLASH_ERROR, STIFFNESS_QUANTITIES
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import UNITS, ActuatorRecord, value_of
 from armwright.robot.arm import Arm
@@ -18,23 +19,28 @@ ALONG_CYCLE = (
 Assumed = Mapping[str, Mapping[str, float]]  # assumed values by actuator and name, in the units of UNITS
 
 
-def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None) -> Assumed:
+def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: Iterable[str] = ()) -> Assumed:
     """Return the assumed values that enter the results; actuators without any are left out.
 
     Args:
         problem: The problem.
         arms: Arms whose actuators count; None for all actuators of the space.
+        also: Names of values that enter besides those that objectives and constraints depend on.
     """
     records = problem.space.actuators
     if arms is not None:
         used = {joint.actuator.name for arm in arms for joint in arm.joints if joint.actuator is not None}
         records = [record for record in records if record.name in used]
-    found = {record.name: _values(problem, record) for record in records}
+    entering = {*(STATIC if problem.task.cycle is None else ALONG_CYCLE), *also}
+    if problem.uses(*STIFFNESS_QUANTITIES):
+        entering.add("joint_stiffness")
+    if problem.uses(BACKLASH_ERROR):
+        entering.add("backlash")
+    found = {record.name: _values(record, entering) for record in records}
     return {name: values for name, values in found.items() if values}
 
 
-def _values(problem: Problem, record: ActuatorRecord) -> Mapping[str, float]:
-    entering = STATIC if problem.task.cycle is None else ALONG_CYCLE
+def _values(record: ActuatorRecord, entering: Container[str]) -> Mapping[str, float]:
     completed = record.completed()
     values = {name: value_of(completed, name) for name in record.assumed if name in entering}
     return {name: value for name, value in values.items() if value is not None}

@@ -17,6 +17,7 @@ from armwright.robot.srdf import to_srdf
 from armwright.robot.urdf_writer import to_urdf
 from armwright.robot.xacro import to_xacro
 from armwright.runs.assumptions import assumed_values, describe_assumed
+from armwright.runs.compliance_notes import compliance_notes
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.selection import pick
@@ -26,6 +27,7 @@ from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
 from armwright.spaces.parameters import Design
 
 OPTUNA = "optuna"  # the format of a whole run (optuna_export.py)
+SHEET_VALUES = ("backlash", "joint_stiffness")  # of actuators, which a sheet depends on whatever the objectives
 
 
 def export_design(run: Path, number: int | None, kind: str) -> str:
@@ -65,7 +67,8 @@ def _sheet(history: History, member: FrontMember) -> str:
         notes.append(f"Target {target + 1} is missed by {unreached_reason(member.arm, evaluation, 0, int(target))}.")
     if supply := supply_of(evaluation, 0):
         notes.append(f"Along the cycle the actuators draw {supply.description}; standby current comes on top.")
-    if assumed := assumed_values(history.problem, [member.arm]):
+    notes += compliance_notes(member.arm, evaluation)
+    if assumed := assumed_values(history.problem, [member.arm], also=SHEET_VALUES):
         notes.append(f"Assumed values of actuators, defaults of their kind or estimates: {describe_assumed(assumed)}.")
     return sheet_markdown(_name(history, member), member.arm, _rows(history, member), notes)
 

@@ -1,13 +1,15 @@
 """Selection of designs of a front: by conditions, by one quantity, by weights, or the knee."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
+from armwright.problem.objective import Objective
+from armwright.problem.objectives import QUANTITIES
 from armwright.runs.folder import read_run
 from armwright.runs.history import FrontMember, History
 from armwright.runs.infeasibility import describe_infeasibility
@@ -84,7 +86,7 @@ def pick(
 
     Args:
         history: The trials.
-        where: Conditions.
+        where: Conditions. Quantities that the run did not evaluate are evaluated now, in the task's first case.
         by: The quantity to sort by, smallest first.
         weights: Weights of the objectives, which are divided by the reference point and summed.
         numbers: The trials to select from, such as the robust ones; None for all.
@@ -107,8 +109,12 @@ def pick(
     quantities = {member.number: numbers_of(history, member) for member in history.front}
     names = list(quantities[history.front[0].number]) if history.front else []
     objectives = [objective.name for objective in history.problem.objectives]
-    for name in [*(condition.name for condition in where), *([] if by is None else [by])]:
-        _check_name(name, names)
+    asked = [*(condition.name for condition in where), *([] if by is None else [by])]
+    for name in asked:
+        _check_name(name, names, QUANTITIES)
+    for name in {name for name in asked if name not in names}:
+        for number, value in _evaluated(history, QUANTITIES[name]).items():
+            quantities[number][name] = value
     for name in weights or {}:
         _check_name(name, objectives)
     left = [
@@ -146,9 +152,17 @@ def pick_from(
     return history, pick(history, where, by, weights, numbers)
 
 
-def _check_name(name: str, names: Sequence[str]) -> None:
-    if name not in names:
-        raise SettingsError(f'unknown quantity "{name}".{did_you_mean(name, names)} Available: {", ".join(names)}')
+def _evaluated(history: History, quantity: Objective) -> dict[int, float]:
+    """Return a quantity of the designs of the front by number, in the task's first case; SettingsError if unknown."""
+    numbers = [member.number for member in history.front]
+    return dict(zip(numbers, quantity(history.evaluation(numbers)).tolist(), strict=True)) if numbers else {}
+
+
+def _check_name(name: str, names: Sequence[str], others: Iterable[str] = ()) -> None:
+    """Raise SettingsError if a name is not among names or others; the message lists the names."""
+    known = [*names, *others]
+    if name not in known:
+        raise SettingsError(f'unknown quantity "{name}".{did_you_mean(name, known)} Available: {", ".join(names)}')
 
 
 def _describe_unmet(where: Sequence[Condition], quantities: Sequence[Mapping[str, float]]) -> str:

@@ -192,7 +192,7 @@ class _Motors:
     """Actuators of the modules of N designs."""
 
     mass: Array  # (N, M) of all actuators of a module [kg]
-    ratings: Array  # (N, M, K, 9) of each joint's
+    ratings: Array  # (N, M, K, R) of each joint's
     price: Array  # (N,) of an arm [USD]
 
 
@@ -255,7 +255,7 @@ def _carried(space: DesignSpace, columns: _Columns, joints: _Joints, motors: _Mo
 
 @cache
 def _catalogue(space: DesignSpace) -> tuple[Array, Array, Array]:
-    """Return mass [kg], price [USD] and (A, 9) ratings of the A actuators of a space."""
+    """Return mass [kg], price [USD] and (A, R) ratings of the A actuators of a space."""
     actuators = space.arm_actuators
     return (
         np.array([actuator.mass for actuator in actuators]),

@@ -19,6 +19,7 @@ from armwright.robot.arm import Actuator
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import MODULES, JointType
 from armwright.spaces.parameters import CategoricalParameter, FloatParameter, Parameter
+from armwright.tasks.moments import MAX_MASS
 
 ROUNDING = 1e-5  # relative, of quantities in single precision
 COUNTED = ("joints", "targets", "voltages")  # units that their quantity names already
@@ -156,6 +157,7 @@ def _intervals_of_task(problem: Problem) -> Mapping[str, Interval]:
     intervals = dict.fromkeys(OBJECTIVES, Interval(0.0))
     n = float(len(problem.task.targets))
     intervals |= {"unreached_targets": Interval(0.0, n), "jumps": Interval(0.0, n), "manipulability": Interval(0.0)}
+    intervals["payload_capacity"] = Interval(0.0, MAX_MASS)
     intervals |= dict.fromkeys(("uncovered_fraction", "anisotropy"), Interval(0.0, 1.0))
     intervals |= {quantity.name: Interval(-math.inf, FAR) for quantity in CLEARANCES}
     voltages = {actuator.voltage for actuator in problem.space.arm_actuators}

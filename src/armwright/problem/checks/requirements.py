@@ -2,6 +2,7 @@
 
 from armwright.exceptions import SettingsError
 from armwright.kinematics.cycle_loads import check_durations
+from armwright.problem.compliance_quantities import require_sections
 from armwright.problem.drive_quantities import RATINGS, require_ratings
 from armwright.problem.evaluation import NO_CYCLE, NO_WORKSPACE
 from armwright.problem.objectives import (
@@ -9,6 +10,7 @@ from armwright.problem.objectives import (
     PATH_ANGLE,
     PATH_ERROR,
     QUANTITIES,
+    STIFFNESS_QUANTITIES,
     TIMED_QUANTITIES,
     UNCOVERED_FRACTION,
 )
@@ -18,13 +20,16 @@ N_SAMPLES = 64  # designs whose motors are looked at
 
 
 def check_requirements(problem: Problem) -> None:
-    """Raise SettingsError if a quantity needs actuators, a cycle or a workspace that the problem lacks."""
+    """Raise SettingsError if a quantity needs actuators, sections, a cycle or a workspace that the problem lacks."""
     quantities = [*problem.objectives, *(constraint.quantity for constraint in problem.constraints)]
-    actuation = problem.arms(problem.space.matrix(problem.space.sample(N_SAMPLES, seed=0))).actuation
+    arms = problem.arms(problem.space.matrix(problem.space.sample(N_SAMPLES, seed=0)))
+    actuation = arms.actuation
     plan = problem.scenes[0].plan
     for quantity in quantities:
         if quantity.name in RATINGS and quantity is QUANTITIES[quantity.name]:
             require_ratings(actuation, quantity.name)
+        if quantity in STIFFNESS_QUANTITIES:
+            require_sections(arms, quantity.name)
         if quantity in (JUMPS, PATH_ANGLE, PATH_ERROR, *TIMED_QUANTITIES) and plan is None:
             raise SettingsError(NO_CYCLE)
         if quantity in TIMED_QUANTITIES and plan is not None:

@@ -1,0 +1,185 @@
+"""Deflection, backlash error and payload capacity as objectives, constraints and requirements."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armwright.exceptions import SettingsError
+from armwright.kinematics.arm_arrays import stack_arms
+from armwright.kinematics.compliance import Stiffness, backlash_errors
+from armwright.kinematics.forward import forward_kinematics
+from armwright.problem.checks.requirements import check_requirements
+from armwright.problem.estimates import lower_bounds
+from armwright.problem.evaluation import evaluate
+from armwright.problem.objectives import BACKLASH_ERROR, DEFLECTION, PAYLOAD_CAPACITY, PAYLOAD_DEFLECTION
+from armwright.problem.problem import Problem
+from armwright.robot.actuators import named_actuator
+from armwright.robot.arm import Arm
+from armwright.spaces.design_space import DesignSpace, paper_space
+from armwright.tasks.moments import MAX_MASS
+from armwright.tasks.task import Task
+from tests.support.arms import moving_arms
+from tests.support.frame_program import frame_displacement
+
+TARGETS = [[0.3, 0.2, 0.1], [-0.2, 0.4, 0.3]]
+PAYLOADS = (0.2, 0.6)  # [kg]
+MOTOR = named_actuator("XM540-W270").actuator()
+SPACE = DesignSpace.model_validate({"joints": 4, "actuators": ["XM540-W270", "XM430-W350"], "origin_z": [0.0, 0.0]})
+TUBES = DesignSpace.model_validate(
+    {
+        "joints": [2, 4],
+        "joint_types": ["R", "P", "Y", "S", "O", "F"],
+        "actuators": ["XM540-W270", "FHA-14C-100"],
+        "origin_z": [0.0, 0.0],
+        "link_section": {"tubes": [[0.020, 0.0015], [0.030, 0.002]], "per_link": True, "material": "aluminium"},
+    }
+)
+TASK = {"name": "shelf", "targets": TARGETS, "payload": 0.2}
+
+
+def built(arm: Arm) -> Arm:
+    """An arm with motors, and links of a known section."""
+    joints = tuple(replace(joint, actuator=MOTOR) for joint in arm.joints)
+    links = tuple(
+        replace(
+            link,
+            com=tuple(value / 2.0 for value in link.offset),
+            end_mass=0.2,
+            bending_stiffness=150.0,
+            torsional_stiffness=90.0,
+        )
+        for link in arm.links
+    )
+    return replace(arm, joints=joints, links=links)
+
+
+def problem(**changes: object) -> Problem:
+    return Problem(Task.model_validate(TASK | changes), SPACE)
+
+
+def test_deflection_is_that_of_the_worst_target() -> None:
+    """By PyNite in the postures of the evaluation."""
+    arms = [built(arm) for arm in moving_arms(3, 5, 4)]
+    evaluation = evaluate(arms, TARGETS, payload=PAYLOADS)
+    for i, arm in enumerate(arms):
+        stacked = stack_arms([arm], "float64")
+        stiffness = Stiffness(
+            stacked.bending_stiffness, stacked.torsional_stiffness, np.full((1, 5), MOTOR.joint_stiffness)
+        )
+        found = [
+            frame_displacement(arm, evaluation.q[i, t], stiffness, payload, np.zeros(3))
+            for t, payload in enumerate(PAYLOADS)
+        ]
+        bare = [frame_displacement(arm, evaluation.q[i, t], stiffness, 0.0, np.zeros(3)) for t in range(2)]
+        assert DEFLECTION(evaluation)[i] == pytest.approx(np.linalg.norm(found, axis=1).max(), rel=1e-3)
+        by_payload = np.linalg.norm(np.subtract(found, bare), axis=1).max()
+        assert PAYLOAD_DEFLECTION(evaluation)[i] == pytest.approx(by_payload, rel=1e-3)
+
+
+def test_payload_deflection_is_proportional_to_the_payload() -> None:
+    arms = [built(arm) for arm in moving_arms(5, 4, 5)]
+    none, one, two = (PAYLOAD_DEFLECTION(evaluate(arms, TARGETS, payload=payload)) for payload in (0.0, 0.4, 0.8))
+    assert not none.any()
+    assert two == pytest.approx(2.0 * one)
+
+
+def test_designs_of_a_batch_yield_like_single_arms_to_the_bit() -> None:
+    bounds = ["payload_deflection <= 0.001", "payload_capacity >= 0.5"]
+    task = Task.model_validate(TASK | {"objectives": ["deflection", "backlash_error"], "constraints": bounds})
+    tubes = Problem(task, TUBES)
+    designs = TUBES.sample(60, 5)
+    outcomes = tubes.evaluate(designs)
+    assert len({design.params[f"tube_{j}"] for design in designs for j in (1, 2)}) == 2
+    for i, design in enumerate(designs):
+        evaluation = evaluate([tubes.arm(design)], TARGETS, payload=0.2)
+        assert outcomes.values[i].tolist() == [DEFLECTION(evaluation)[0], BACKLASH_ERROR(evaluation)[0]]
+        assert outcomes.violations[i].tolist() == [constraint(evaluation)[0] for constraint in tubes.constraints]
+
+
+def test_arms_of_thicker_tubes_yield_less_under_the_payload() -> None:
+    thin, thick = (
+        TUBES.model_copy(update={"link_section": TUBES.link_section.model_copy(update={"tubes": (tube,)})})
+        for tube in TUBES.link_section.tubes
+    )
+    designs = thin.sample(40, 6)
+    task = Task.model_validate(TASK)
+    one, other = (PAYLOAD_DEFLECTION(Problem(task, space).physics(designs)) for space in (thin, thick))
+    assert (other <= one * (1.0 + 1e-9)).all()
+    assert (other < 0.99 * one).mean() > 0.8  # in some postures only joints yield
+
+
+def test_bounds_of_screening_hold_for_deflection() -> None:
+    bounds = ["payload_deflection <= 0.001", "payload_capacity >= 0.5"]
+    task = Task.model_validate(TASK | {"objectives": ["deflection", "mass"], "constraints": bounds})
+    tubes = Problem(task, TUBES)
+    matrix = TUBES.matrix(TUBES.sample(60, 7))
+    found, outcomes = lower_bounds(tubes, matrix), tubes.evaluate_matrix(matrix)
+    assert (found.values <= outcomes.values).all()
+    assert (found.violations <= outcomes.violations).all()
+
+
+def test_backlash_error_reads_the_backlash_of_the_actuators() -> None:
+    designs = SPACE.sample(20, 0)
+    evaluation = problem().physics(designs)
+    for i, design in enumerate(designs):
+        arm = SPACE.arm(design)
+        backlash = np.array([[joint.actuator.backlash if joint.kind == "revolute" else 0.0 for joint in arm.joints]])
+        arms = stack_arms([arm])
+        frames = forward_kinematics(arms, evaluation.q[i : i + 1])
+        assert BACKLASH_ERROR.each(evaluation)[i] == pytest.approx(backlash_errors(arms, frames, backlash)[0])
+
+
+def test_slides_play_by_their_travel_and_yield_by_its_square() -> None:
+    space = SPACE.model_copy(update={"joint_types": ("S",), "travel": 0.02, "actuators": SPACE.actuators[:1]})
+    actuation = Problem(Task.model_validate(TASK), space).physics(space.sample(3, 0)).arms.actuation
+    assert actuation is not None
+    assert actuation.backlash == pytest.approx(0.02 * MOTOR.backlash)
+    assert actuation.joint_stiffness == pytest.approx(MOTOR.joint_stiffness / 0.02**2)
+
+
+def test_quantities_bound_designs_as_objectives_and_constraints() -> None:
+    bounded = problem(objectives=["backlash_error", "mass"], constraints=["payload_capacity >= 0.5"])
+    designs = SPACE.sample(40, 1)
+    outcomes, evaluation = bounded.evaluate(designs), bounded.physics(designs)
+    assert np.array_equal(outcomes.values[:, 0], BACKLASH_ERROR(evaluation))
+    assert outcomes.violations[:, 0] == pytest.approx((0.5 - PAYLOAD_CAPACITY(evaluation)) / 0.5)
+    assert 0 < (outcomes.violations[:, 0] <= 0.0).sum() < 40
+
+
+def test_worst_copy_counts_for_robust_designs() -> None:
+    exact = problem(objectives=["backlash_error"], constraints=["payload_capacity >= 0.5"])
+    robust = replace(exact, tolerance=1e-3)
+    designs = SPACE.sample(10, 1)
+    one, other = exact.evaluate(designs), robust.evaluate(designs)
+    assert (other.values >= one.values).all()
+    assert (other.violations >= one.violations).all()
+    assert (other.values > one.values).any()
+
+
+def test_targets_without_the_payload_of_a_cycle_do_not_limit_it() -> None:
+    places = {"above": [0.5, 0.3, 0.1], "near": [0.2, 0.1, 0.1], "beside": [0.2, -0.1, 0.1]}
+    steps = [{"to": "above"}, {"to": "near", "do": "pick"}, {"to": "beside", "do": "place"}]
+    targets = [{"position": position, "name": name} for name, position in places.items()]
+    task = problem(targets=targets, cycle={"steps": steps, "time": 2.0})
+    limits = PAYLOAD_CAPACITY.each(task.physics(SPACE.sample(20, 2)))
+    assert (limits[:, 0] == MAX_MASS).all()
+    assert (limits[:, 1:] < MAX_MASS).any()
+
+
+@pytest.mark.parametrize("quantity", ["deflection", "payload_deflection"])
+def test_deflection_reports_missing_sections(quantity: str) -> None:
+    unknown = problem(objectives=["mass"], constraints=[f"{quantity} <= 0.001"])
+    message = f"{quantity} needs the section and the material of the links; try link_section: "
+    with pytest.raises(SettingsError, match=message):
+        unknown.evaluate(SPACE.sample(1, 0))
+    with pytest.raises(SettingsError, match=message):
+        check_requirements(unknown)
+
+
+@pytest.mark.parametrize("quantity", ["deflection", "payload_deflection", "backlash_error", "payload_capacity"])
+def test_quantities_report_missing_actuators(quantity: str) -> None:
+    relation = ">=" if quantity == "payload_capacity" else "<="
+    task = Task.model_validate(TASK | {"constraints": [f"{quantity} {relation} 0.1"]})
+    with pytest.raises(SettingsError, match=f"objective {quantity} needs actuators"):
+        check_requirements(Problem(task, paper_space()))
