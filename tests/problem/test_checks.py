@@ -26,12 +26,13 @@ TABLE = {"kind": "ground", "name": "table"}
 MOTORS = ["XL430-W250", "XM430-W350", "XM540-W270"]
 SPACES = {
     "paper": {},
-    "motors": {"joints": [2, 5], "joint_types": ["R", "O", "S", "F"], "actuators": MOTORS, "stroke": [0.1, 0.4]},
+    "motors": {"joints": [2, 5], "joint_types": ["R", "O", "S", "F"], "actuators": MOTORS, "stroke": [0.1, 0.4],
+               "bracket_mass": 0.05},
     "restricted": {"joints": 3, "restrict": {"link_1": [0.1, 0.2], "joint_2": ["O"], "motor_3": ["XL430-W250"]},
                    "joint_types": ["R", "O", "X"], "actuators": MOTORS,
                    "link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"}},
     "slides": {"joints": [1, 4], "joint_types": ["X", "T", "S"], "stroke": 0.5, "grid": {"link": 0.02},
-               "mass": {"kind": "per_link", "kg": 0.3}},
+               "bracket_mass": 0.2, "mass": {"kind": "per_link", "kg": 0.3}},
     "tubes": {"joints": [1, 4], "joint_types": ["R", "O", "S"], "stroke": [0.1, 0.4], "actuators": MOTORS,
               "restrict": {"tube_1": "30x2"},
               "link_section": {"tubes": [[0.03, 0.002], [0.02, 0.001]],

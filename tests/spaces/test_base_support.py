@@ -8,6 +8,7 @@ import pytest
 
 from armwright.exceptions import SpaceError
 from armwright.kinematics.arm_arrays import stack_arms
+from armwright.kinematics.clearance import clearances
 from armwright.problem.checks.bounds import intervals_by_modules
 from armwright.problem.objectives import MASS, PRICE
 from armwright.problem.problem import Problem
@@ -47,6 +48,19 @@ def test_column_counts_in_mass_and_price(obstacles: tuple[dict[str, Any], ...], 
     kg = 7850 * math.pi * (0.025**2 - 0.023**2)
     added = np.column_stack([kg * lengths, 20.0 * lengths])
     assert values(with_column, designs) == pytest.approx(values(without, designs) + added, rel=1e-6)
+
+
+def test_motor_body_is_between_face_and_base() -> None:
+    """The shaft of an XL430-W250, of 28.5 x 46.5 mm, is 14.25 mm from one end of its body, 32.25 mm from the other."""
+    keys = {"base_on": "table", "motor_bodies": True, "joint_types": ["P"], "link": [0.1, 0.2]}
+    of = problem(space(**keys), TABLE).space
+    assert of.origin_z == pytest.approx((0.7, 0.73225))
+    checked = problem(space(**keys, origin_x=[0.2, 0.2], origin_y=[0.0, 0.0]), TABLE)
+    designs = [checked.space.clipped((0.2, 0.0, z), "PP", (0.15, 0.15)) for z in (0.7, 0.72, 0.73225)]
+    arms = checked.arms(checked.space.matrix(designs))
+    clear = clearances(arms, np.zeros((3, 1, 2)), checked.task.obstacles)[1][:, 0]
+    assert clear[:2] == pytest.approx([-0.03225, -0.01225], abs=1e-5)
+    assert clear[2] > -1e-6
 
 
 def test_default_column_is_an_aluminium_tube_without_a_price() -> None:

@@ -13,9 +13,10 @@ from armwright.cli.streams import format_point, plain_table
 from armwright.experiments.baselines import Baseline, baselines, baselines_of
 from armwright.llm.draft import Draft
 from armwright.problem.checks.reach import distance_to_bases
-from armwright.problem.constraints import cycle_constraints
+from armwright.problem.constraints import implied_constraints
 from armwright.problem.problem import Problem
 from armwright.robot.actuators import UNITS, ActuatorRecord, catalogue_sources, value_of
+from armwright.robot.motor_body import ActuatorShape
 from armwright.tasks.payload import Payload
 from armwright.tasks.targets import AXIS, TargetArrays, describe_targets
 from armwright.tasks.task import Task as DesignTask
@@ -76,6 +77,15 @@ def show_actuator(console: Console, record: ActuatorRecord) -> None:
             shown = f"assumed: estimate from {shown}" if found else f"assumed: default of a {record.kind}"
         table.add_row(name, f"{value:.4g}", unit, Text(shown))
     console.print(table)
+    if record.body_shape is not None:
+        console.print(Text(f"body: {_describe_body(record, record.body_shape)}"))
+
+
+def _describe_body(record: ActuatorRecord, body: ActuatorShape) -> str:
+    across = f"{1e3 * body.long:g} mm" if body.shape == "cylinder" else f"{1e3 * body.long:g} x {1e3 * body.short:g} mm"
+    assumed = [name for name in ("shape", "shaft_edge") if getattr(record, name) is None]
+    note = f"; assumed: {', '.join(assumed)}" if assumed else ""
+    return f"a {body.shape}, {1e3 * body.length:g} mm along its shaft, {across} across{note}"
 
 
 def show_task(
@@ -84,6 +94,7 @@ def show_task(
     best_known: float | None = None,
     stored: Sequence[Baseline] = (),
     has_drives: bool = False,
+    has_motor_bodies: bool = False,
     is_brief: bool = False,
 ) -> None:
     """Print a task.
@@ -94,6 +105,7 @@ def show_task(
         best_known: Its best known hypervolume, if any.
         stored: Its baselines.
         has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
+        has_motor_bodies: Whether the bodies of the actuators count, which may not collide.
         is_brief: Leave out the targets and the steps of the cycle.
     """
     reference = task.reference_point
@@ -114,7 +126,10 @@ def show_task(
         *(("obstacle", obstacle.describe()) for obstacle in task.obstacles),
         ("cycle", "" if is_brief else task.cycle_description),
         ("durations", task.cycle.describe_times() if task.cycle and not is_brief else ""),
-        ("constraints of the cycle", ", ".join(cycle_constraints(task, has_drives))),
+        (
+            "constraints of the cycle" if task.cycle else "constraints of the motor bodies",
+            ", ".join(implied_constraints(task, has_drives, has_motor_bodies)),
+        ),
         *(("workspace", region.describe()) for region in task.workspace),
         ("reference point", "found by the search" if reference is None else format_point(reference)),
         ("provenance", task.provenance),

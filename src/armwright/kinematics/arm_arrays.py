@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.kinematics.actuation import Actuation, actuation_of
+from armwright.kinematics.motor_bodies import MotorBodies, stack_bodies
 from armwright.kinematics.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
 from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
 from armwright.tasks.payload import POINT_LOAD, LoadShape
@@ -58,6 +59,7 @@ class ArmArrays(PerArm):
     structure_price: Array  # (N,) of all links and of the column [USD]
     bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
+    motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
 
     def __len__(self) -> int:
         return len(self.base)
@@ -162,6 +164,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         structure_price=np.array([arm.structure_price for arm in arms]),
         bodies=bodies,
         actuation=actuation_of(arms, travel),
+        motor_bodies=stack_bodies(arms, dof, precision),
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, load_clearance
+from armwright.kinematics.devices import Device, load_clearance, load_motor_clearance
 from armwright.tasks.obstacles import SHAPES, Obstacle
 
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
@@ -22,9 +22,10 @@ def clearances(
 ) -> tuple[Array, Array]:
     """Compute the self-clearance and the obstacle clearance of arms in postures.
 
-    These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. They are
-    negative for overlaps, and infinite without obstacles or links to compare. The tool is ignored, since it is made to
-    touch.
+    These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. The bodies of
+    actuators count as well, if the arms have them: from each other, from links that they do not join, and from
+    obstacles. Clearances are negative for overlaps, and infinite without obstacles or links to compare. The tool is
+    ignored, since it is made to touch.
 
     Args:
         arms: N arms of up to D joints.
@@ -71,6 +72,17 @@ def _distances(
     wp.launch(kernels.self_clearance, dim, inputs=[motion, *links, self_clearance], device=device)
     if solids is not None:
         wp.launch(kernels.obstacle_clearance, dim, inputs=[*links, *solids, obstacle_clearance], device=device)
+    bodies = arms.motor_bodies
+    if bodies is not None:
+        _, motors = load_motor_clearance(arms.precision, device)
+        shape, axis = on_device(bodies.shape, wp.int32), on_device(bodies.axis, wp.int32)
+        half, centre = on_device(bodies.half, vector), on_device(bodies.centre, vector)
+        middle, into = wp.empty(q.shape, vector, device=device), wp.empty(q.shape, kernels.Matrix3, device=device)
+        wp.launch(motors.motor_frames, dim, inputs=[*posed, shape, axis, centre, middle, into], device=device)
+        placed = [motion, shape, half, middle, into]
+        wp.launch(motors.self_clearance, dim, inputs=[*placed, *links, self_clearance], device=device)
+        if solids is not None:
+            wp.launch(motors.obstacle_clearance, dim, inputs=[*placed, *solids, obstacle_clearance], device=device)
     return np.stack([self_clearance.numpy(), obstacle_clearance.numpy()])
 
 

@@ -83,6 +83,12 @@ def load_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
         return _warp(), _load_clearance(precision, device)
 
 
+def load_motor_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
+    """Return Warp and one variant of the kernels of clearance for the bodies of actuators."""
+    with _loading:
+        return _warp(), _load_motor_clearance(precision, device)
+
+
 def load_path(device: Device) -> tuple[Any, Any]:
     """Return Warp and the kernels along lines."""
     with _loading:
@@ -127,6 +133,16 @@ def _load_clearance(precision: Precision, device: Device) -> Any:
 
         kernels = clearance_kernels(precision)
         _load_modules((kernels.link_axes, kernels.self_clearance, kernels.obstacle_clearance), device)
+    return kernels
+
+
+@cache
+def _load_motor_clearance(precision: Precision, device: Device) -> Any:
+    with _report_cache_errors():
+        from armwright.kinematics.motor_kernels import motor_kernels
+
+        kernels = motor_kernels(precision)
+        _load_modules((kernels.motor_frames, kernels.self_clearance, kernels.obstacle_clearance), device)
     return kernels
 
 

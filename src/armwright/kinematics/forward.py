@@ -7,7 +7,10 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import PRISMATIC, ArmArrays, stack_arms
+from armwright.kinematics.motor_bodies import body_values
 from armwright.robot.arm import Arm
+from armwright.robot.axes import Axis
+from armwright.tasks.obstacles import Solid
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,27 @@ def rails(arm: Arm, q: Sequence[float] | Array) -> list[Array]:
         for joint, value, position, axis in joints
         if joint.kind == "prismatic"
     ]
+
+
+def motor_solids(arm: Arm, q: Sequence[float] | Array) -> list[tuple[Axis, Solid]]:
+    """Return axis and solid of the motor body of each joint that has one; q: (J,) [rad] or [m]."""
+    frames = _frames(arm, q)
+    rotations = [np.eye(3), *frames.rotation[0, 0]]  # of the base and the links
+    found: list[tuple[Axis, Solid]] = []
+    for joint, start, rotation in zip(arm.joints, _link_ends(arm, frames), rotations[:-1], strict=True):
+        if joint.body is not None:
+            _, axis, half, centre = body_values(joint.body)
+            x, y, z = (start + rotation @ np.array(centre)).tolist()
+            columns = rotation[:, [(axis + 1) % 3, (axis + 2) % 3, axis]]
+            found.append((joint.axis, Solid(joint.body.shape, (x, y, z), columns, half)))
+    return found
+
+
+def _link_ends(arm: Arm, frames: Frames) -> Array:
+    """Return the (J, 3) positions of the base and of the ends of all links but the last [m]."""
+    offsets = np.array([link.offset for link in arm.links])
+    ends = frames.position[0, 0] + (frames.rotation[0, 0] @ offsets[..., None])[..., 0]
+    return np.vstack([arm.base, ends[:-1]])
 
 
 def _frames(arm: Arm, q: Sequence[float] | Array) -> Frames:

@@ -14,6 +14,7 @@ from armwright.exceptions import TaskError, did_you_mean
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import CLEARANCES, QUANTITIES, RENAMED
+from armwright.tasks.cycle import Cycle
 from armwright.tasks.task import Task
 
 Relation = Literal["<=", ">="]
@@ -73,27 +74,31 @@ def read_constraints(texts: Sequence[str]) -> tuple[Constraint, ...]:
     return constraints
 
 
-def cycle_constraints(task: Task, has_actuators: bool) -> tuple[str, ...]:
-    """Return the constraints that a cycle implies, except for quantities that the task bounds itself.
+def implied_constraints(task: Task, has_actuators: bool, has_motor_bodies: bool) -> tuple[str, ...]:
+    """Return the constraints that a cycle and motor bodies imply, except for quantities that the task bounds itself.
 
     Args:
         task: The task.
         has_actuators: Whether the torques and speeds of the joints are limited.
+        has_motor_bodies: Whether the bodies of the actuators count.
     """
-    if task.cycle is None:
-        return ()
-    tolerance = task.cycle.tolerance
-    implied = {
+    implied = _cycle_bounds(task.cycle, task.target_arrays.oriented, has_actuators) if task.cycle else {}
+    implied |= {"collision": 0.0} if has_motor_bodies else {}
+    own = {constraint.quantity.name for constraint in read_constraints(task.constraints)}
+    own |= {"collision"} if own & {quantity.name for quantity in CLEARANCES} else set()
+    return tuple(f"{name} <= {bound:.12g}" for name, bound in implied.items() if name not in own)
+
+
+def _cycle_bounds(cycle: Cycle, oriented: bool, has_actuators: bool) -> dict[str, float]:
+    tolerance = cycle.tolerance
+    return {
         "unreached_targets": 0.0,
         "path_error": tolerance.path,
-        **({"path_angle": tolerance.angle} if task.target_arrays.oriented else {}),
+        **({"path_angle": tolerance.angle} if oriented else {}),
         "jumps": 0.0,
         "collision": 0.0,
         **(dict.fromkeys(DRIVE_QUANTITIES, 1.0) if has_actuators else {}),
     }
-    own = {constraint.quantity.name for constraint in read_constraints(task.constraints)}
-    own |= {"collision"} if own & {quantity.name for quantity in CLEARANCES} else set()
-    return tuple(f"{name} <= {bound:.12g}" for name, bound in implied.items() if name not in own)
 
 
 def _read(text: str) -> Constraint:

@@ -12,7 +12,7 @@ from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
-from armwright.problem.constraints import Constraint, cycle_constraints, read_constraints
+from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
 from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
 from armwright.problem.evaluators import Evaluator
 from armwright.problem.objective import Objective
@@ -106,7 +106,7 @@ class Problem:
         objectives: what is minimised; by default the task's, else the paper's, with the orientation error if a
             target states an orientation.
         evaluator: a custom function that measures objectives, such as a simulation.
-        constraints: the task's and those that its cycle implies, parsed.
+        constraints: the task's and those that its cycle and motor bodies imply, parsed.
 
     Examples:
         >>> import armwright as aw
@@ -135,7 +135,8 @@ class Problem:
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
         object.__setattr__(self, "space", supported_space(self.space, self.task.obstacles))
-        texts = (*self.task.constraints, *cycle_constraints(self.task, self.has_drives))
+        implied = implied_constraints(self.task, self.has_drives, self.space.motor_bodies)
+        texts = (*self.task.constraints, *implied)
         object.__setattr__(self, "constraints", read_constraints(texts))
         if not self.objectives:
             object.__setattr__(self, "objectives", self._default_objectives())

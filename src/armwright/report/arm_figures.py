@@ -12,11 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from armwright.kinematics.forward import forward_kinematics, joint_positions, link_lines, rails
+from armwright.kinematics.forward import forward_kinematics, joint_positions, link_lines, motor_solids, rails
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import TORQUE
 from armwright.report.drawing import legend_mark
-from armwright.report.solids import draw_obstacles
+from armwright.report.solids import draw_obstacles, draw_solid
 from armwright.report.style import FRONT, JOINT, JOINT_LABEL, LINK, MISSED, OBSTACLE, TARGET, look
 from armwright.runs.history import FrontMember, History
 from armwright.tasks.obstacles import Ground
@@ -99,6 +99,8 @@ def _draw_panel(
             axes.plot(*line.T, color=FRONT, linewidth=1.0, alpha=alpha)
         for line in link_lines(arm, q):
             axes.plot(*line.T, color=LINK, linewidth=2.6, alpha=alpha, solid_capstyle="round")
+        for axis, body in motor_solids(arm, q):
+            draw_solid(axes, body, extent, JOINT[axis])
         for joint, place in zip(arm.joints, places[:-1], strict=True):
             axes.plot(*place[:, None], marker="o", markersize=5, color=JOINT[joint.axis], alpha=alpha)
         goal = evaluation.targets[target]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armwright.experiments.compare_arms import dominance_counts, read_existing_arms
 from armwright.experiments.run_summary import describe_method
+from armwright.kinematics.motor_bodies import NO_BODY, MotorBodies
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pareto import hypervolume
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
@@ -34,6 +35,7 @@ from armwright.runs.selection import bounded_numbers, numbers_of
 from armwright.runs.trials_file import TrialsReader
 from armwright.spaces.joint_modules import DIRECTIONS, mounted_vector
 from armwright.spaces.parameters import FloatParameter
+from armwright.tasks.obstacles import SHAPES
 from armwright.tasks.task import Task
 
 KINDS = ("revolute", "prismatic", "fixed")
@@ -196,6 +198,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         "mass": evaluation.arms.mass,
         "payload_center": evaluation.arms.payload_center,
         **_arm_arrays(arms, evaluation.arms.dof),
+        **_body_arrays(evaluation.arms.motor_bodies),
     }
 
 
@@ -219,6 +222,14 @@ def _arm_arrays(arms: Sequence[Arm], room: int) -> Arrays:
         "offset": floats([[link.offset for link in row] for row in links]),
         "radius": floats([[link.radius for link in row] for row in links]),
     }
+
+
+def _body_arrays(bodies: MotorBodies | None) -> Arrays:
+    """Return the motor bodies joint by joint; nothing if they do not count."""
+    if bodies is None:
+        return {}
+    shape = np.where(bodies.shape == NO_BODY, len(SHAPES), bodies.shape).astype(np.uint8)
+    return {"body_shape": shape, "body_half": bodies.half, "body_centre": bodies.centre}
 
 
 def _joined(chunks: Sequence[Arrays]) -> dict[str, NDArray[Any]]:

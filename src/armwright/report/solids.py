@@ -1,4 +1,4 @@
-"""Obstacles in figures: translucent faces, clipped to the drawing."""
+"""Obstacles and motor bodies in figures: translucent faces, clipped to the drawing."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -11,23 +11,28 @@ from armwright.report.style import OBSTACLE
 from armwright.tasks.obstacles import Obstacle, Solid
 
 EDGE = 0.5  # [pt]
+OPACITY = 0.18
 AROUND, UPWARDS = 32, 12  # faces of round shapes
 
 
 def draw_obstacles(axes: Any, obstacles: Sequence[Obstacle], extent: tuple[Array, float]) -> None:
     """Draw the parts of obstacles within a cube, given by its centre and half its side [m]."""
-    middle, half = extent
     for obstacle in obstacles:
-        solid = obstacle.solid
-        faces = [(clipped(face, middle, half), line) for face, line in _faces(solid, middle, half)]
-        shown = [(face, line) for face, line in faces if len(face) > 2]
-        if shown:
-            faces_, lines = zip(*shown, strict=True)
-            # Matplotlib pads shorter faces with uninitialised memory, which may overflow when projected.
-            most = max(map(len, faces_))
-            corners = [np.vstack([face, np.repeat(face[-1:], most - len(face), axis=0)]) for face in faces_]
-            drawn = Poly3DCollection(corners, facecolor=OBSTACLE, edgecolor=OBSTACLE, alpha=0.18, linewidth=lines)
-            axes.add_collection3d(drawn, autolim=False)
+        draw_solid(axes, obstacle.solid, extent, OBSTACLE)
+
+
+def draw_solid(axes: Any, solid: Solid, extent: tuple[Array, float], colour: str) -> None:
+    """Draw the part of a solid within a cube, given by its centre and half its side [m]."""
+    middle, half = extent
+    faces = [(clipped(face, middle, half), line) for face, line in _faces(solid, middle, half)]
+    shown = [(face, line) for face, line in faces if len(face) > 2]
+    if shown:
+        faces_, lines = zip(*shown, strict=True)
+        # Matplotlib pads shorter faces with uninitialised memory, which may overflow when projected.
+        most = max(map(len, faces_))
+        corners = [np.vstack([face, np.repeat(face[-1:], most - len(face), axis=0)]) for face in faces_]
+        drawn = Poly3DCollection(corners, facecolor=colour, edgecolor=colour, alpha=OPACITY, linewidth=lines)
+        axes.add_collection3d(drawn, autolim=False)
 
 
 def clipped(face: Array, middle: Array, half: float) -> Array:

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from armwright.robot.motor_body import BodyShape
+
 ActuatorKind = Literal["servo", "coreless servo", "geared drive", "quasi-direct-drive", "harmonic"]
 
 
@@ -82,3 +84,22 @@ def default_values(
     if voltage is not None:
         values["current"] = ratios.current * torque * speed / voltage
     return values
+
+
+@dataclass(frozen=True)
+class DefaultShape:
+    """Shape of an actuator, and which of its edges is along its shaft."""
+
+    shape: BodyShape
+    shaft_edge: Literal["width", "height", "depth"]
+
+
+def default_shape(kind: ActuatorKind, width: float, height: float, depth: float) -> DefaultShape:
+    """Return the default shape of a kind with these edges [m].
+
+    Two equal edges are those of a square or round section about the shaft. Otherwise makers of servos state the depth
+    along it. Servos and geared drives are boxes, flat drives are cylinders.
+    """
+    round_kinds = ("quasi-direct-drive", "harmonic")
+    edge = "width" if height == depth != width else "height" if width == depth != height else "depth"
+    return DefaultShape("cylinder" if kind in round_kinds else "box", edge)

@@ -9,13 +9,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from pydantic import BaseModel, Field, model_validator
 
 from armwright.exceptions import SpaceError, did_you_mean
-from armwright.robot.actuator_defaults import ActuatorKind, default_values
+from armwright.robot.actuator_defaults import ActuatorKind, default_shape, default_values
 from armwright.robot.arm import Actuator
+from armwright.robot.motor_body import ActuatorShape, BodyShape
 
 CATALOGUE = "actuators.csv"
 SOURCES = "actuator_sources.csv"
@@ -24,8 +25,13 @@ UNITS: Mapping[str, str] = {
     "voltage": "V", "mass": "kg", "stall_torque": "N m", "rated_torque": "N m", "peak_torque": "N m", "speed": "rad/s",
     "corner_speed": "rad/s", "gear_ratio": "", "rotor_inertia": "kg m²", "coulomb_friction": "N m",
     "viscous_friction": "N m s/rad", "backlash": "rad", "joint_stiffness": "N m/rad", "position_gain": "N m/rad",
-    "damping_gain": "N m s/rad", "current": "A", "width": "m", "height": "m", "depth": "m", "price": "USD",
+    "damping_gain": "N m s/rad", "current": "A", "width": "m", "height": "m", "depth": "m",
+    "shaft_offset": "m", "price": "USD",
 }  # fmt: skip
+
+Edge = Literal["width", "height", "depth"]
+
+DIMENSIONS: tuple[Edge, ...] = ("width", "height", "depth")
 
 
 class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
@@ -53,6 +59,9 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
     width: float | None = Field(default=None, gt=0.0)  # [m]
     height: float | None = Field(default=None, gt=0.0)  # [m]
     depth: float | None = Field(default=None, gt=0.0)  # [m]
+    shape: BodyShape | None = None  # a cylinder is about its shaft
+    shaft_edge: Edge | None = None  # the edge along the shaft
+    shaft_offset: float | None = Field(default=None, ge=0.0)  # of the shaft from the middle, along the longer edge [m]
     price: float | None = Field(default=None, ge=0.0)  # [USD]
     estimates: tuple[str, ...] = ()  # the stated values that are estimated from a source, not stated by it
     source: str = Field(default="", max_length=500)
@@ -75,8 +84,31 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         defaults = self._defaults()
         return tuple(name for name in UNITS if name in self.estimates or name in defaults)
 
+    @property
+    def body_shape(self) -> ActuatorShape | None:
+        """The shape about its shaft; None if a dimension is missing."""
+        shape = self._default_body()
+        if shape is None or self.shaft_offset is None:
+            return shape
+        return replace(shape, shaft_offset=self.shaft_offset)
+
+    def _default_body(self) -> ActuatorShape | None:
+        """Return the shape with the default offset of its shaft: none from the axis of a cylinder.
+
+        The shaft of a box is as far from the near end as from the sides, as that of servos.
+        """
+        if self.width is None or self.height is None or self.depth is None:
+            return None
+        edges = {"width": self.width, "height": self.height, "depth": self.depth}
+        default = default_shape(self.kind, **edges)
+        length = edges.pop(self.shaft_edge or default.shaft_edge)
+        short, long = sorted(edges.values())
+        if (self.shape or default.shape) == "cylinder":
+            return ActuatorShape("cylinder", length, long, long)
+        return ActuatorShape("box", length, long, short, (long - short) / 2)
+
     def completed(self) -> "ActuatorRecord":
-        """Return the record with the defaults of its kind in place of missing values.
+        """Return the record with the defaults of its kind in place of missing numbers.
 
         Without a no-load speed or a voltage, the values that depend on it stay missing.
         """
@@ -101,6 +133,8 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
         values = default_values(self.kind, reference, self.speed, self.voltage, self.position_gain)
         if self.stall_torque is None:
             values["peak_torque"] = rated
+        if (body := self._default_body()) is not None:
+            values["shaft_offset"] = body.shaft_offset
         return {name: value for name, value in values.items() if getattr(self, name) is None}
 
     def actuator(self) -> Actuator:
@@ -123,6 +157,7 @@ class ActuatorRecord(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False
             damping_gain=values.damping_gain,
             voltage=self.voltage,
             current=values.current,
+            shape=self.body_shape,
         )
 
 

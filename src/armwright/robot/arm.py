@@ -1,16 +1,15 @@
 """The physical arm: a base position, then alternating joints and links."""
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 from armwright.exceptions import ArmError
+from armwright.robot.axes import AXES, Axis, Vector
+from armwright.robot.motor_body import ActuatorShape, MotorBody
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
-Axis = Literal["x", "y", "z"]
-Vector = tuple[float, float, float]
 
-AXES: tuple[Axis, ...] = ("x", "y", "z")
 GRAVITY = 9.81  # [m/s²] along -z
 UNIT = 1e-6  # tolerance on the length of a unit vector
 
@@ -36,6 +35,7 @@ class Actuator:
         damping_gain: Damping of its position control [N m s/rad].
         voltage: Its supply voltage [V].
         current: Supply current at the peak torque [A].
+        shape: Its shape.
     """
 
     name: str
@@ -54,9 +54,11 @@ class Actuator:
     damping_gain: float | None = None
     voltage: float | None = None
     current: float | None = None
+    shape: ActuatorShape | None = None
 
     def __post_init__(self) -> None:
-        numbers = [value for value in astuple(self)[1:] if value is not None]
+        values = (getattr(self, field.name) for field in fields(self) if field.name not in ("name", "shape"))
+        numbers = [value for value in values if value is not None]
         if not all(0.0 <= value < math.inf for value in numbers) or 0.0 in (
             self.peak_torque,
             self.speed,
@@ -79,6 +81,7 @@ class Joint:
         upper: The upper limit [rad] or [m].
         actuator: Its actuator; None if not chosen.
         travel: Travel of a prismatic joint per radian of its actuator [m/rad]; 1 for other joints.
+        body: The body of its actuator, if it counts.
     """
 
     kind: JointKind
@@ -87,12 +90,17 @@ class Joint:
     upper: float = 0.0
     actuator: Actuator | None = None
     travel: float = 1.0
+    body: MotorBody | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(JointKind):
             raise ArmError(f'joint kind "{self.kind}" is not one of {", ".join(get_args(JointKind))}')
         if self.axis not in AXES:
             raise ArmError(f'joint axis "{self.axis}" is not one of {", ".join(AXES)}')
+        if self.kind == "fixed" and self.body is not None:
+            raise ArmError("a fixed joint has no actuator, so no body of one")
+        if self.body is not None and self.body.axis != self.axis:
+            raise ArmError(f"motor body: expected its shaft along the joint's axis {self.axis}, got {self.body.axis}")
         unit = "m" if self.kind == "prismatic" else "rad"
         if not (math.isfinite(self.lower) and math.isfinite(self.upper)):
             raise ArmError(f"joint limits must be finite: [{self.lower}, {self.upper}] {unit}")
@@ -304,6 +312,11 @@ class Arm:
     def length(self) -> float:
         """The total length of the links [m]."""
         return sum(link.length for link in self.links)
+
+    @property
+    def has_motor_bodies(self) -> bool:
+        """True if the bodies of actuators count."""
+        return any(joint.body is not None for joint in self.joints)
 
     @property
     def reach(self) -> float:

@@ -11,6 +11,7 @@ and sliding by a changes it by at most a. If the bound is too weak, the box is h
 """
 
 import math
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -40,6 +41,25 @@ def disabled_collision_pairs(arm: Arm) -> dict[tuple[int, int], Reason]:
             if reason is not None:
                 pairs[first, second] = reason
     return pairs
+
+
+def joined_by_motors(arm: Arm) -> Iterator[tuple[int, int]]:
+    """Yield pairs of a joint with a motor body and a solid link that need no collision check, counted from 0.
+
+    A motor is a neighbour of the link that carries it, of the link that it moves, and of links without a solid link or
+    a moving joint between. All other pairs count, and so do all pairs of motors.
+    """
+    solid = [n for n, link in enumerate(arm.links) if link.length > 0.0]
+    for j, joint in enumerate(arm.joints):
+        if joint.body is None:
+            continue
+        before, after = [n for n in solid if n < j], [n for n in solid if n >= j]
+        for n in before:
+            rigid = all(one.kind == "fixed" for one in arm.joints[n + 1 : j])
+            if rigid or n == before[-1]:
+                yield j, n
+        if after:
+            yield j, after[0]
 
 
 def _proven(arm: Arm, first: int, second: int) -> Reason | None:

@@ -8,7 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.robot.arm import Arm, Joint, Link, Vector
+from armwright.robot.arm import AXES, Arm, Joint, Link, Vector
+from armwright.robot.motor_body import MotorBody
 
 AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 COLOURS = {
@@ -50,6 +51,11 @@ class Segment:
     def name(self) -> str:
         """The name of the link."""
         return f"link_{self.number}"
+
+    @property
+    def motor_name(self) -> str:
+        """The name of the body of the joint's actuator."""
+        return f"motor_{self.number}"
 
 
 def segments(arm: Arm) -> Iterator[Segment]:
@@ -153,6 +159,21 @@ def midpoint(link: Link) -> Vector:
 def marker_radius(link: Link) -> float:
     """Return the radius of the sphere that marks a joint [m]."""
     return MARKER_SCALE * link.radius
+
+
+def body_rpy(body: MotorBody) -> Vector:
+    """Return roll, pitch and yaw [rad] of the shape of a motor body: a cylinder of these formats is along z."""
+    if body.shape == "box":
+        return (0.0, 0.0, 0.0)
+    along = AXES.index(body.axis)
+    return rpy_along((float(along == 0), float(along == 1), float(along == 2)))
+
+
+def body_dimensions(body: MotorBody) -> dict[str, str]:
+    """Return the dimensions of a motor body [m], by their URDF names."""
+    if body.shape == "box":
+        return {"size": numbers(body.size)}
+    return {"radius": number(body.radius), "length": number(body.length)}
 
 
 def number(value: float) -> str:

@@ -1,5 +1,6 @@
 """An arm as MJCF, MuJoCo's own format."""
 
+from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement
 
 from armwright.robot.arm import GRAVITY, Arm, Joint, Link
@@ -7,6 +8,8 @@ from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     COLOURS,
     MIN_INERTIA,
+    Segment,
+    body_rpy,
     inertia_moments,
     marker_radius,
     midpoint,
@@ -20,6 +23,7 @@ from armwright.robot.link_geometry import (
     to_xml,
     tool_moments,
 )
+from armwright.robot.motor_body import MotorBody
 
 TYPES = {"revolute": "hinge", "prismatic": "slide"}  # a fixed joint is a body without a joint
 # XYZ: roll, pitch and yaw about fixed axes, as in a URDF.
@@ -32,7 +36,8 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     """Return the MJCF of an arm: `base`, link_1 on joint_1, …, a site `tip`, and motor_1 on joint_1, ….
 
     Names, frames, masses, inertias and colours are those of `to_urdf`: link frames are at their joints, and with all
-    joints at 0 they are parallel to the world frame. A tool with mass is a body `tool` at the end of the last link.
+    joints at 0 they are parallel to the world frame. A tool with mass is a body `tool` at the end of the last link. The
+    body of an actuator is a body motor_1, … on the link before its joint.
     Each moving joint has a motor with gear 1, limited to the torque of its actuator if it has one. `ctrl` is the torque
     [N m] or force [N] on that joint.
 
@@ -47,6 +52,8 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     SubElement(SubElement(root, "default"), "geom", contype="0", conaffinity="0", mass="0")
     body = SubElement(add_scene(root, arm), "body", name="base", pos=numbers(arm.base))
     for segment in segments(arm):
+        if segment.joint.body is not None:
+            add_motor(body, segment, segment.joint.body, segment.motor_name)
         body = SubElement(body, "body", name=segment.name, pos=numbers(segment.position))
         _add_joint(body, f"joint_{segment.number}", segment.joint)
         _add_link(body, segment.joint, segment.link)
@@ -107,6 +114,17 @@ def add_inertial(body: Element, link: Link) -> None:
     else:
         inertial["fullinertia"] = " ".join(moments)
     SubElement(body, "inertial", inertial)
+
+
+def add_motor(
+    carrier: Element, segment: Segment, body: MotorBody, name: str, attributes: Mapping[str, str] | None = None
+) -> None:
+    """Add the body of an actuator to the link that carries it, with further attributes of its geometry."""
+    element = SubElement(carrier, "body", name=name, pos=numbers(segment.position))
+    x, y, z = body.size
+    size = (x / 2, y / 2, z / 2) if body.shape == "box" else (body.radius, body.length / 2)
+    solid = {"type": body.shape, "size": numbers(size), "pos": numbers(body.centre), "euler": numbers(body_rpy(body))}
+    SubElement(element, "geom", {**solid, "material": f"joint_{segment.joint.axis}", **(attributes or {})})
 
 
 def add_tip(body: Element, arm: Arm) -> None:

@@ -11,6 +11,8 @@ from armwright.robot.link_geometry import (
     COLOURS,
     MIN_INERTIA,
     Segment,
+    body_dimensions,
+    body_rpy,
     inertia_moments,
     inertia_rpy,
     joint_limits,
@@ -25,6 +27,7 @@ from armwright.robot.link_geometry import (
     to_xml,
     tool_moments,
 )
+from armwright.robot.motor_body import MotorBody
 
 VERSION = "1.9"  # read by Gazebo Fortress and later
 MIN_MASS, MIN_MOMENT = float(MIN_INERTIA["boundmass"]), float(MIN_INERTIA["boundinertia"])  # [kg], [kg m²]
@@ -53,6 +56,8 @@ def to_sdf(arm: Arm, name: str = "arm") -> str:
     _add_inertial(base, MASSLESS)
     _add_joint(model, "world_to_base", "fixed", "world", "base")
     for segment in segments(arm):
+        if segment.joint.body is not None:
+            _add_motor(model, segment, segment.joint.body)
         element = SubElement(model, "link", name=segment.name)
         SubElement(element, "pose", relative_to=segment.parent).text = f"{numbers(segment.position)} 0 0 0"
         _add_link(element, segment)
@@ -125,6 +130,23 @@ def _add_link(element: Element, segment: Segment) -> None:
     sphere = SubElement(SubElement(marker, "geometry"), "sphere")
     SubElement(sphere, "radius").text = number(marker_radius(link))
     _add_material(marker, f"joint_{segment.joint.axis}")
+
+
+def _add_motor(model: Element, segment: Segment, body: MotorBody) -> None:
+    """Add the link of an actuator's body; its mass is a part of the link that carries it."""
+    name = segment.motor_name
+    element = SubElement(model, "link", name=name)
+    SubElement(element, "pose", relative_to=segment.parent).text = f"{numbers(segment.position)} 0 0 0"
+    _add_inertial(element, MASSLESS)
+    for purpose in ("visual", "collision"):
+        solid = SubElement(element, purpose, name=f"{name}_{purpose}")
+        SubElement(solid, "pose").text = f"{numbers(body.centre)} {numbers(body_rpy(body))}"
+        shape = SubElement(SubElement(solid, "geometry"), body.shape)
+        for key, value in body_dimensions(body).items():
+            SubElement(shape, key).text = value
+        if purpose == "visual":
+            _add_material(solid, f"joint_{segment.joint.axis}")
+    _add_joint(model, f"{name}_joint", "fixed", segment.parent, name)
 
 
 def _add_material(visual: Element, colour: str) -> None:

@@ -3,7 +3,7 @@
 from xml.etree.ElementTree import Element, SubElement
 
 from armwright.robot.arm import Arm
-from armwright.robot.collision_pairs import disabled_collision_pairs
+from armwright.robot.collision_pairs import disabled_collision_pairs, joined_by_motors
 from armwright.robot.link_geometry import home_position, moving_joints, number, to_xml
 
 GROUP = "arm"
@@ -13,7 +13,8 @@ def to_srdf(arm: Arm, name: str = "arm") -> str:
     """Return the SRDF for the URDF of the same arm and name: the group `arm` from `base` to `tip`, and its home.
 
     Home is all joints at 0, or at the limit closest to it. Collision checks are disabled between neighbours, and for
-    links that provably never or always collide (`disabled_collision_pairs`). There is no end effector, since an
+    links that provably never or always collide (`disabled_collision_pairs`), and between motor bodies and the links
+    that they join (`joined_by_motors`). There is no end effector, since an
     arm ends at its tip, and no virtual joint, since the URDF itself has `world`.
     """
     robot = Element("robot", name=name)
@@ -24,5 +25,8 @@ def to_srdf(arm: Arm, name: str = "arm") -> str:
         SubElement(state, "joint", name=f"joint_{n}", value=number(home_position(joint)))
     for (first, second), reason in disabled_collision_pairs(arm).items():
         pair = {"link1": f"link_{first + 1}", "link2": f"link_{second + 1}", "reason": reason}
+        SubElement(robot, "disable_collisions", pair)
+    for joint, link in joined_by_motors(arm):
+        pair = {"link1": f"motor_{joint + 1}", "link2": f"link_{link + 1}", "reason": "Adjacent"}
         SubElement(robot, "disable_collisions", pair)
     return to_xml(robot)

@@ -7,7 +7,10 @@ from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     COLOURS,
     MUJOCO_COMPILER,
+    TENSOR_INDICES,
     Segment,
+    body_dimensions,
+    body_rpy,
     inertia_moments,
     inertia_rpy,
     joint_limits,
@@ -22,6 +25,7 @@ from armwright.robot.link_geometry import (
     to_xml,
     tool_moments,
 )
+from armwright.robot.motor_body import MotorBody
 
 FIXED = Joint("fixed", "z")
 
@@ -31,7 +35,8 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
 
     Link frames are at their joints; with all joints at 0 they are parallel to the world frame. The z axis of the tip
     frame is the tool's axis, its x axis the tool's side. Links are solid cylinders of uniform density from joint to
-    joint, for inertia, collision and display. A tool with mass is a link `tool` at the end of the last link.
+    joint, for inertia, collision and display. A tool with mass is a link `tool` at the end of the last link. The body
+    of an actuator is a massless link motor_1, …, fixed to the link before its joint.
 
     Example:
         >>> import armwright as aw
@@ -54,6 +59,10 @@ def urdf_tree(arm: Arm, name: str) -> Element:
     SubElement(robot, "link", name="base")
     add_joint(robot, "world_to_base", "world", "base", numbers(arm.base))
     for segment in segments(arm):
+        if segment.joint.body is not None:
+            motor, position = segment.motor_name, numbers(segment.position)
+            add_motor(robot, segment, segment.joint.body, motor)
+            add_joint(robot, f"{motor}_joint", segment.parent, motor, position)
         _add_link(robot, segment)
         name, position = f"joint_{segment.number}", numbers(segment.position)
         add_joint(robot, name, segment.parent, segment.name, position, joint=segment.joint)
@@ -108,18 +117,29 @@ def _add_link(robot: Element, segment: Segment) -> None:
     SubElement(inertial, "inertia", inertia_moments(link))
     if link.length > 0.0:
         centre, rpy = numbers(midpoint(link)), numbers(rpy_along(link.offset))
-        add_cylinder(element, centre, rpy, number(link.radius), number(link.length))
+        cylinder = {"radius": number(link.radius), "length": number(link.length)}
+        add_solid(element, "link", centre, rpy, "cylinder", cylinder)
     add_marker(element, segment, number(marker_radius(link)))
 
 
-def add_cylinder(element: Element, xyz: str, rpy: str, radius: str, length: str) -> None:
-    """Add the cylinder of a link, for display and for collisions."""
+def add_solid(element: Element, material: str, xyz: str, rpy: str, shape: str, dimensions: dict[str, str]) -> None:
+    """Add a box or cylinder, for display and for collisions."""
     for purpose in ("visual", "collision"):
         body = SubElement(element, purpose)
         SubElement(body, "origin", xyz=xyz, rpy=rpy)
-        SubElement(SubElement(body, "geometry"), "cylinder", radius=radius, length=length)
+        SubElement(SubElement(body, "geometry"), shape, dimensions)
         if purpose == "visual":
-            SubElement(body, "material", name="link")
+            SubElement(body, "material", name=material)
+
+
+def add_motor(robot: Element, segment: Segment, body: MotorBody, name: str) -> None:
+    """Add the link of an actuator's body; its mass is a part of the link that carries it."""
+    element = SubElement(robot, "link", name=name)
+    inertial = SubElement(element, "inertial")
+    SubElement(inertial, "mass", value="0")
+    SubElement(inertial, "inertia", dict.fromkeys(TENSOR_INDICES, "0"))
+    material, rpy = f"joint_{segment.joint.axis}", numbers(body_rpy(body))
+    add_solid(element, material, numbers(body.centre), rpy, body.shape, body_dimensions(body))
 
 
 def add_marker(element: Element, segment: Segment, radius: str) -> None:

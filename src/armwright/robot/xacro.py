@@ -15,7 +15,7 @@ from armwright.robot.link_geometry import (
     tip_rpy,
     to_xml,
 )
-from armwright.robot.urdf_writer import add_cylinder, add_header, add_joint, add_marker, add_tool
+from armwright.robot.urdf_writer import add_header, add_joint, add_marker, add_motor, add_solid, add_tool
 
 NAMESPACE = "http://www.ros.org/wiki/xacro"
 NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
@@ -50,6 +50,10 @@ def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float | Sequence[float
     add_joint(robot, _prefixed("world_to_base"), "world", _prefixed("base"), "${base_x} ${base_y} ${base_z}")
     position, terms = "0 0 0", ["0", "0", "0"]
     for segment in segments(arm):
+        if segment.joint.body is not None:
+            motor, carrier = _prefixed(segment.motor_name), _prefixed(segment.parent)
+            add_motor(robot, segment, segment.joint.body, motor)
+            add_joint(robot, f"{motor}_joint", carrier, motor, position)
         _add_link(robot, segment)
         name, parent, child = map(_prefixed, (f"joint_{segment.number}", segment.parent, segment.name))
         add_joint(robot, name, parent, child, position, joint=segment.joint)
@@ -176,5 +180,6 @@ def _add_link(robot: Element, segment: Segment) -> None:
     drawn = SubElement(element, "xacro:if", value=f"${{{length} > 0}}")
     x, y, z = direction
     midpoint = _evaluated(_scaled((x / 2, y / 2, z / 2), n))
-    add_cylinder(drawn, midpoint, numbers(rpy_along(direction)), f"${{{own}radius}}", f"${{{length}}}")
+    cylinder = {"radius": f"${{{own}radius}}", "length": f"${{{length}}}"}
+    add_solid(drawn, "link", midpoint, numbers(rpy_along(direction)), "cylinder", cylinder)
     add_marker(element, segment, f"${{{MARKER_SCALE} * {own}radius}}")

@@ -36,6 +36,8 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: It
         entering.add("joint_stiffness")
     if problem.uses(BACKLASH_ERROR):
         entering.add("backlash")
+    if problem.space.motor_bodies:
+        entering.add("shaft_offset")
     found = {record.name: _values(record, entering) for record in records}
     return {name: values for name, values in found.items() if values}
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.robot.arm import GRAVITY, Arm, Joint
+from armwright.robot.collision_pairs import joined_by_motors
 from armwright.robot.link_geometry import (
     Segment,
     moving_joints,
@@ -24,7 +25,7 @@ from armwright.robot.link_geometry import (
     tip_rpy,
     to_xml,
 )
-from armwright.robot.mjcf import COMPILER, add_inertial, add_scene, add_tip, add_tool, joint_attributes
+from armwright.robot.mjcf import COMPILER, add_inertial, add_motor, add_scene, add_tip, add_tool, joint_attributes
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.payload import LoadShape
 from armwright.tasks.targets import TargetArrays
@@ -71,9 +72,9 @@ def to_simulation_mjcf(
     """Return the MJCF of an arm in its surroundings.
 
     Moving joints are joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque), whose sum
-    is limited to the actuator's peak torque. Link k is the capsule link_k, its actuator the sphere motor_k. A site
-    target_NAME is at each target; its user data are the tolerance of the position [m], of the angle [rad], and how many
-    angles count (2: the z axis, 3: all). The keyframe NAME is the posture there.
+    is limited to the actuator's peak torque. Link k is the capsule link_k, its actuator the sphere or body motor_k. A
+    site target_NAME is at each target; its user data are the tolerance of the position [m], of the angle [rad], and how
+    many angles count (2: the z axis, 3: all). The keyframe NAME is the posture there.
 
     Args:
         arm: The arm.
@@ -85,16 +86,19 @@ def to_simulation_mjcf(
     root = Element("mujoco", model=name)
     SubElement(root, "compiler", COMPILER)
     gravity = numbers((0.0, 0.0, -GRAVITY))
-    SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP), integrator="RK4")
+    option = SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP), integrator="RK4")
+    if arm.has_motor_bodies:  # a motor touches the link before its carrier; what may not touch is excluded below
+        SubElement(option, "flag", filterparent="disable")
     SubElement(SubElement(root, "default"), "geom", {**TOUCHES_NOTHING, "mass": "0"})
     world = add_scene(root, arm)
     _add_obstacles(world, surroundings.obstacles)
     _add_targets(world, surroundings, arm)
     body = SubElement(world, "body", name="base", pos=numbers(arm.base))
     names = {n: f"joint_{k}" for k, (n, _) in enumerate(moving_joints(arm), start=1)}
+    motor_names = {n: f"motor{name.removeprefix('joint')}" for n, name in names.items()}
     for segment in segments(arm):
         if segment.joint.kind != "fixed":
-            _add_motor(body, f"motor{names[segment.number].removeprefix('joint')}", segment, arm)
+            _add_motor(body, motor_names[segment.number], segment, arm)
         body = SubElement(body, "body", name=segment.name, pos=numbers(segment.position))
         if segment.joint.kind != "fixed":
             SubElement(body, "joint", _joint(names[segment.number], segment.joint))
@@ -107,6 +111,8 @@ def to_simulation_mjcf(
     contact = SubElement(root, "contact")
     for first, second in uncounted_pairs(arm):
         SubElement(contact, "exclude", body1=f"link_{first + 1}", body2=f"link_{second + 1}")
+    for joint, link in joined_by_motors(arm):
+        SubElement(contact, "exclude", body1=motor_names[joint + 1], body2=f"link_{link + 1}")
     _add_actuators(root, arm, peak_torques)
     frames = SubElement(root, "keyframe")
     for target, q in zip(surroundings.target_names, postures.tolist(), strict=True):
@@ -194,7 +200,10 @@ def _add_capsule(body: Element, name: str, start: Array, end: Array, radius: flo
 
 
 def _add_motor(body: Element, name: str, segment: Segment, arm: Arm) -> None:
-    """Add the actuator of a joint to the link before: a sphere within its capsule, if it has one."""
+    """Add the actuator of a joint to the link before: its body, or a sphere within the link's capsule, if any."""
+    if segment.joint.body is not None:
+        add_motor(body, segment, segment.joint.body, name, {"name": name, **TOUCHES_ALL})
+        return
     before = arm.links[segment.number - 2] if segment.number > 1 else None
     counts = before is not None and before.length > 0.0
     radius = segment.link.radius if before is None else before.radius

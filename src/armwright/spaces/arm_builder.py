@@ -3,12 +3,14 @@
 from dataclasses import replace
 from typing import cast
 
-from armwright.robot.arm import Actuator, Arm, Joint, Link, Vector
+from armwright.robot.arm import Actuator, Arm, Axis, Joint, Link, Vector
+from armwright.robot.motor_body import MotorBody, placed_body
 from armwright.spaces.joint_modules import (
     DIRECTIONS,
     Direction,
     Mount,
     mounted,
+    mounted_body,
     mounted_vector,
 )
 from armwright.spaces.parameters import Design
@@ -50,7 +52,16 @@ class ArmBuilder:
         lower, upper = self._limits(i)
         if sign < 0.0:
             lower, upper = 0.0 - upper, 0.0 - lower  # no -0.0
-        return Joint(kind, axis, lower, upper, self._actuator(i), self._space.travel if kind == "prismatic" else 1.0)
+        travel = self._space.travel if kind == "prismatic" else 1.0
+        return Joint(kind, axis, lower, upper, self._actuator(i), travel, self._body(i, local_axis))
+
+    def _body(self, i: int, local_axis: Axis) -> MotorBody | None:
+        """Return the body of the actuator of a module, if it counts."""
+        actuator = self._actuator(i)
+        if not self._space.motor_bodies or actuator is None or actuator.shape is None:
+            return None
+        carrier = DIRECTIONS[self._direction(i - 1) if i else "+z"]
+        return mounted_body(placed_body(actuator.shape, local_axis, carrier), self._mount)
 
     def _limits(self, i: int) -> tuple[float, float]:
         """Return the joint limits of a module along its local axis [rad] or [m]."""
@@ -87,10 +98,13 @@ class ArmBuilder:
         return self._actuators[str(self._params.get(f"motor_{i + 1}", self._space.arm_actuators[0].name))]
 
     def _carried_mass(self, i: int) -> float:
-        """Return the mass at the start of a module: its actuators and its rail [kg]."""
+        """Return the mass at the start of a module: its actuators with their brackets, and its rail [kg]."""
         module = self._modules[i]
-        actuator = self._actuator(i) if module.is_actuated else None
-        return self._rail_mass(i) + len(module.joints) * (0.0 if actuator is None else actuator.mass)
+        if not module.is_actuated:
+            return self._rail_mass(i)
+        actuator = self._actuator(i)
+        mass = 0.0 if actuator is None else actuator.mass
+        return self._rail_mass(i) + len(module.joints) * (mass + self._space.bracket_mass)
 
     def _rail_mass(self, i: int) -> float:
         return self._link_mass(i, self._stroke(i)) if self._modules[i].is_prismatic else 0.0

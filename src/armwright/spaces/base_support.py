@@ -17,7 +17,8 @@ def supported_space(space: DesignSpace, obstacles: Sequence[Obstacle]) -> Design
     """Return the space with its bases on what they stand on in a task.
 
     With `base_on`, the base position is restricted to the top face of that obstacle: at its height, or above if there
-    is a column. The column stands on it, else on the highest ground, else at z = 0. Applied twice, nothing changes.
+    is a column, or above by at most the reach of a motor if motors are bodies. The column stands on it, else on the
+    highest ground, else at z = 0. Applied twice, nothing changes.
 
     Args:
         space: The design space.
@@ -35,6 +36,9 @@ def supported_space(space: DesignSpace, obstacles: Sequence[Obstacle]) -> Design
         foot = faces["origin_z"][0]
         if space.column is not None:
             faces["origin_z"] = (foot, math.inf)
+        elif space.motor_bodies:  # the first motor is between the face and the base
+            reach = max(actuator.shape.reach for actuator in space.arm_actuators if actuator.shape is not None)
+            faces["origin_z"] = (foot, foot + reach)
         changes |= {name: _narrowed(space, name, face, obstacle) for name, face in faces.items()}
     if space.column is not None and space.column.foot is None:
         changes["column"] = space.column.model_copy(update={"foot": foot})

@@ -22,8 +22,10 @@ from armwright.kinematics.arm_arrays import (
     round_down,
     stack_tools,
 )
+from armwright.kinematics.motor_bodies import MotorBodies, bodies_in
 from armwright.kinematics.rigid_bodies import Bodies, Tools
 from armwright.robot.arm import AXES
+from armwright.spaces.batch_bodies import motor_body_values
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import DIRECTIONS, MODULES, MOUNTS
 from armwright.spaces.parameters import CategoricalParameter
@@ -80,6 +82,10 @@ def stack_designs(
         per_joint[name] = _in_last_slot(columns.of_links(space.tube_values(name), np.inf), n_slots, np.inf)
     if motors is not None:
         per_joint["ratings"] = motors.ratings
+    if space.motor_bodies:
+        motor, direction = _motor_choices(space, columns), _link_directions(space, columns)
+        values = motor_body_values(space, motor, joints.plan, direction, columns.mount)
+        per_joint |= {f"body_{name}": value for name, value in values.items()}
     present = _flatten(present)
     flat = _compact({name: _flatten(values) for name, values in per_joint.items()}, present)
     n_joints = present.sum(axis=1).astype(np.int32)
@@ -113,6 +119,7 @@ def stack_designs(
         else actuation_at_joints(
             flat["ratings"], flat["travel"], motors.price, np.full(columns.n, space.safety_factor)
         ),
+        motor_bodies=_motor_bodies(flat, precision) if space.motor_bodies else None,
     )
 
 
@@ -191,7 +198,7 @@ class _Joints:
 class _Motors:
     """Actuators of the modules of N designs."""
 
-    mass: Array  # (N, M) of all actuators of a module [kg]
+    mass: Array  # (N, M) of all actuators of a module, with their brackets [kg]
     ratings: Array  # (N, M, K, R) of each joint's
     price: Array  # (N,) of an arm [USD]
 
@@ -235,22 +242,39 @@ def _limits(space: DesignSpace, columns: _Columns, plan: Indices) -> tuple[Array
 def _motors(space: DesignSpace, columns: _Columns, joints: _Joints) -> _Motors:
     moves = joints.plan < FIXED  # (N, M, K) joints that need an actuator
     count = moves.sum(axis=2)
-    motor = columns.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
+    motor = _motor_choices(space, columns)
     masses, prices, ratings = _catalogue(space)
     ratings = np.repeat(ratings[motor][:, :, None], moves.shape[2], axis=2)
     ratings[~moves] = FIXED_RATINGS
     return _Motors(
-        mass=count * masses[motor],
+        mass=count * (masses[motor] + space.bracket_mass),
         ratings=ratings,
         price=np.where(count > 0, count * prices[motor], 0.0).sum(axis=1),
     )
+
+
+def _motor_choices(space: DesignSpace, columns: _Columns) -> Indices:
+    """Return the (N, M) index of the actuator of each module."""
+    return columns.choices("motor", [a.name for a in space.arm_actuators].index, space.arm_actuators[0].name)
+
+
+def _link_directions(space: DesignSpace, columns: _Columns) -> Indices:
+    """Return the (N, M) index of the direction of each link."""
+    return columns.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
+
+
+def _motor_bodies(flat: dict[str, Any], precision: Precision) -> MotorBodies:
+    """Return the bodies of actuators; joints that an arm does not have come last, without bodies."""
+    return bodies_in({field.name: flat[f"body_{field.name}"] for field in fields(MotorBodies)}, precision)
 
 
 def _carried(space: DesignSpace, columns: _Columns, joints: _Joints, motors: _Motors | None) -> _Carried:
     """Return the masses of rails and actuators."""
     stroke = columns.reals("stroke", space.min_stroke)
     rails = np.where(joints.prismatic[..., -1], space.link_mass(stroke, columns.tubes), 0.0)
-    return _Carried(rails if motors is None else rails + motors.mass, rails)
+    if motors is not None:
+        return _Carried(rails + motors.mass, rails)
+    return _Carried(rails + (joints.plan < FIXED).sum(axis=2) * space.bracket_mass, rails)
 
 
 @cache
@@ -269,8 +293,7 @@ def _bodies(space: DesignSpace, columns: _Columns, joints: _Joints, carried: _Ca
     links = columns.links
     mass = np.where(columns.present, space.link_mass(links, columns.tubes), 0.0)
     end_mass = np.concatenate([carried.mass[:, 1:], np.zeros((columns.n, 1))], axis=1)
-    directions = columns.choices("direction", tuple(DIRECTIONS).index, space.link_directions[0])
-    direction = _rotate(_VECTORS[directions], columns.mount)  # (N, M, 3)
+    direction = _rotate(_VECTORS[_link_directions(space, columns)], columns.mount)  # (N, M, 3)
     middle = direction * (links / 2)[..., None]
     offset = direction * links[..., None]
     end_mass_position = offset + _end_shift(space, columns, joints.plan, carried)

@@ -189,7 +189,7 @@ class DesignSpace(SpaceSchema, frozen=True):
     def is_toy(self) -> bool:
         """True if even the heaviest arm is nearly massless, as in the paper."""
         heaviest = max((record.mass for record in self.actuators), default=0.0)
-        return self.max_joints * (self.heaviest_link + heaviest) < TOY_MASS
+        return self.max_joints * (self.heaviest_link + heaviest + self.bracket_mass) < TOY_MASS
 
     @property
     def mass_note(self) -> str:
@@ -197,8 +197,9 @@ class DesignSpace(SpaceSchema, frozen=True):
         toy = "; a toy: real arms weigh kilograms, so read its N m as a comparison only" if self.is_toy else ""
         names = ", ".join(record.name for record in self.actuators)
         actuators = f"; actuators: {names}" if self.actuators else ""
+        brackets = f"; brackets: {self.bracket_mass:g} kg for each joint that moves" if self.bracket_mass else ""
         column = f"; the base on a column of {self.column.description}" if self.column else ""
-        return f"links: {self.link_description}{toy}{actuators}{column}"
+        return f"links: {self.link_description}{toy}{actuators}{brackets}{column}"
 
 
 def _default_motors(space: SpaceSchema) -> dict[str, str]:

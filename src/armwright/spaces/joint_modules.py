@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from armwright.robot.arm import AXES, Axis, JointKind, Vector
+from armwright.robot.motor_body import MotorBody
 
 JointType = Literal["R", "P", "Y", "O", "X", "T", "S", "F"]
 Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
@@ -104,3 +105,10 @@ def mounted_vector(vector: Vector, mount: Mount) -> Vector:
         world, sign = mounted(axis, mount)
         rotated[AXES.index(world)] = sign * value
     return rotated[0], rotated[1], rotated[2]
+
+
+def mounted_body(body: MotorBody, mount: Mount) -> MotorBody:
+    """Return a motor body of the base frame in world axes."""
+    (x, y, z), (u, v, w) = mounted_vector(body.size, mount), mounted_vector(body.centre, mount)
+    axis, _ = mounted(body.axis, mount)
+    return MotorBody(body.shape, axis, (abs(x), abs(y), abs(z)), (u + 0.0, v + 0.0, w + 0.0))  # no -0.0

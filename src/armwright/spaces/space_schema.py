@@ -7,7 +7,7 @@ from typing import Any, Self, cast
 import numpy as np
 from pydantic import BaseModel, Field, field_serializer, field_validator, model_validator
 
-from armwright.robot.actuators import ActuatorRecord, resolve_actuator
+from armwright.robot.actuators import DIMENSIONS, ActuatorRecord, resolve_actuator, value_of
 from armwright.robot.arm import Actuator
 from armwright.spaces.column import ColumnKeys
 from armwright.spaces.joint_modules import MODULES, Direction, JointType, Mount
@@ -66,6 +66,10 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     """Names from the catalogue, or records; several add the parameters motor_j. Empty: joints without mass."""
     safety_factor: float = Field(default=1.5, gt=0.0, le=100.0)
     """Factor of the torque that the actuators have to deliver."""
+    motor_bodies: bool = False
+    """Whether the actuators are solid bodies, which count in collisions."""
+    bracket_mass: float = Field(default=0.0, ge=0.0, le=1e4)
+    """Mass of brackets and screws at each joint that moves, where its actuator is [kg]."""
     restrict: tuple[tuple[str, Restriction], ...] = Field(default=(), max_length=100)
     """Single parameters, fixed (joint_1: Y) or narrowed (joint_2: [P, R], link_1: [0.1, 0.2])."""
     grid: tuple[tuple[str, float], ...] = Field(default=(), max_length=100)
@@ -107,6 +111,7 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         _check_ranges(self)
         _check_joint_ranges(self)
         _check_duplicates(self)
+        _check_motor_bodies(self)
         _check_mass(self)
         _check_support(self)
         return self
@@ -257,3 +262,23 @@ def _check_duplicates(space: SpaceSchema) -> None:
     for key, names in choices.items():
         if len(set(names)) != len(names):
             raise ValueError(f"{key} has duplicates: {', '.join(names)}")
+
+
+def _check_motor_bodies(space: SpaceSchema) -> None:
+    if not space.motor_bodies:
+        return
+    if not space.actuators:
+        raise ValueError("motor_bodies: expected actuators, got none; try actuators: [XM430-W350]")
+    shared = [letter for letter in space.joint_types if len(MODULES[letter].joints) > 1]
+    if shared:
+        raise ValueError(
+            f"motor_bodies: expected joint_types with one actuator each, got {', '.join(shared)} with two at one "
+            "place, which overlap; try R and P"
+        )
+    for record in space.actuators:
+        missing = [name for name in DIMENSIONS if value_of(record, name) is None]
+        if missing:
+            raise ValueError(
+                f"motor_bodies: expected the dimensions [m] of every actuator, got none for {record.name}: "
+                f"{', '.join(missing)}; describe it with them or leave it out"
+            )

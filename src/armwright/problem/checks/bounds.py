@@ -139,7 +139,7 @@ def _of_letter(
     module = MODULES[letter]
     n = len(module.joints) if module.is_actuated else 0
     prices = [n * (motor.price or 0.0) for motor in motors] or [0.0]
-    masses = [n * motor.mass for motor in motors] or [0.0]
+    masses = [n * (mass + space.bracket_mass) for mass in [motor.mass for motor in motors] or [0.0]]
     rail = _mass(space, strokes, tubes) if module.is_prismatic else NOTHING
     return {
         "joints": Interval(n, n),

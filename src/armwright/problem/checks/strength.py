@@ -62,7 +62,7 @@ def _of_toys(problem: Problem, payload: float) -> list[Finding]:
     """Compare the payload [kg] with the mass of the heaviest arm."""
     space = problem.space
     heaviest_motor = max((record.mass for record in space.actuators), default=0.0)
-    heaviest = space.max_joints * (space.heaviest_link + heaviest_motor)
+    heaviest = space.max_joints * (space.heaviest_link + heaviest_motor + space.bracket_mass)
     if payload <= HEAVY * heaviest or heaviest == 0.0:
         return []
     toy = "; the links are a toy" if space.is_toy else ""

@@ -2,7 +2,7 @@
 
 import { during } from "./cycle.js";
 import { describeMiss, postures, why } from "./design.js";
-import { PRISMATIC, chain, length, rail } from "./kinematics.js";
+import { PRISMATIC, chain, length, motorBody, rail } from "./kinematics.js";
 import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./format.js";
@@ -75,6 +75,11 @@ export function drawnJoints() {
     .map((mesh) => mesh.position.toArray());
 }
 
+// Returns the middles of the drawn motor bodies in the world; for tests.
+export function drawnMotors() {
+  return groups.arm.children.filter((mesh) => mesh.userData.motor).map((mesh) => [12, 13, 14].map((k) => mesh.matrix.elements[k]));
+}
+
 // Returns the corners of the drawn obstacles in the world; for tests.
 export function drawnObstacles() {
   return groups.obstacles.children.map((part) => {
@@ -118,7 +123,8 @@ function paint() {
   const faint = (paint_, opacity) => new THREE.MeshLambertMaterial({ color: paint_, transparent: true, opacity, depthWrite: false });
   materials = {
     link: solid(colour("arm")), base: solid(shown("#111111")), joints: ["x", "y", "z"].map((axis) => solid(joint[axis])),
-    ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45),
+    motors: ["x", "y", "z"].map((axis) => ({ face: faint(joint[axis], 0.3), edge: new THREE.LineBasicMaterial({ color: joint[axis] }) })),
+    ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45), comparedMotor: { face: faint(target, 0.2), edge: new THREE.LineBasicMaterial({ color: target }) },
     reached: solid(HIT), missed: solid(target), now: solid(NOW),
     obstacle: { face: faint(obstacle, 0.3), edge: new THREE.LineBasicMaterial({ color: obstacle }) },
     gap: new THREE.LineDashedMaterial({ color: missed, dashSize: 0.02, gapSize: 0.012 }),
@@ -324,6 +330,12 @@ function drawPosture(group, arm, q, paints) {
     joint.userData.joint = j;
     joint.position.set(...joints[j]);
     group.add(joint);
+    const body = motorBody(arm, posed, j);
+    if (body) {
+      const [mesh, ...edges] = solidParts(body, frame, paints.motors[arm.axis[j]]);
+      mesh.userData.motor = true;
+      group.add(mesh, ...edges);
+    }
   }
   const radius = thick(arm, 0);
   const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.up[k]); // end of the base plate
@@ -340,8 +352,7 @@ export function drawArm() {
   if (!scene || state.design === null) return;
   reframe();
   const arm = content.arm(state.design), posed = postures(state.design);
-  const shape = { link: materials.link, joints: materials.joints, base: materials.base };
-  const tip = drawPosture(groups.arm, arm, content.q(state.design, state.target), shape);
+  const tip = drawPosture(groups.arm, arm, content.q(state.design, state.target), materials);
   gap(tip);
   paintTargets(posed);
   empty(groups.ghost);
@@ -355,7 +366,7 @@ export function drawArm() {
   }
   empty(groups.compared);
   if (state.compared !== null && state.compared !== state.design) {
-    const pale = { link: materials.compared, joints: [0, 1, 2].map(() => materials.compared), base: materials.compared };
+    const pale = { link: materials.compared, joints: [0, 1, 2].map(() => materials.compared), base: materials.compared, motors: [0, 1, 2].map(() => materials.comparedMotor) };
     drawPosture(groups.compared, content.arm(state.compared), content.q(state.compared, state.target), pale);
   }
   render();
@@ -402,8 +413,7 @@ function tick(now) {
     drawArm();
     return;
   }
-  const shape = { link: materials.link, joints: materials.joints, base: materials.base };
-  gap(drawPosture(groups.arm, content.arm(state.design), moving.now, shape));
+  gap(drawPosture(groups.arm, content.arm(state.design), moving.now, materials));
   render();
   requestAnimationFrame(tick);
 }
@@ -445,7 +455,7 @@ function drive(now) {
   }
   set({ target: at.target });
   empty(groups.ghost);
-  drawPosture(groups.arm, content.arm(state.design), at.q, { link: materials.link, joints: materials.joints, base: materials.base });
+  drawPosture(groups.arm, content.arm(state.design), at.q, materials);
   paintTargets();
   render();
   requestAnimationFrame(drive);

@@ -110,6 +110,10 @@ export class Content {
     for (const name of ["base", "up", "tip", "tool_axis", "tool_side", "payload_center"]) arm[name] = this._part(name, i);
     for (const name of ["kind", "axis", "lower", "upper", "travel", "mass", "radius"]) arm[name] = this._part(name, i).subarray(0, n);
     for (const name of ["offset", "com"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
+    if (this.head.arrays.body_shape) {
+      arm.body_shape = this._part("body_shape", i).subarray(0, n);
+      for (const name of ["body_half", "body_centre"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
+    }
     return arm;
   }
 

@@ -23,13 +23,14 @@ function rotated(m, k, angle) {
 }
 
 // joints: positions of the joints and, last, of the tip [m]; ends: of the links; axes: of the joints, in the world;
-// centres: of mass; payload: its centre of mass; tool: its own x, y and z in the world.
+// centres: of mass; mounts: frame of the link before each joint, and the joint at displacement 0; payload: its centre of mass; tool: its own x, y and z in the world.
 export function chain(arm, q) {
   let frame = [1, 0, 0, 0, 1, 0, 0, 0, 1], place = Array.from(arm.base);
-  const joints = [], ends = [], axes = [], centres = [];
+  const joints = [], ends = [], axes = [], centres = [], mounts = [];
   for (let j = 0; j < q.length; j++) {
     const axis = column(frame, arm.axis[j]);
     axes.push(axis);
+    mounts.push([frame, place]);
     if (arm.kind[j] === PRISMATIC) place = add(place, axis.map((v) => v * q[j]));
     joints.push(place);
     if (arm.kind[j] === REVOLUTE) frame = rotated(frame, arm.axis[j], q[j]);
@@ -39,7 +40,7 @@ export function chain(arm, q) {
   }
   const [x, z] = [turned(frame, arm.tool_side), turned(frame, arm.tool_axis)];
   const tip = add(place, turned(frame, arm.tip)), payload = add(tip, turned(frame, arm.payload_center));
-  return { joints: [...joints, tip], ends, axes, centres, payload, tool: [x, cross(z, x), z] };
+  return { joints: [...joints, tip], ends, axes, centres, mounts, payload, tool: [x, cross(z, x), z] };
 }
 
 // Returns the joint torques [N m] that hold the arm and its payload [kg] against gravity.
@@ -61,6 +62,18 @@ export function holding(arm, posed, payload) {
 export function rail(arm, posed, q, j) {
   const along = (way) => posed.joints[j].map((v, k) => v + posed.axes[j][k] * (way - q[j]));
   return [along(arm.lower[j]), along(arm.upper[j])];
+}
+
+const SHAPES = ["box", "sphere", "cylinder"];
+
+// Returns the motor body of a joint as a solid in the world; null without one.
+export function motorBody(arm, posed, j) {
+  const shape = arm.body_shape && SHAPES[arm.body_shape[j]];
+  if (!shape) return null;
+  const [frame, place] = posed.mounts[j], k = arm.axis[j];
+  const columns = [(k + 1) % 3, (k + 2) % 3, k].map((c) => column(frame, c));
+  const rotation = [0, 1, 2].map((r) => columns.map((c) => c[r]));
+  return { shape, half: at(arm.body_half, j), rotation, centre: add(place, turned(frame, at(arm.body_centre, j))) };
 }
 
 // Returns the angle [rad] between a tool and a target's frame (3 x 3 by rows): of its z alone, or of all its axes.

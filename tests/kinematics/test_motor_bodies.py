@@ -1,0 +1,299 @@
+"""Motor bodies: clearances against Coal with the exported geometry, and contacts in MuJoCo."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import coal
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+from numpy.typing import NDArray
+
+from armwright.exceptions import ArmError, SpaceError
+from armwright.kinematics.arm_arrays import Precision, stack_arms
+from armwright.kinematics.clearance import clearances
+from armwright.kinematics.motor_bodies import MotorBodies
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm, Joint, uniform_link
+from armwright.robot.motor_body import MotorBody
+from armwright.robot.urdf_writer import to_urdf
+from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.obstacles import Ground, Obstacle
+from armwright.tasks.payload import POINT_LOAD
+from armwright.tasks.targets import position_targets
+from armwright.tasks.task import Task
+from tests.kinematics.test_clearance import SHAPES, agree, apart, capsule, coal_shape, random_obstacle
+
+Array = NDArray[np.float64]
+CONTENT: Mapping[str, Any] = {
+    "name": "bodies",
+    "joints": [3, 6],
+    "joint_types": ["R", "P", "Y", "S"],
+    "joint_range": [-2.4, 2.4],
+    "stroke": [0.05, 0.1],
+    "mount": ["floor", "ceiling", "wall+x", "wall-y"],
+    "link": [0.06, 0.25],
+    "link_directions": ["+z", "-x", "+y"],
+    "actuators": ["XM540-W270", "AK60-6", "PH42-020-S300-R", "XL330-M288"],
+    "motor_bodies": True,
+}
+SPACE = DesignSpace.model_validate(CONTENT)
+PITCH = DesignSpace.model_validate(
+    {"joints": 3, "joint_types": ["P"], "link": [0.02, 0.3], "actuators": ["XM540-W270"], "motor_bodies": True}
+)
+
+
+class Exported:
+    """The motors of an arm's URDF in Coal, and its links as capsules, placed by Pinocchio."""
+
+    def __init__(self, arm: Arm) -> None:
+        urdf = to_urdf(arm)
+        self._arm, self._model = arm, pinocchio.buildModelFromXML(urdf)
+        self._geometry = pinocchio.buildGeomFromUrdfString(self._model, urdf, pinocchio.GeometryType.COLLISION)
+        self.links: list[tuple[Any, coal.Transform3s]] = []
+        self.motors: dict[int, tuple[Any, coal.Transform3s]] = {}
+
+    def at(self, q: Array) -> "Exported":
+        """Place all in this posture."""
+        arm, model, geometry = self._arm, self._model, self._geometry
+        data, placed = model.createData(), geometry.createData()
+        pinocchio.framesForwardKinematics(model, data, q)
+        pinocchio.updateGeometryPlacements(model, data, geometry, placed)
+        self.links.clear()
+        for n, link in enumerate(arm.links, start=1):
+            frame = data.oMf[model.getFrameId(f"link_{n}")]
+            self.links.append(capsule(frame.translation, frame.act(np.array(link.offset)), link.radius))
+        for solid, at in zip(geometry.geometryObjects, placed.oMg, strict=True):
+            if solid.name.startswith("motor_"):
+                number = int(solid.name.removeprefix("motor_").removesuffix("_0")) - 1
+                self.motors[number] = (solid.geometry, coal.Transform3s(at.rotation, at.translation))
+        return self
+
+    def own_clearance(self) -> float:
+        """Of motors from motors and links, of arms whose joints all move; motor j joins the links j - 1 and j."""
+        found = np.inf
+        for j, motor in self.motors.items():
+            others = [other for k, other in self.motors.items() if k > j]
+            others += [link for k, link in enumerate(self.links) if k not in (j - 1, j)]
+            found = min([found, *(apart(motor, other) for other in others)])
+        return found
+
+    def obstacle_clearance(self, obstacles: Sequence[Obstacle]) -> float:
+        """Of motors from obstacles; the first motor is at rest, so that only overlaps count."""
+        found = [(j, apart(motor, coal_shape(one))) for j, motor in self.motors.items() for one in obstacles]
+        return min([np.inf, *(distance for j, distance in found if j > 0 or distance < 0.0)])
+
+
+def postures(arms: Sequence[Arm], t: int, seed: int) -> Array:
+    """(N, T, D) random joint values within the limits; 0 for joints that an arm does not have."""
+    rng, arrays = np.random.default_rng(seed), stack_arms(arms)
+    q = rng.uniform(arrays.lower[:, None], arrays.upper[:, None], (len(arms), t, arrays.dof))
+    return np.where(np.arange(arrays.dof) < arrays.n_joints[:, None, None], q, 0.0)
+
+
+# Against Coal, with the geometry of the exported URDF placed by Pinocchio
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_motor_clearance_agrees_with_coal(precision: Precision) -> None:
+    arms = [SPACE.arm(design) for design in SPACE.sample(40, 1)]
+    rng = np.random.default_rng(2)
+    obstacles = [random_obstacle(rng, kind, 1.0, 0.6) for kind in (*SHAPES[:3], *SHAPES[:3])]
+    q = postures(arms, 4, 3)
+    arrays = stack_arms(arms, precision)
+    own, clear = clearances(arrays, q, obstacles)
+    links_own, links_clear = clearances(replace(arrays, motor_bodies=None), q, obstacles)
+    nearer, free, hit = 0, 0, 0
+    for n, arm in enumerate(arms):
+        exported = Exported(arm)
+        for t in range(q.shape[1]):
+            exported.at(q[n, t, : len(arm.joints)])
+            theirs = min(links_own[n, t], exported.own_clearance())
+            nearer += theirs < links_own[n, t]
+            free, hit = free + (theirs > 0.0), hit + (theirs < 0.0)
+            assert agree(own[n, t], theirs), (own[n, t], theirs)
+            assert agree(clear[n, t], min(links_clear[n, t], exported.obstacle_clearance(obstacles)))
+    assert nearer > 40
+    assert min(free, hit) > 20
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_clearance_of_one_motor_agrees_with_coal(kind: str) -> None:
+    """A motor on a link that turns about its own axis, near an obstacle."""
+    rng = np.random.default_rng(SHAPES.index(kind))
+    n_free = n_hit = 0
+    for shape in ("box", "cylinder"):
+        for axis in ("x", "y", "z"):
+            arms = [turning_motor(rng, shape, axis) for _ in range(25)]
+            q = rng.uniform(-3.0, 3.0, (25, 1, 2))
+            obstacle = random_obstacle(rng, kind, 0.3)
+            found = clearances(stack_arms(arms), q, [obstacle])[1]
+            links = clearances(replace(stack_arms(arms), motor_bodies=None), q, [obstacle])[1]
+            for n, arm in enumerate(arms):
+                theirs = min(links[n, 0], Exported(arm).at(q[n, 0]).obstacle_clearance([obstacle]))
+                assert agree(found[n, 0], theirs), (shape, axis, found[n, 0], theirs)
+                n_free, n_hit = n_free + (theirs > 0.0), n_hit + (theirs < 0.0)
+    assert min(n_free, n_hit) > 10
+
+
+def turning_motor(rng: np.random.Generator, shape: Any, axis: Any) -> Arm:
+    x, y, z = rng.uniform(0.02, 0.3, 3).tolist()
+    if shape == "cylinder":
+        x, y, z = {"x": (x, y, y), "y": (x, y, x), "z": (x, x, z)}[axis]
+    body = MotorBody(shape, axis, (x, y, z), tuple(rng.uniform(-0.05, 0.05, 3).tolist()))
+    joints = (Joint("revolute", rng.choice(["x", "y", "z"]), -3.1, 3.1), Joint("revolute", axis, -3.1, 3.1, body=body))
+    links = (uniform_link((0.1, 0.0, 0.1), 0.1, 0.01), uniform_link((0.0, 0.0, 0.001), 0.1, 0.001))
+    return Arm(tuple(rng.uniform(-0.2, 0.2, 3).tolist()), joints, links)
+
+
+def test_depth_of_overlapping_boxes_is_the_least_translation_apart() -> None:
+    """Two boxes on a slide: their overlap shrinks as the second is moved out."""
+    bodies = MotorBody("box", "x", (0.06, 0.05, 0.04)), MotorBody("box", "x", (0.04, 0.06, 0.05))
+    joints = tuple(Joint("prismatic", "x", 0.0, 1.0, body=body) for body in bodies)
+    arm = Arm((0.0, 0.0, 0.0), joints, (uniform_link((0.0, 0.0, 0.01), 0.1, 0.001),) * 2)
+    shifts = np.array([0.0, 0.01, 0.02, 0.04, 0.05, 0.1, 0.2])
+    q = np.stack([shifts, np.zeros_like(shifts)], axis=1)[None]
+    found = clearances(stack_arms([arm]), q)[0][0]
+    assert found == pytest.approx([-0.035, -0.035, -0.03, -0.01, 0.0, 0.05, 0.15], abs=1e-5)
+
+
+# What must hold whatever the arm
+
+
+def test_stacked_designs_and_arms_have_equal_bodies() -> None:
+    space = DesignSpace.model_validate({**CONTENT, "joint_types": ["R", "P", "Y", "S", "X", "F"], "bracket_mass": 0.02})
+    designs = space.sample(100, 5)
+    arms = [space.arm(design) for design in designs]
+    one, other = stack_designs(space, space.matrix(designs)), stack_arms(arms)
+    assert one.motor_bodies is not None
+    assert other.motor_bodies is not None
+    for field in fields(MotorBodies):
+        mine, theirs = (getattr(arrays.motor_bodies, field.name) for arrays in (one, other))
+        assert mine.dtype == theirs.dtype
+        assert np.array_equal(mine, theirs), field.name
+    for name in ("mass", "com", "base_mass"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    q = postures(arms, 3, 6)
+    obstacles = [random_obstacle(np.random.default_rng(7), kind) for kind in SHAPES]
+    assert np.array_equal(clearances(one, q, obstacles), clearances(other, q, obstacles))
+    assert np.array_equal(np.array(clearances(one, q, obstacles))[:, 3:9], clearances(one[3:9], q[3:9], obstacles))
+
+
+def test_spaces_without_the_key_have_no_bodies() -> None:
+    plain = DesignSpace.model_validate({**CONTENT, "motor_bodies": False})
+    designs = plain.sample(20, 0)
+    assert stack_designs(plain, plain.matrix(designs)).motor_bodies is None
+    assert not any(plain.arm(design).has_motor_bodies for design in designs)
+    assert "motor_1_joint" not in to_urdf(plain.arm(designs[0]))
+
+
+def test_motors_need_longer_links_and_a_higher_base() -> None:
+    """The longer edge of an XM540-W270 is 58.5 mm, its shaft 12.5 mm off the middle, so 41.75 mm from the lower end."""
+    lengths = (0.05, 0.0585, 0.07, 0.2)
+    designs = [PITCH.clipped((0.0, 0.0, 0.0), "PPP", (length, 0.2, 0.2)) for length in lengths]
+    own = clearances(stack_designs(PITCH, PITCH.matrix(designs)), np.zeros((len(lengths), 1, 3)))[0][:, 0]
+    assert own[:3] == pytest.approx([-0.0085, 0.0, 0.0115], abs=2e-5)
+    heights = (0.0, 0.03, 0.04174, 0.04176)
+    designs = [PITCH.clipped((0.0, 0.0, height), "PPP", (0.2, 0.2, 0.2)) for height in heights]
+    arms = stack_designs(PITCH, PITCH.matrix(designs))
+    clear = clearances(arms, np.zeros((len(heights), 1, 3)), [Ground(kind="ground")])[1][:, 0]
+    assert clear[:3] == pytest.approx([-0.04175, -0.01175, -1e-5], abs=2e-6)
+    assert clear[3] > 0.05, "a motor at rest may be close"
+
+
+def test_motor_bodies_may_not_collide() -> None:
+    task = Task(name="near", targets=((0.3, 0.0, 0.2),), obstacles=(Ground(kind="ground"),))
+    problem = Problem(task, PITCH)
+    assert [constraint.description for constraint in problem.constraints] == ["collision <= 0"]
+    short, low, free = (
+        PITCH.clipped((0.0, 0.0, height), "PPP", (length, 0.2, 0.2))
+        for height, length in ((0.05, 0.05), (0.03, 0.15), (0.05, 0.15))
+    )
+    violations = problem.evaluate([short, low, free]).violations[:, 0]
+    assert violations[0] >= 0.0084
+    assert violations[1] == pytest.approx(0.01175, abs=1e-5)
+    assert violations[2] == 0.0
+    bounded = task.model_copy(update={"constraints": ("clearance >= 0.01",)})
+    assert [constraint.description for constraint in Problem(bounded, PITCH).constraints] == ["clearance >= 0.01"]
+
+
+def test_contacts_in_mujoco_agree_with_the_clearance() -> None:
+    """The motors and links that touch in the exported simulation are those of a negative clearance."""
+    ground: tuple[Obstacle, ...] = (Ground(kind="ground", z=-0.3),)
+    surroundings = Surroundings(np.zeros((1, 3)), position_targets(1), ("one",), ground, 0.0, POINT_LOAD)
+    space = DesignSpace.model_validate(
+        {**CONTENT, "joint_types": ["R", "P", "Y", "F"], "mount": ["floor"], "origin_z": [0.2, 0.5]}
+    )
+    touching = 0
+    for design in space.sample(40, 8):
+        arm = space.arm(design)
+        moves = [joint.kind != "fixed" for joint in arm.joints]
+        model = mujoco.MjModel.from_xml_string(
+            to_simulation_mjcf(arm, surroundings, np.zeros((1, sum(moves))), np.ones(sum(moves)))
+        )
+        data = mujoco.MjData(model)
+        q = postures([arm], 10, 9)
+        own, clear = clearances(stack_arms([arm], "float64"), q, ground)
+        rigid_links = clearances(replace(stack_arms([arm], "float64"), motor_bodies=None), q, ground)
+        for t in range(10):
+            data.qpos[:] = q[0, t, moves]
+            mujoco.mj_forward(model, data)
+            names = [{model.geom(g).name.split("_")[0] for g in data.contact[c].geom} for c in range(data.ncon)]
+            motors = [kinds for kinds in names if "motor" in kinds]
+            nearest = min(own[0, t], clear[0, t])
+            if min(rigid_links[0][0, t], rigid_links[1][0, t]) > 1e-4 and abs(nearest) > 1e-4:
+                assert bool(motors) == (nearest < 0.0), (design, nearest, names)
+                touching += bool(motors)
+    assert touching > 20
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"actuators": ["XM430-W350", "FHA-14C-100"]}, "none for FHA-14C-100: width, height, depth"),
+        ({"actuators": [{"name": "own", "mass": 0.1, "stall_torque": 1.0, "width": 0.02, "depth": 0.03}]},
+         "none for own: height"),
+        ({"actuators": []}, "motor_bodies: expected actuators, got none"),
+        ({"joint_types": ["P", "O"]}, "got O with two at one place"),
+        ({"actuators": [{"name": "own", "mass": 0.1, "stall_torque": 1.0, "shaft_edge": "length"}]}, "shaft_edge"),
+        ({"bracket_mass": -0.1}, "bracket_mass"),
+    ],
+)  # fmt: skip
+def test_spaces_that_cannot_have_bodies_are_refused(content: dict[str, Any], message: str) -> None:
+    with pytest.raises((SpaceError, ValueError), match=message):
+        DesignSpace.model_validate({"actuators": ["XM430-W350"], "motor_bodies": True, **content})
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"shape": "sphere"},
+        {"axis": "w"},
+        {"size": (0.0, 0.1, 0.1)},
+        {"shape": "cylinder", "size": (0.1, 0.2, 0.1)},
+        {"centre": (float("nan"), 0.0, 0.0)},
+    ],
+)
+def test_invalid_motor_body_is_refused(body: dict[str, Any]) -> None:
+    with pytest.raises(ArmError, match="motor body"):
+        MotorBody(**{"shape": "box", "axis": "z", "size": (0.1, 0.1, 0.1), **body})
+    with pytest.raises(ArmError, match="fixed joint"):
+        Joint("fixed", "z", body=MotorBody("box", "z", (0.1, 0.1, 0.1)))
+
+
+def test_bracket_mass_adds_to_each_joint_that_moves() -> None:
+    content = {"joints": 3, "restrict": {"joint_2": "F"}, "joint_types": ["P", "F", "O"], "actuators": ["XL330-M288"]}
+    plain = DesignSpace.model_validate(content)
+    heavy = DesignSpace.model_validate({**content, "bracket_mass": 0.05})
+    for design in plain.sample(20, 2):
+        joints = sum(joint.kind != "fixed" for joint in plain.arm(design).joints)
+        assert heavy.arm(design).mass - plain.arm(design).mass == pytest.approx(0.05 * joints)
+    bare = DesignSpace.model_validate({"joints": 3, "bracket_mass": 0.05})
+    designs = bare.sample(5, 0)
+    one, other = stack_designs(bare, bare.matrix(designs)), stack_arms([bare.arm(design) for design in designs])
+    assert np.array_equal(one.mass, other.mass)
+    assert np.array_equal(one.base_mass, np.full(5, 0.05))
