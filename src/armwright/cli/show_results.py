@@ -13,6 +13,7 @@ from rich.text import Text
 
 from armwright.cli.notes import payload_note, unused_parts
 from armwright.cli.streams import format_point, list_files, plain_table
+from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.report.style import look
@@ -53,7 +54,9 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
         _show_proposer(console, summary["proposer"])
     is_scaled = TORQUE in problem.objectives
     notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if is_scaled else []
-    notes += [problem.space.mass_note, payload_note(problem.task), *unused_parts(problem)]
+    notes += [
+        problem.space.mass_note, payload_note(problem.task), describe_ignored_errors(problem), *unused_parts(problem),
+    ]  # fmt: skip
     console.print("; ".join(filter(None, notes)))
     _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))
@@ -96,7 +99,8 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
             f"considered {screening['considered']:,} designs: bounds discarded {screening['discarded_by_bounds']:,}, "
             f"estimates ranked the rest; {screening['evaluated_though_rejected']:,} evaluated though rejected"
         )
-    console.print(run.history.problem.space.mass_note)
+    problem = run.history.problem
+    console.print("; ".join(filter(None, (problem.space.mass_note, describe_ignored_errors(problem)))))
     _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))
     _show_files(console, run.folder, figures)

@@ -85,8 +85,8 @@ def cycle_constraints(task: Task, has_actuators: bool) -> tuple[str, ...]:
     tolerance = task.cycle.tolerance
     implied = {
         "unreached_targets": 0.0,
-        "path_error": tolerance.path,
-        **({"path_angle": tolerance.angle} if task.target_arrays.oriented else {}),
+        "path_error": tolerance.largest_distance,
+        **({"path_angle": tolerance.largest_angle} if task.target_arrays.oriented else {}),
         "jumps": 0.0,
         "collision": 0.0,
         **(dict.fromkeys(DRIVE_QUANTITIES, 1.0) if has_actuators else {}),

@@ -176,6 +176,16 @@ class Evaluation(Scene):
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
 
     @property
+    def excess_error(self) -> Array:
+        """(N, T) position error beyond the stated tolerance [m]; the error itself where none is stated."""
+        return np.maximum(self.position_error - self.target_arrays.stated_tolerance, 0.0)
+
+    @property
+    def excess_angle(self) -> Array:
+        """(N, T) angle error likewise [rad]."""
+        return np.maximum(self.angle_error - self.target_arrays.stated_angle_tolerance, 0.0)
+
+    @property
     def unreached(self) -> NDArray[np.bool_]:
         """(N, T) whether the tip or the tool's direction is off by a target's tolerance or more."""
         target_arrays = self.target_arrays

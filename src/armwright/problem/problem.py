@@ -257,7 +257,7 @@ class Problem:
         Raises:
             SettingsError: one is not a finite number.
         """
-        values = [measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives]
+        values = [measured[o.name] if o.name in measured else o.minimised(evaluation) for o in self.objectives]
         names = [f"objective {o.name}" for o in self.objectives]
         paths = evaluation.cycle_paths
         postures = None if paths is None else paths.entry

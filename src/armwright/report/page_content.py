@@ -17,6 +17,7 @@ from armwright.experiments.compare_arms import dominance_counts, read_existing_a
 from armwright.experiments.run_summary import describe_method
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pareto import hypervolume
+from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
 from armwright.report.page_cycles import cycle_motions, cycle_of_design
 from armwright.report.repeat_command import repeat_command
@@ -239,6 +240,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "targets": task.targets,
         "payloads": task.payloads,
         "cases": task.cases_description,
+        "ignored_errors": describe_ignored_errors(config.problem),
         "obstacles": [asdict(obstacle.solid) | {"description": obstacle.describe()} for obstacle in task.obstacles],
         "target_arrays": asdict(task.target_arrays) | {"oriented": task.target_arrays.oriented},
         "workspace": [{"low": r.low, "high": r.high, "description": r.describe()} for r in task.workspace],
