@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -113,11 +113,11 @@ def _show_assumed(console: Console, summary: dict[str, Any]) -> None:
 
 
 def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) -> None:
-    """Print the recommended designs of a task with a cycle, and whether they were verified in the simulator."""
+    """Print the recommended designs of a task with a cycle, whether they are verified, and what they survive."""
     for one in recommended:
         demoted = "".join(f"; #{other['design']} was demoted: {other['reason']}" for other in one["demoted"])
-        assumed = "" if one["assumed"] is None else f"; {one['assumed']['verdict']}"
-        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}{assumed}{demoted}")
+        survival = "perturbations not evaluated" if one["survival"] is None else one["survival"]["verdict"]
+        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}; {survival}{demoted}")
 
 
 def show_refined(console: Console, refined: RefinedRun) -> None:
@@ -191,8 +191,24 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
     console.print(table)
 
 
-def show_picked(console: Console, run: Path, history: History, picked: Sequence[FrontMember], most: int) -> None:
-    """Print the chosen designs and the command that exports the first."""
+def show_picked(
+    console: Console,
+    run: Path,
+    history: History,
+    picked: Sequence[FrontMember],
+    survival: Mapping[int, Mapping[str, Any]],
+    most: int,
+) -> None:
+    """Print the chosen designs and the command that exports the first.
+
+    Args:
+        console: The console.
+        run: The run folder.
+        history: Its trials.
+        picked: The chosen designs.
+        survival: Records of their survival by number.
+        most: Number of designs to print.
+    """
     console.print(f"{len(picked)} of the front's {len(history.front)} designs meet the conditions")
     for member in picked[:most]:
         values = ", ".join(map(_format_objective, history.problem.objectives, member.values))
@@ -208,6 +224,8 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
             console.print(f"  supply along its cycle: {supply.description}")
         if assumed := assumed_values(history.problem, [member.arm]):
             console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
+        if member.number in survival:
+            console.print(f"  perturbed: {survival[member.number]['verdict']}")
     first = picked[0].number
     console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
 

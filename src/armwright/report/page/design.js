@@ -107,12 +107,12 @@ function describeConstraints(i) {
   return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${values.join("; ")}.`;
 }
 
-// Says for what it is recommended, and whether its verdict holds.
+// Says for what it is recommended, whether it is verified, and which perturbations it survives.
 function describeRecommended(i) {
   const found = content.head.result.recommended.filter((one) => one.design === i);
   if (!found.length) return "";
-  const { status, assumed } = found[0], roles = found.map((one) => one.role).join(", ");
-  return ` Recommended (${roles}): ${status}${assumed ? `; ${assumed.verdict}` : ""}.`;
+  const { status, survival } = found[0], roles = found.map((one) => one.role).join(", ");
+  return ` Recommended (${roles}): ${status}; ${survival?.verdict ?? "perturbations not evaluated"}.`;
 }
 
 // Names the values of its motors that are assumed.
