@@ -14,8 +14,10 @@ from armwright.runs.recommendation import candidates, recommend
 from armwright.runs.results import read_summary
 from armwright.runs.selection import survival_of
 from armwright.runs.simulated_run import Simulator
-from armwright.runs.survival import PERTURBATIONS
-from tests.runs.test_simulation import Desk
+from armwright.runs.survival import HEAVIER, MOVED, PERTURBATIONS, SHIFTED, SUPPLY
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+from tests.runs.test_simulation import SPACE, Desk
 from tests.support.command_line import armwright, refused
 
 
@@ -98,6 +100,19 @@ def test_pick_states_which_perturbations_a_design_survives(run: Path) -> None:
         [one[key] for one in found["perturbations"]] for found in (survival, evaluated) for key in ("name", "changes")
     ]
     assert names[:2] == names[2:]
+
+
+def test_designs_without_a_cycle_are_perturbed_if_they_have_constraints() -> None:
+    for constraints, n in (([], 0), (["torque_utilisation <= 0.5"], 3)):
+        content = {"name": "hold", "targets": [[0.3, 0.0, 0.2]], "payload": 0.5, "constraints": constraints}
+        problem = aw.Problem(Task.model_validate(content), DesignSpace.model_validate(SPACE))
+        run = aw.optimize(problem, proposer="none", n_init=20, n_total=20, seed=0, verify=False)
+        recommended = run.summary.get("recommended", [])
+        assert len(recommended) == n
+        for one in recommended:
+            assert one["status"] == "not simulated"
+            names = [found["name"] for found in one["survival"]["perturbations"]]
+            assert names == [MOVED, SUPPLY, HEAVIER, SHIFTED]  # mass and torques of the motors are stated
 
 
 class Verdicts:

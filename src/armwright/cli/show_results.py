@@ -113,7 +113,7 @@ def _show_assumed(console: Console, summary: dict[str, Any]) -> None:
 
 
 def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) -> None:
-    """Print the recommended designs of a task with a cycle, whether they are verified, and what they survive."""
+    """Print the recommended designs, whether they are verified in the simulator, and what they survive."""
     for one in recommended:
         demoted = "".join(f"; #{other['design']} was demoted: {other['reason']}" for other in one["demoted"])
         survival = "perturbations not evaluated" if one["survival"] is None else one["survival"]["verdict"]

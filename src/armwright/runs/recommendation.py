@@ -22,7 +22,7 @@ OUT_OF_TIME = f"{NOT_SIMULATED}: the time is up"
 class HasTime(Protocol):
     """Return whether there is time for a number of simulations, and to evaluate the survival of some designs."""
 
-    def __call__(self, simulations: int, survivals: int) -> bool: ...
+    def __call__(self, simulations: int, survivals: int, /) -> bool: ...
 
 
 def unlimited(simulations: int, survivals: int) -> bool:
@@ -73,7 +73,7 @@ def candidates(history: History) -> dict[str, list[int]]:
 def recommend(
     history: History, simulator: Simulator | None = None, has_time: HasTime = unlimited
 ) -> list[Recommendation]:
-    """Return the recommended designs: simulated, unless MuJoCo is missing or a duration of the cycle is not known.
+    """Return the recommended designs: simulated, unless MuJoCo, a cycle or its durations are missing.
 
     Args:
         history: The trials.

@@ -12,6 +12,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import to_jsonable_python
+
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, replace_folder, to_csv
@@ -204,10 +206,10 @@ def _assumed_record(history: History) -> dict[str, Any]:
 
 
 def _recommended_record(history: History, has_time: HasTime) -> dict[str, Any]:
-    """Return the recommended designs, verified in the simulator; empty for a task without a cycle."""
-    if history.problem.task.cycle is None:
+    """Return the recommended designs; empty without constraints, which a cycle implies."""
+    if not history.problem.constraints:
         return {}
-    return {"recommended": [asdict(one) for one in recommend(history, has_time=has_time)]}
+    return {"recommended": to_jsonable_python(recommend(history, has_time=has_time))}
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:

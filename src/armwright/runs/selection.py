@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic_core import to_jsonable_python
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.runs.folder import read_run
@@ -156,7 +157,9 @@ def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int
     recommended = (read_summary(run) or {}).get("recommended", ())
     stored = {one["design"]: one["survival"] for one in recommended if one["survival"] is not None}
     missing = dict.fromkeys((number for number in numbers if number not in stored), False)
-    evaluated = {number: asdict(one) for number, one in evaluate_survival(history, missing).items()}
+    evaluated: dict[int, dict[str, Any]] = {
+        number: to_jsonable_python(one) for number, one in evaluate_survival(history, missing).items()
+    }
     return {number: one for number, one in {**stored, **evaluated}.items() if number in numbers}
 
 

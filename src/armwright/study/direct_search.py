@@ -305,8 +305,6 @@ class DirectSearch:
         design = seconds / len(history) + files_seconds(self.problem.task)
         if not history.front:
             return ResultCosts(design)
-        if self.problem.task.cycle is None:  # nothing is recommended
-            return ResultCosts(design, 0.0, 0.0)
         started, number = self.plan.elapsed, history.front[0].number
         with suppress(MissingExtraError, SettingsError):  # such designs are not simulated later, either
             Simulator(history)(number)
