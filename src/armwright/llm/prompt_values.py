@@ -10,6 +10,7 @@ from armwright.kinematics.ik import UPDATES
 from armwright.llm.answer_format import SINGLE, module_lists
 from armwright.llm.feedback import MAX_PROPOSED, MIN_PROPOSED, Feedback, Record, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
+from armwright.problem.ignored_errors import stated_tolerance
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     CLEARANCE_QUANTITIES,
@@ -223,9 +224,12 @@ def _task_specific(objective: Objective, task: Task) -> Objective:
         return replace(
             objective, description=f"1 where the tip misses the target by its tolerance{angle} or more, else 0"
         )
+    description = objective.description
+    if stated_tolerance(task, objective).any():
+        description = f"{description}, beyond the stated tolerance, else 0"
     if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(target_arrays.weight != 1.0):
-        return replace(objective, description=f"{objective.description}, times the target's weight")
-    return objective
+        description = f"{description}, times the target's weight"
+    return replace(objective, description=description)
 
 
 def _describe_tool(tool: Tool) -> str:
