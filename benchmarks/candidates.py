@@ -66,7 +66,7 @@ def feasible(cell: Task, designs: DesignSpace, candidates: int) -> Array:
     arms = stack_designs(designs, designs.matrix(designs.sample(N, seed=0)), cell.tool)
     paths = find_paths(arms, cell.plan(cell.target_positions), cell.obstacles, candidates)
     allowed = paths.plan.cycle.tolerance
-    good = (paths.path_error <= allowed.path) & (paths.path_angle <= allowed.angle) & ~paths.jumps
+    good = (paths.path_error <= allowed.largest_distance) & (paths.path_angle <= allowed.largest_angle) & ~paths.jumps
     good &= np.minimum(paths.self_clearance, paths.obstacle_clearance) >= 0.0
     reached = good.all(axis=1)
     poses = paths.plan.poses[[motion.end for motion in paths.plan.motions]]

@@ -55,6 +55,7 @@ from tests.support.fixed_problem import (
 GOLDEN = Path(__file__).parent / "golden"
 PAPER = FixedProblem(load_task("target-1"))
 OPEN = load_task("target-1").model_copy(update={"reference_point": None})  # for other objectives than the paper's
+WITHIN_5_MM = Task.model_validate({"name": "a", "targets": [{"position": [0.3, 0.1, 0.2], "tolerance": 0.005}]})
 ONE_POINT = Task(name="one", targets=((0.2, 0.0, 0.3),), reference_point=(5.0, 5.0))
 IN_THE_WAY = Task.model_validate(
     {
@@ -307,6 +308,15 @@ FACTS: dict[str, Facts] = {
             "A workshop builds to within 1 mm.",
             "the worst of the design as it stands and of 14 copies of it, each with one coordinate of ORIGIN or one "
             "link longer or shorter by that much.",
+        ),
+        (),
+    ),
+    "stated tolerances of targets": (
+        lambda: rendered(fixed_history(FixedProblem(WITHIN_5_MM)), "minus"),
+        (
+            "- target 1: tolerance 5 mm",
+            "- E_pos_i [m]: the distance between the tip and the target in the kept posture, beyond the stated "
+            "tolerance, else 0.",
         ),
         (),
     ),

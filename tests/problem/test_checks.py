@@ -159,8 +159,8 @@ def test_target_in_an_obstacle_is_suspected_unless_the_constraints_exclude_it() 
 )
 def test_target_on_a_surface_or_within_its_tolerance_is_fine(target: Any) -> None:
     assert found(problem([target], obstacles=[TABLE])) == []
-    bounds = ["collision <= 0", "unreached_targets <= 0"]
-    assert found(problem([target], obstacles=[TABLE], constraints=bounds, tool={"tip": [0, 0, 0.1]})) == []
+    bounds, tool = ["collision <= 0", "unreached_targets <= 0"], {"tip": [0, 0, 0.1]}
+    assert found(problem([target], obstacles=[TABLE], constraints=bounds, tool=tool, objectives=["torque"])) == []
 
 
 @pytest.mark.parametrize(

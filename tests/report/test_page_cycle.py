@@ -75,13 +75,25 @@ def test_motion_in_time_follows_the_joint_path(run: Path, tab: Tab, history: His
     assert tab.ask(f"armwright.during(armwright.content.head, {off_front}, 0)") is None
 
 
-def test_recommended_designs_say_whether_they_are_verified(run: Path, tab: Tab) -> None:
+def test_recommended_designs_say_whether_they_are_verified_and_what_they_survive(run: Path, tab: Tab) -> None:
     summary = read_summary(run)
     assert summary is not None
     first = summary["recommended"][0]
     tab.open(run / "report.html", f"#design={first['design']}")
     assert f"Recommended ({first['role']}" in tab.text("#design-summary")
-    assert f"): {first['status']}." in tab.text("#design-summary")
+    verdict = first["survival"]["verdict"]
+    assert verdict.startswith("holds ")
+    assert f"): {first['status']}; {verdict}." in tab.text("#design-summary")
+
+
+def test_page_says_which_objectives_ignore_errors_within_tolerances(tmp_path: Path, tab: Tab) -> None:
+    targets = [{"position": [0.3, 0.1, 0.2], "tolerance": 0.01}, [0.2, 0.3, 0.1]]
+    problem = aw.Problem(Task.model_validate({"name": "near", "targets": targets}))
+    aw.optimize(problem, proposer="none", n_init=2, n_total=2, verify=False, out=tmp_path)
+    write_report(tmp_path)
+    tab.open(tmp_path / "report.html", "#design=0")
+    text = " In this task, errors below the stated tolerances count as 0 in position_error."
+    assert text in tab.text("#design-note")
 
 
 def test_play_drives_the_arm_through_its_cycle(run: Path, tab: Tab, history: History) -> None:

@@ -12,8 +12,12 @@ import armwright as aw
 from armwright.runs.folder import read_run
 from armwright.runs.recommendation import candidates, recommend
 from armwright.runs.results import read_summary
+from armwright.runs.selection import survival_of
 from armwright.runs.simulated_run import Simulator
-from tests.runs.test_simulation import Desk
+from armwright.runs.survival import HEAVIER, MOVED, PERTURBATIONS, SHIFTED, SUPPLY
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.task import Task
+from tests.runs.test_simulation import SPACE, Desk
 from tests.support.command_line import armwright, refused
 
 
@@ -31,12 +35,14 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_finished_run_states_what_is_verified(run: Path) -> None:
     summary = read_summary(run)
     assert summary is not None
-    verdicts = [one.pop("assumed") for one in summary["recommended"]]
+    found = [one.pop("survival") for one in summary["recommended"]]
     assert summary["recommended"] == [
         {"role": role, "design": 0, "status": "verified", "demoted": []}
         for role in ("knee", "least peak_torque", "least length")
     ]
-    assert [list(verdict) for verdict in verdicts] == [["verdict", "changes", "broken", "simulated"]] * 3
+    assert [list(survival) for survival in found] == [["verdict", "perturbations", "simulated"]] * 3
+    names = [one["name"] for one in found[0]["perturbations"]]
+    assert names == list(PERTURBATIONS)
     assert {file.name for file in (run / "designs" / "0000").iterdir()} >= {"arm.xml", "trajectory.csv"}
 
 
@@ -55,7 +61,7 @@ def test_simulate_writes_and_prints_the_verdicts(run: Path) -> None:
         *("claimed_rms_torque", "peak_speed", "saturated_fraction"),
     ]
     assert json.loads((run / "simulation.json").read_text()) == content
-    assert "#0, verified; not with rated_torque halved (thermal utilisation" in armwright("simulate", run).stdout
+    assert "#0, verified; holds all but: " in " ".join(armwright("simulate", run).stdout.split())
     place = run / "designs" / "0000"
     assert (place / "figures" / "simulation.png").is_file()
     rows = (place / "simulation.csv").read_text().splitlines()
@@ -78,6 +84,35 @@ def test_without_mujoco_designs_are_not_simulated(run: Path, monkeypatch: pytest
     _, history = read_run(run)
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert {one.status for one in recommend(history)} == {"not simulated"}
+
+
+def test_pick_states_which_perturbations_a_design_survives(run: Path) -> None:
+    summary = read_summary(run)
+    assert summary is not None
+    survival = summary["recommended"][0]["survival"]
+    assert f"perturbed: {survival['verdict']}" in " ".join(armwright("pick", run).stdout.split())
+    (picked,) = json.loads(armwright("pick", run, "--json").stdout)
+    assert picked["survival"] == survival
+    _, history = read_run(run)
+    assert survival_of(run, history, [0])[0] == survival
+    evaluated = survival_of(run.parent, history, [0])[0]  # without a summary
+    names = [
+        [one[key] for one in found["perturbations"]] for found in (survival, evaluated) for key in ("name", "changes")
+    ]
+    assert names[:2] == names[2:]
+
+
+def test_designs_without_a_cycle_are_perturbed_if_they_have_constraints() -> None:
+    for constraints, n in (([], 0), (["torque_utilisation <= 0.5"], 3)):
+        content = {"name": "hold", "targets": [[0.3, 0.0, 0.2]], "payload": 0.5, "constraints": constraints}
+        problem = aw.Problem(Task.model_validate(content), DesignSpace.model_validate(SPACE))
+        run = aw.optimize(problem, proposer="none", n_init=20, n_total=20, seed=0, verify=False)
+        recommended = run.summary.get("recommended", [])
+        assert len(recommended) == n
+        for one in recommended:
+            assert one["status"] == "not simulated"
+            names = [found["name"] for found in one["survival"]["perturbations"]]
+            assert names == [MOVED, SUPPLY, HEAVIER, SHIFTED]  # mass and torques of the motors are stated
 
 
 class Verdicts:
@@ -107,9 +142,10 @@ def test_failing_designs_are_demoted_with_their_reason() -> None:
 def test_recommended_designs_are_not_simulated_without_time() -> None:
     history = aw.optimize(aw.Problem(aw.load_task("target-1")), proposer="none", n_total=40, verify=False).history
     simulator = SimpleNamespace(members={})
-    chosen = recommend(history, cast("Simulator", simulator), has_time=lambda _: False)
+    chosen = recommend(history, cast("Simulator", simulator), has_time=lambda *_: False)
     assert [one.design for one in chosen] == [numbers[0] for numbers in candidates(history).values()]
     assert {one.status for one in chosen} == {"not simulated: the time is up"}
+    assert {one.survival for one in chosen} == {None}
 
 
 def test_ends_of_the_front_have_the_least_objectives() -> None:

@@ -211,8 +211,8 @@ def test_front_run_stopped_within_a_generation_resumes_identically(
 
 @pytest.mark.slow
 def test_front_outside_the_reference_box_is_kept_and_resumed(tmp_path: Path) -> None:
-    target = {"position": [9.0, 0.0, 0.0], "tolerance": 8.0}
-    far = Task.model_validate({"name": "far", "targets": [target], "reference_point": [1.0, 1.0]})
+    content = {"name": "far", "targets": [[9.0, 0.0, 0.0]], "reference_point": [1.0, 1.0]}
+    far = Task.model_validate(content | {"constraints": ["worst_error <= 12"]})
     for evaluations in (600, 900):
         run = find_front(Problem(far), evaluations=evaluations, out=tmp_path / "run")
         assert run.summary["hypervolume"]["final"] == 0.0

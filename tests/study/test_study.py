@@ -359,8 +359,8 @@ def test_settings_out_of_range_are_refused(settings: dict[str, int]) -> None:
 
 
 def test_front_outside_reference_box_has_no_hypervolume() -> None:
-    far = {"position": [9.0, 0.0, 0.0], "tolerance": 8.0}
-    problem = Problem(Task.model_validate({"name": "far", "targets": [far], "reference_point": [1.0, 1.0]}))
+    content = {"name": "far", "targets": [[9.0, 0.0, 0.0]], "reference_point": [1.0, 1.0]}
+    problem = Problem(Task.model_validate(content | {"constraints": ["worst_error <= 12"]}))
     run = short(problem=problem)
     assert run.hypervolume.tolist() == [0.0] * 8
     assert run.front

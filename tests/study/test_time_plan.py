@@ -182,16 +182,19 @@ def test_expensive_results_leave_fewer_designs_and_less_search(clock: Clock) -> 
     assert kept == [300, 300, 120, 12]
     plan.costs = ResultCosts(0.01, simulation=0.5)
     assert plan.search_left == pytest.approx(left[1] - 9 * 0.5)
+    plan.costs = ResultCosts(0.01, simulation=0.5, survival=0.25)
+    assert plan.search_left == pytest.approx(left[1] - 9 * 0.5 - 3 * 0.25)
 
 
-def test_simulations_need_time(clock: Clock) -> None:
+def test_simulations_and_perturbations_need_time(clock: Clock) -> None:
     plan = plan_of(clock, drawing=True, seconds=60.0)
-    plan.costs = ResultCosts(0.01, simulation=2.0)
-    assert plan.has_time_to_simulate(9, after=10.0)
+    plan.costs = ResultCosts(0.01, simulation=2.0, survival=1.0)
+    assert plan.has_time_for(9, 3, after=10.0)
     clock.wait(43.0)
-    assert plan.has_time_to_simulate(1, after=0.0)
-    assert not plan.has_time_to_simulate(1, after=10.0)
-    assert plan_of(clock, evaluations=5).has_time_to_simulate(10**9, after=1e9)
+    assert plan.has_time_for(1, 3, after=0.0)
+    assert not plan.has_time_for(1, 20, after=0.0)
+    assert not plan.has_time_for(0, 3, after=10.0)
+    assert plan_of(clock, evaluations=5).has_time_for(10**9, 10**9, after=1e9)
 
 
 @pytest.mark.parametrize("seconds", [1e-6, 1e-3, 0.02])

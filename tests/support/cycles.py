@@ -116,5 +116,5 @@ def own_joints(arm: Arm, q: Array) -> Array:
 def tolerated(paths: CyclePaths, rows: Sequence[int] | None = None) -> np.ndarray:
     """(N,) arms that stay within the tolerance of their lines, without a jump."""
     allowed = paths.plan.cycle.tolerance
-    good = (paths.path_error <= allowed.path) & (paths.path_angle <= allowed.angle) & ~paths.jumps
+    good = (paths.path_error <= allowed.largest_distance) & (paths.path_angle <= allowed.largest_angle) & ~paths.jumps
     return good.all(axis=1)

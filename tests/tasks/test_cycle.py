@@ -80,7 +80,8 @@ def test_defaults_of_a_cycle() -> None:
     cycle = task(steps(1, 2)).cycle
     assert cycle is not None
     assert (cycle.closed, cycle.time, cycle.dwell, cycle.approach) == (True, "fastest", 0.0, None)
-    assert cycle.tolerance == PathTolerance(path=0.002, angle=0.02)
+    assert cycle.tolerance == PathTolerance(path=None, angle=None)
+    assert (cycle.tolerance.largest_distance, cycle.tolerance.largest_angle) == (0.002, 0.02)
     assert {(step.by, step.do, step.time) for step in cycle.steps} == {("joint", None, None)}
     assert task(None).cycle is None
     assert task(None).cycle_description == ""

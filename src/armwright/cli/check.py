@@ -14,6 +14,7 @@ from armwright.problem.checks.finding import SUSPECTED, Finding
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.checks.reach import longest_reach
 from armwright.problem.checks.sampling import check_by_sampling
+from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.problem import Problem
 from armwright.runs.config import record_objectives
 from armwright.runs.folder import CONFIG
@@ -107,6 +108,8 @@ def show_check(console: Console, problem: Problem) -> None:
     show_cycle(console, problem.task)
     minimised = ", ".join(f"{objective.name} [{objective.unit}]" for objective in problem.objectives)
     console.print(f"  minimised: {minimised}")
+    if ignored := describe_ignored_errors(problem):
+        console.print(f"  {ignored}")
     space, tie = problem.space, dict(problem.space.tie)
     low, high = space.min_joints, space.max_joints
     console.print(

@@ -30,23 +30,25 @@ def pick(
     """Choose designs of RUN's front by conditions, one quantity or weights; by default, its knee."""
     from armwright.cli.show_results import show_picked
     from armwright.runs.path_report import path_record
-    from armwright.runs.selection import numbers_of, pick_from, read_condition, read_weights
+    from armwright.runs.selection import numbers_of, pick_from, read_condition, read_weights, survival_of
 
     if n < 1:
         raise SettingsError(f"-n {n}: expected a whole number from 1")
     conditions = [read_condition(text) for text in where or ()]
     weighed = None if weights is None else read_weights(weights)
     history, picked = pick_from(run, conditions, by, weighed, robust)
+    survival = survival_of(run, history, [member.number for member in picked[:n]])
     if json_:
         print_json(
             [
                 {"number": m.number, "source": m.source, "joints": m.design.joints, **numbers_of(history, m)}
                 | path_record(history.evaluation([m.number]), 0)
+                | ({"survival": survival[m.number]} if m.number in survival else {})
                 for m in picked[:n]
             ]
         )
         return
-    show_picked(open_console(), run, history, picked, n)
+    show_picked(open_console(), run, history, picked, survival, n)
 
 
 def export(

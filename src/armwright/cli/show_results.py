@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from rich.text import Text
 
 from armwright.cli.notes import payload_note, unused_parts
 from armwright.cli.streams import format_point, list_files, plain_table
+from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import POSITION_ERROR, TORQUE, TORQUE_SCALE
 from armwright.report.style import look
@@ -53,7 +54,9 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
         _show_proposer(console, summary["proposer"])
     is_scaled = TORQUE in problem.objectives
     notes = [f"torque = {TORQUE_SCALE:g} x the sum over the targets of |joint torques|"] if is_scaled else []
-    notes += [problem.space.mass_note, payload_note(problem.task), *unused_parts(problem)]
+    notes += [
+        problem.space.mass_note, payload_note(problem.task), describe_ignored_errors(problem), *unused_parts(problem),
+    ]  # fmt: skip
     console.print("; ".join(filter(None, notes)))
     _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))
@@ -96,7 +99,8 @@ def show_search(console: Console, run: FrontRun, figures: Sequence[Path]) -> Non
             f"considered {screening['considered']:,} designs: bounds discarded {screening['discarded_by_bounds']:,}, "
             f"estimates ranked the rest; {screening['evaluated_though_rejected']:,} evaluated though rejected"
         )
-    console.print(run.history.problem.space.mass_note)
+    problem = run.history.problem
+    console.print("; ".join(filter(None, (problem.space.mass_note, describe_ignored_errors(problem)))))
     _show_assumed(console, summary)
     show_recommended(console, summary.get("recommended", ()))
     _show_files(console, run.folder, figures)
@@ -109,11 +113,11 @@ def _show_assumed(console: Console, summary: dict[str, Any]) -> None:
 
 
 def show_recommended(console: Console, recommended: Sequence[dict[str, Any]]) -> None:
-    """Print the recommended designs of a task with a cycle, and whether they were verified in the simulator."""
+    """Print the recommended designs, whether they are verified in the simulator, and what they survive."""
     for one in recommended:
         demoted = "".join(f"; #{other['design']} was demoted: {other['reason']}" for other in one["demoted"])
-        assumed = "" if one["assumed"] is None else f"; {one['assumed']['verdict']}"
-        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}{assumed}{demoted}")
+        survival = "perturbations not evaluated" if one["survival"] is None else one["survival"]["verdict"]
+        console.print(f"recommended, {one['role']}: #{one['design']}, {one['status']}; {survival}{demoted}")
 
 
 def show_refined(console: Console, refined: RefinedRun) -> None:
@@ -187,8 +191,24 @@ def show_runs(console: Console, listed: Sequence[dict[str, Any]]) -> None:
     console.print(table)
 
 
-def show_picked(console: Console, run: Path, history: History, picked: Sequence[FrontMember], most: int) -> None:
-    """Print the chosen designs and the command that exports the first."""
+def show_picked(
+    console: Console,
+    run: Path,
+    history: History,
+    picked: Sequence[FrontMember],
+    survival: Mapping[int, Mapping[str, Any]],
+    most: int,
+) -> None:
+    """Print the chosen designs and the command that exports the first.
+
+    Args:
+        console: The console.
+        run: The run folder.
+        history: Its trials.
+        picked: The chosen designs.
+        survival: Records of their survival by number.
+        most: Number of designs to print.
+    """
     console.print(f"{len(picked)} of the front's {len(history.front)} designs meet the conditions")
     for member in picked[:most]:
         values = ", ".join(map(_format_objective, history.problem.objectives, member.values))
@@ -205,6 +225,8 @@ def show_picked(console: Console, run: Path, history: History, picked: Sequence[
             console.print(f"  supply along its cycle: {supply.description}")
         if assumed := assumed_values(history.problem, [member.arm]):
             console.print(f"  assumed values of actuators: {count_assumed(assumed)} (listed in its design.json)")
+        if member.number in survival:
+            console.print(f"  perturbed: {survival[member.number]['verdict']}")
     first = picked[0].number
     console.print(f"armwright export {shlex.quote(str(run))} --design {first} --format urdf | mjcf | sheet, or another")
 

@@ -66,12 +66,12 @@ def simulate(
 
 def _simulate_chosen(simulator: "Simulator", design: int | None, every: bool) -> list[dict[str, Any]]:
     """Simulate the chosen designs; return the recommended ones if those were chosen."""
-    from dataclasses import asdict
+    from pydantic_core import to_jsonable_python
 
     from armwright.runs.recommendation import recommend
 
     if design is None and not every:
-        return [asdict(one) for one in recommend(simulator.history, simulator)]
+        return to_jsonable_python(recommend(simulator.history, simulator))
     for number in [member.number for member in simulator.history.front] if design is None else [design]:
         simulator(number)
     return []

@@ -46,12 +46,18 @@ def placed_at(arm: Arm, position: Sequence[float]) -> Arm:
     return replace(arm, base=(x, y, z))
 
 
-def known_values(quantity: Objective, evaluation: Evaluation) -> Array | None:
-    """Return (N,) values of existing arms; None if their URDFs lack drives, prices, or the shape of links."""
+def known_values(quantity: Objective, evaluation: Evaluation, minimised: bool = False) -> Array | None:
+    """Return (N,) values of existing arms; None if their URDFs lack drives, prices, or the shape of links.
+
+    Args:
+        quantity: The quantity.
+        evaluation: Physics of the arms.
+        minimised: Return its value as an objective, which ignores errors below stated tolerances.
+    """
     if quantity in CLEARANCE_QUANTITIES:
         return None
     try:
-        return quantity(evaluation)
+        return quantity.minimised(evaluation) if minimised else quantity(evaluation)
     except SettingsError:
         return None
 

@@ -220,7 +220,7 @@ def _compared(
     problem: Problem, history: History | None, name: str, arm: Arm, base: Vector, notes: Sequence[str] = ()
 ) -> ComparedArm:
     evaluation = problem.physics_of_arms(stack_arms([arm]))
-    values = tuple(_value(objective, evaluation) for objective in problem.objectives)
+    values = tuple(_value(objective, evaluation, minimised=True) for objective in problem.objectives)
     bounds = [(constraint, _value(constraint.quantity, evaluation)) for constraint in problem.constraints]
     violated = tuple(
         f"{constraint.description} (it has {value:.3g})"
@@ -247,8 +247,8 @@ def _compared(
     )
 
 
-def _value(quantity: Objective, evaluation: Evaluation) -> float | None:
-    values = known_values(quantity, evaluation)
+def _value(quantity: Objective, evaluation: Evaluation, minimised: bool = False) -> float | None:
+    values = known_values(quantity, evaluation, minimised)
     return None if values is None else float(values[0])
 
 

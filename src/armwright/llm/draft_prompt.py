@@ -11,6 +11,7 @@ from armwright.exceptions import SettingsError
 from armwright.llm.prompt import rendered
 from armwright.problem.objectives import MAX_OBJECTIVES, OBJECTIVES, PAPER_OBJECTIVES
 from armwright.robot.actuators import ActuatorRecord, catalogue
+from armwright.robot.tubes import MATERIALS
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.joint_modules import JOINT_DESCRIPTIONS
 from armwright.tasks.task import MAX_TARGETS, Task
@@ -62,25 +63,29 @@ def draft_prompt(description: str) -> str:
 
 
 def draft_schema() -> dict[str, Any]:
-    """Return the JSON schema of the answer, in which actuators are names of the catalogue."""
+    """Return the JSON schema of the answer, in which actuators and materials are names."""
     schema = _plain(DraftAnswer.model_json_schema(mode="serialization"))
     actuators = schema["$defs"]["DesignSpace"]["properties"]["actuators"]
     actuators["items"] = {"type": "string", "enum": list(catalogue())}
-    del schema["$defs"]["ActuatorRecord"]
+    schema["$defs"]["LinkSection"]["properties"]["material"] = {"type": "string", "enum": list(MATERIALS)}
+    for record in ("ActuatorRecord", "Material"):
+        del schema["$defs"][record]
     return schema
 
 
 def _plain(schema: Any) -> Any:
     """Return a schema without titles, which repeat the names, and with tuples of one type as arrays of it.
 
-    Not all servers know `prefixItems`. Optional keys that may be null are left out instead, which saves 500 tokens.
+    Not all servers know `prefixItems`. Optional keys that may be null are left out instead, and so are the largest
+    numbers, which no sensible answer meets: this saves 900 tokens.
     """
     if isinstance(schema, list):
         return [_plain(item) for item in cast("list[Any]", schema)]
     if not isinstance(schema, dict):
         return schema
     fields = cast("dict[str, Any]", schema).items()
-    plain = {key: _plain(value) for key, value in fields if key != "title" or not isinstance(value, str)}
+    names = {"title": str, "maximum": (int, float)}  # a property may have such a name; its value is a mapping
+    plain = {key: _plain(value) for key, value in fields if not isinstance(value, names.get(key, ()))}
     items: list[Any] = plain.get("prefixItems", [])
     if items and all(item == items[0] for item in items):
         plain["items"] = plain.pop("prefixItems")[0]

@@ -95,7 +95,7 @@ class Feedback:
         self.digits = Digits.of(history)
         if self._rows:
             self._evaluation = history.evaluation(list(self._rows))
-            shares = [o.each(self._evaluation) for o in history.problem.objectives if o.is_of_targets]
+            shares = [o.shares(self._evaluation) for o in history.problem.objectives if o.is_of_targets]
             shape = (*self._evaluation.position_error.shape, 0)
             self._each = np.stack(shares, axis=-1) if shares else np.empty(shape)  # (n, T, objectives with shares)
 

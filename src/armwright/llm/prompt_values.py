@@ -10,6 +10,7 @@ from armwright.kinematics.ik import UPDATES
 from armwright.llm.answer_format import SINGLE, module_lists
 from armwright.llm.feedback import MAX_PROPOSED, MIN_PROPOSED, Feedback, Record, design_lines, points, vector
 from armwright.llm.model_options import PromptOptions
+from armwright.problem.ignored_errors import stated_tolerance
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     CLEARANCE_QUANTITIES,
@@ -185,9 +186,9 @@ def _space_values(space: DesignSpace) -> dict[str, Any]:
 
 
 def _describe_radius(space: DesignSpace) -> str:
-    """Describe the radius of the links."""
+    """Describe the radius of the links, as in "a bar of …"."""
     if len(space.tube_names) > 1:
-        return f"half the outer diameter of {'its tube' if space.link_section.per_link else 'the tube'}"
+        return f"the outer diameter of {'tube_j' if space.link_section.per_link else 'tube'}"
     return f"radius {space.tube_values('radius')[0]:g} m"
 
 
@@ -223,9 +224,12 @@ def _task_specific(objective: Objective, task: Task) -> Objective:
         return replace(
             objective, description=f"1 where the tip misses the target by its tolerance{angle} or more, else 0"
         )
+    description = objective.description
+    if stated_tolerance(task, objective).any():
+        description = f"{description}, beyond the stated tolerance, else 0"
     if objective in (POSITION_ERROR, ORIENTATION_ERROR) and np.any(target_arrays.weight != 1.0):
-        return replace(objective, description=f"{objective.description}, times the target's weight")
-    return objective
+        description = f"{description}, times the target's weight"
+    return replace(objective, description=description)
 
 
 def _describe_tool(tool: Tool) -> str:

@@ -93,8 +93,8 @@ def _cycle_bounds(cycle: Cycle, oriented: bool, has_actuators: bool) -> dict[str
     tolerance = cycle.tolerance
     return {
         "unreached_targets": 0.0,
-        "path_error": tolerance.path,
-        **({"path_angle": tolerance.angle} if oriented else {}),
+        "path_error": tolerance.largest_distance,
+        **({"path_angle": tolerance.largest_angle} if oriented else {}),
         "jumps": 0.0,
         "collision": 0.0,
         **(dict.fromkeys(DRIVE_QUANTITIES, 1.0) if has_actuators else {}),

@@ -36,7 +36,7 @@ def lower_bounds(problem: Problem, matrix: Array) -> Outcomes:
     values = np.zeros((len(matrix), len(problem.objectives)))
     for column, objective in enumerate(problem.objectives):
         if objective in (*EXACT, *OF_REACH):
-            values[:, column] = objective(evaluation)
+            values[:, column] = objective.minimised(evaluation)
         elif OBJECTIVES.get(objective.name) != objective:
             values[:, column] = -math.inf
     violations = np.full((len(matrix), len(problem.constraints)), -math.inf)

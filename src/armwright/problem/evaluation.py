@@ -100,6 +100,11 @@ class Evaluation(Scene):
             raise SettingsError(NO_CYCLE)
         return self.cycle_paths
 
+    @property
+    def entry_postures(self) -> Array | None:
+        """(N, B, D) posture at the first pose of each block of the cycle [rad] or [m]; None without a cycle."""
+        return None if self.cycle_paths is None else self.cycle_paths.entry
+
     @cached_property
     def torque_terms(self) -> list[tuple[TorqueTerms, ...]]:
         """Terms of the torques along the cycle, for each group of arms."""
@@ -182,6 +187,16 @@ class Evaluation(Scene):
         return np.linalg.norm(reached.astype(np.float64) - points, axis=-1)
 
     @property
+    def excess_error(self) -> Array:
+        """(N, T) position error beyond the stated tolerance [m]; the error itself where none is stated."""
+        return np.maximum(self.position_error - self.target_arrays.stated_tolerance, 0.0)
+
+    @property
+    def excess_angle(self) -> Array:
+        """(N, T) angle error likewise [rad]."""
+        return np.maximum(self.angle_error - self.target_arrays.stated_angle_tolerance, 0.0)
+
+    @property
     def unreached(self) -> NDArray[np.bool_]:
         """(N, T) whether the tip or the tool's direction is off by a target's tolerance or more."""
         target_arrays = self.target_arrays
@@ -255,7 +270,7 @@ def evaluate_arrays(
     scene: Scene,
     device: Device = "cpu",
     initial_q: ArrayLike | None = None,
-    near: CyclePaths | None = None,
+    near: Array | None = None,
     roughly_near: Array | None = None,
 ) -> Evaluation:
     """Evaluate stacked arms at every target of a scene, in their precision.
@@ -266,7 +281,8 @@ def evaluate_arrays(
         device: where the arms are evaluated.
         initial_q: initial joint values [rad] or [m] that broadcast to (N, T, D); None for the straight posture. The
             restarts of the targets begin elsewhere. Where the cycle stops, its postures count instead.
-        near: Paths of N similar arms through the cycle, whose postures the arms keep; None to choose postures.
+        near: (N, B, D) postures at the first pose of each block of the cycle, such as those of similar arms, which the
+            arms keep as far as they can; None to choose postures.
         roughly_near: (N, B, D) postures near those at the first pose of each block of the cycle, from which the paths
             are estimated (`rough_paths`); None for the paths themselves.
     """
@@ -294,8 +310,7 @@ def evaluate_arrays(
         paths, postures = None, nearest()
     else:
         if roughly_near is None:
-            entry = None if near is None else near.entry
-            paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=entry)
+            paths = find_paths(arrays, scene.plan, scene.obstacles, device=device, near=near)
         else:
             paths = rough_paths(arrays, scene.plan, roughly_near, scene.obstacles, device)
         q = paths.postures(len(targets))

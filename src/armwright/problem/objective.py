@@ -19,6 +19,7 @@ class Objective:
     Attributes:
         description: The quantity at one target, or for `over="arm"` of the arm, for readers new to this program.
         each: Its value per target, (N, T); for `over="arm"` of the arm itself, (N,).
+        excess: What of this value an objective minimises, if not all: of errors, what exceeds the stated tolerances.
         over: How the values become one: their sum, maximum, minimum or root mean square.
         label: Its name in tables and figures; by default the name in words.
         symbol: Its name in formulas and prompts; by default E_name.
@@ -31,14 +32,25 @@ class Objective:
     over: Over = "sum"
     label: str = ""
     symbol: str = ""
+    excess: Callable[[Evaluation], Array] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", self.label or self.name.replace("_", " ").capitalize())
         object.__setattr__(self, "symbol", self.symbol or f"E_{self.name}")
 
     def __call__(self, evaluation: Evaluation) -> Array:
-        """Return one value per arm, (N,)."""
-        each = self.each(evaluation)
+        """Return one value per arm, (N,), as constraints bound it."""
+        return self._total(self.each(evaluation))
+
+    def minimised(self, evaluation: Evaluation) -> Array:
+        """Return one value per arm, (N,), as searches minimise it."""
+        return self._total(self.shares(evaluation))
+
+    def shares(self, evaluation: Evaluation) -> Array:
+        """Return the shares of the targets in the minimised value, (N, T); for `over="arm"` the value itself, (N,)."""
+        return (self.excess or self.each)(evaluation)
+
+    def _total(self, each: Array) -> Array:
         match self.over:
             case "sum":
                 return each.sum(axis=1)

@@ -29,6 +29,7 @@ POSITION_ERROR = Objective(
     symbol="E_pos",
     description="the distance between the tip and the target in the kept posture",
     each=lambda e: e.target_arrays.weight * e.position_error,
+    excess=lambda e: e.target_arrays.weight * e.excess_error,
 )
 TORQUE = Objective(
     name="torque",
@@ -44,6 +45,7 @@ WORST_ERROR = Objective(
     symbol="E_worst",
     description=POSITION_ERROR.description,
     each=lambda e: e.position_error,
+    excess=lambda e: e.excess_error,
     over="max",
 )
 UNREACHED_TARGETS = Objective(
@@ -60,6 +62,7 @@ ORIENTATION_ERROR = Objective(
     description="the angle between the tool's axis (or frame) and the target's in the kept posture; 0 where it has "
     "none",
     each=lambda e: e.target_arrays.weight * e.angle_error,
+    excess=lambda e: e.target_arrays.weight * e.excess_angle,
 )
 WORST_ANGLE = Objective(
     name="worst_angle",
@@ -68,6 +71,7 @@ WORST_ANGLE = Objective(
     symbol="E_angle",
     description=ORIENTATION_ERROR.description,
     each=lambda e: e.angle_error,
+    excess=lambda e: e.excess_angle,
     over="max",
 )
 PEAK_TORQUE = Objective(
@@ -147,6 +151,7 @@ PATH_ERROR = Objective(
     description="the largest distance between the tip and where it should be on the lines of the steps to the target; "
     "0 where there are none",
     each=lambda e: e.largest_on_motions(e.paths.path_error),
+    excess=lambda e: e.largest_on_motions(e.paths.path_error - (e.paths.plan.cycle.tolerance.path or 0.0)),
     over="max",
 )
 PATH_ANGLE = Objective(
@@ -157,6 +162,7 @@ PATH_ANGLE = Objective(
     description="the largest angle between the tool and the direction that it should have on the lines of the steps "
     "to the target; 0 where there are none",
     each=lambda e: e.largest_on_motions(e.paths.path_angle),
+    excess=lambda e: e.largest_on_motions(e.paths.path_angle - (e.paths.plan.cycle.tolerance.angle or 0.0)),
     over="max",
 )
 JUMPS = Objective(

@@ -9,7 +9,6 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.exceptions import EvaluatorError, SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
-from armwright.kinematics.cycle_path import CyclePaths
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
@@ -234,7 +233,7 @@ class Problem:
         matrix = designs if isinstance(designs, np.ndarray) else self.space.matrix(designs)
         return self.physics_of_arms(self.arms(matrix))
 
-    def physics_of_arms(self, arms: ArmArrays, case: int = 0, near: CyclePaths | None = None) -> Evaluation:
+    def physics_of_arms(self, arms: ArmArrays, case: int = 0, near: Array | None = None) -> Evaluation:
         """Return the kinematics and statics of arms at all targets in one case; near as in `evaluate_arrays`."""
         return evaluate_arrays(arms, self.scenes[case], self.device, near=near)
 
@@ -261,11 +260,10 @@ class Problem:
         Raises:
             SettingsError: one is not a finite number.
         """
-        values = [measured[o.name] if o.name in measured else o(evaluation) for o in self.objectives]
+        values = [measured[o.name] if o.name in measured else o.minimised(evaluation) for o in self.objectives]
         names = [f"objective {o.name}" for o in self.objectives]
-        paths = evaluation.cycle_paths
-        postures = None if paths is None else paths.entry
-        return Outcomes(_finite(values, names, len(evaluation)), self.violations(evaluation), postures=postures)
+        columns = _finite(values, names, len(evaluation))
+        return Outcomes(columns, self.violations(evaluation), postures=evaluation.entry_postures)
 
     def violations(self, evaluation: Evaluation) -> Array:
         """Return the (N, C) violations of evaluated arms; SettingsError if one is not a finite number."""
@@ -294,8 +292,9 @@ class Problem:
         for case in range(len(self.scenes)):
             exact = self.physics(matrix) if case == 0 else self.physics_of_arms(self.arms(matrix), case)
             yield exact
+            near = exact.entry_postures
             for rows in perturbed(self.space, matrix, self.tolerance) if self.tolerance > 0.0 else ():
-                yield self.physics_of_arms(self.arms(rows), case, near=exact.cycle_paths)
+                yield self.physics_of_arms(self.arms(rows), case, near)
 
     @cached_property
     def _postures(self) -> int:

@@ -157,7 +157,8 @@ def pulled_origin(history: History, member: FrontMember) -> Array:
     evaluation = history.evaluation([member.number])
     miss = evaluation.targets - evaluation.reached[0]  # (T, 3)
     error = evaluation.position_error[0][:, None]  # (T, 1)
-    direction = np.where(error > REACHED, miss / np.maximum(error, REACHED), 0.0)
+    reached = np.maximum(evaluation.target_arrays.stated_tolerance[:, None], REACHED)  # (T, 1)
+    direction = np.where(error > reached, miss / np.maximum(error, reached), 0.0)
     return np.array(member.design.origin) + PULL * direction.mean(axis=0)
 
 

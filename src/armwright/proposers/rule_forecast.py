@@ -28,7 +28,7 @@ class Forecast:
     """Forecast of N designs.
 
     Attributes:
-        error: (N,) position error, summed over the targets [m].
+        error: (N,) position error beyond stated tolerances, summed over the targets [m].
         torque: (N,) torque, summed over the targets [α-scaled].
         length: (N,) from pivot to tip [m].
     """
@@ -49,6 +49,7 @@ def forecast(problem: Problem, designs: Sequence[Design]) -> Forecast:
     moment = moment[:, None] + scene.payload * payload_lever[:, None]  # (N, T) of the stretched, level arm
     lever = np.sqrt((share * stretch) ** 2 + BULGE * (1.0 - stretch**2))
     error = np.maximum(distance - length[:, None], 0.0) + LEFT
+    error = np.maximum(error - scene.target_arrays.stated_tolerance, 0.0)
     return Forecast(error.sum(axis=1), TORQUE_SCALE * GRAVITY * (moment * lever).sum(axis=1), length)
 
 

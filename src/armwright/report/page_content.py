@@ -18,6 +18,7 @@ from armwright.experiments.run_summary import describe_method
 from armwright.kinematics.motor_bodies import NO_BODY, MotorBodies
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pareto import hypervolume
+from armwright.problem.ignored_errors import describe_ignored_errors
 from armwright.problem.objectives import TORQUE, TORQUE_SCALE
 from armwright.report.page_cycles import cycle_motions, cycle_of_design
 from armwright.report.repeat_command import repeat_command
@@ -250,6 +251,7 @@ def _about(config: RunConfig, folder: Path, history: History, spent: int | None)
         "targets": task.targets,
         "payloads": task.payloads,
         "cases": task.cases_description,
+        "ignored_errors": describe_ignored_errors(config.problem),
         "obstacles": [asdict(obstacle.solid) | {"description": obstacle.describe()} for obstacle in task.obstacles],
         "target_arrays": asdict(task.target_arrays) | {"oriented": task.target_arrays.oriented},
         "workspace": [{"low": r.low, "high": r.high, "description": r.describe()} for r in task.workspace],

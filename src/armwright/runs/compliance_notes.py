@@ -31,11 +31,15 @@ def compliance_notes(arm: Arm, evaluation: Evaluation) -> Iterator[str]:
 def _over_reach(arm: Arm) -> str:
     found = payloads_over_reach(arm, FRACTIONS)
     held = [
-        f"{payload:.3g} kg at {fraction:.0%}"
+        f"{_mass(payload)} at {fraction:.0%}"
         for fraction, payload in zip(FRACTIONS, found.payloads, strict=True)
         if not np.isnan(payload)
     ]
     return f", {' and '.join(held)} of the reach of {found.reach:.3g} m" if held else ""
+
+
+def _mass(payload: float) -> str:
+    return f"{payload:.3g} kg" if payload < MAX_MASS else "any payload"
 
 
 def _known(quantity: Objective, evaluation: Evaluation) -> float | None:

@@ -111,7 +111,7 @@ def describe_faults(evaluation: Evaluation, row: int) -> str:
         return ""
     extremes, allowed = path_extremes(paths, row), paths.plan.cycle.tolerance
     faults = [f"jump in step {step}" for step in jumping_steps(paths, row)]
-    for name, bound in (("path_error", allowed.path), ("path_angle", allowed.angle)):
+    for name, bound in (("path_error", allowed.largest_distance), ("path_angle", allowed.largest_angle)):
         if name in extremes and extremes[name].value > bound:
             faults.append(_describe(name, extremes[name]))
     clearance = extremes.get("clearance")

@@ -1,21 +1,33 @@
 """The recommended designs of a front: its knee and its two ends, each verified in the simulator.
 
-For each it is stated whether its verdict holds if assumed values of its actuators are halved or doubled.
+For each it is stated which perturbations it survives.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from armwright.exceptions import MissingExtraError, SettingsError
-from armwright.runs.assumed_changes import FACTORS, AssumedVerdict, vary_assumed
 from armwright.runs.history import History
 from armwright.runs.ranking import knee_first
 from armwright.runs.simulated_run import Simulator
 from armwright.runs.simulation import PASS
+from armwright.runs.survival import FACTORS, Survival, evaluate_survival
 
 MAX_TRIED = 10  # designs for each role
 VERIFIED, NOT_SIMULATED = "verified", "not simulated"
 OUT_OF_TIME = f"{NOT_SIMULATED}: the time is up"
+
+
+class HasTime(Protocol):
+    """Return whether there is time for a number of simulations, and to evaluate the survival of some designs."""
+
+    def __call__(self, simulations: int, survivals: int, /) -> bool: ...
+
+
+def unlimited(simulations: int, survivals: int) -> bool:
+    """Return True: there is time for everything."""
+    return True
 
 
 @dataclass(frozen=True)
@@ -36,14 +48,14 @@ class Recommendation:
         status: `verified`, `not verified: reason` if each design that was tried failed, or `not simulated`, with the
             reason if the time was up.
         demoted: The designs tried before.
-        assumed: Whether this holds with assumed values halved and doubled; None without assumed values.
+        survival: Which perturbations it survives; None without constraints, or if the time was up.
     """
 
     role: str
     design: int
     status: str
     demoted: tuple[Demoted, ...] = ()
-    assumed: AssumedVerdict | None = None
+    survival: Survival | None = None
 
 
 def candidates(history: History) -> dict[str, list[int]]:
@@ -59,34 +71,37 @@ def candidates(history: History) -> dict[str, list[int]]:
 
 
 def recommend(
-    history: History, simulator: Simulator | None = None, has_time: Callable[[int], bool] = lambda _: True
+    history: History, simulator: Simulator | None = None, has_time: HasTime = unlimited
 ) -> list[Recommendation]:
-    """Return the recommended designs: simulated, unless MuJoCo is missing or a duration of the cycle is not known.
+    """Return the recommended designs: simulated, unless MuJoCo, a cycle or its durations are missing.
 
     Args:
         history: The trials.
         simulator: Keeps what it simulates; None for a new one.
-        has_time: Returns whether there is time for a number of simulations.
+        has_time: Returns whether there is time.
     """
+    roles = candidates(history)
     try:
         simulator = simulator or Simulator(history)
-        chosen = [_verified(role, numbers, simulator, has_time) for role, numbers in candidates(history).items()]
+        chosen = [_verified(role, numbers, simulator, has_time, len(roles)) for role, numbers in roles.items()]
     except (MissingExtraError, SettingsError):
-        chosen = [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in candidates(history).items()]
-    changed = {one.design for one in chosen if one.status == VERIFIED}
-    if not has_time(len(FACTORS) * len(changed)):
-        changed = set[int]()
-    verified = {one.design: one.design in changed for one in chosen}
-    assumed = vary_assumed(history, verified)
-    return [replace(one, assumed=assumed.get(one.design)) for one in chosen]
+        chosen = [Recommendation(role, numbers[0], NOT_SIMULATED) for role, numbers in roles.items()]
+    verified = {one.design: one.status == VERIFIED for one in chosen}
+    if not has_time(0, len(verified)):
+        return chosen
+    if not has_time(len(FACTORS) * sum(verified.values()), len(verified)):
+        verified = dict.fromkeys(verified, False)
+    survival = evaluate_survival(history, verified)
+    return [replace(one, survival=survival.get(one.design)) for one in chosen]
 
 
 def _verified(
-    role: str, numbers: Sequence[int], simulator: Simulator, has_time: Callable[[int], bool]
+    role: str, numbers: Sequence[int], simulator: Simulator, has_time: HasTime, survivals: int
 ) -> Recommendation:
+    """Return the first design that passes in the simulator; survivals: designs whose survival needs time as well."""
     demoted: list[Demoted] = []
     for number in numbers[:MAX_TRIED]:
-        if not has_time(1) and number not in simulator.members:
+        if not has_time(1, survivals) and number not in simulator.members:
             return Recommendation(role, number, OUT_OF_TIME, tuple(demoted))
         result = simulator(number).result
         if result.verdict == PASS:

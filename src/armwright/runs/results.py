@@ -7,10 +7,12 @@ designs/NNNN/             each design of the front (design_folders.py)
 
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+from pydantic_core import to_jsonable_python
 
 from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
@@ -25,7 +27,7 @@ from armwright.runs.front_gap import front_gap
 from armwright.runs.history import History
 from armwright.runs.infeasibility import ViolationTally, feasibility_record
 from armwright.runs.proposer_bias import proposer_bias
-from armwright.runs.recommendation import recommend
+from armwright.runs.recommendation import HasTime, recommend, unlimited
 from armwright.runs.summary import ProposerSummary, parse_summary
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify_front
@@ -149,7 +151,7 @@ def summarize_front(
     search: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
-    has_time: Callable[[int], bool] = lambda _: True,
+    has_time: HasTime = unlimited,
 ) -> dict[str, Any]:
     """Return the content of summary.json for a direct search.
 
@@ -160,7 +162,7 @@ def summarize_front(
         search: Evaluations, seconds, why it ended, and the hypervolume over the evaluations.
         verification: Verification of the front; None if it was not verified.
         tally: All evaluated designs by the constraints that they satisfy.
-        has_time: Returns whether there is time for a number of simulations of recommended designs.
+        has_time: Returns whether there is time for simulations and survival of recommended designs.
     """
     volume = {"final": hypervolume(found, history.reference_point or ())}
     return {
@@ -177,7 +179,7 @@ def _common_record(
     volume: Mapping[str, Any],
     verification: Verification | None,
     tally: ViolationTally | None = None,
-    has_time: Callable[[int], bool] = lambda _: True,
+    has_time: HasTime = unlimited,
 ) -> dict[str, Any]:
     """Return what the summaries of studies and direct searches have in common; found: (N, M) values of the front."""
     reference = history.reference_point
@@ -203,11 +205,11 @@ def _assumed_record(history: History) -> dict[str, Any]:
     return {"assumed": assumed} if assumed else {}
 
 
-def _recommended_record(history: History, has_time: Callable[[int], bool]) -> dict[str, Any]:
-    """Return the recommended designs, verified in the simulator; empty for a task without a cycle."""
-    if history.problem.task.cycle is None:
+def _recommended_record(history: History, has_time: HasTime) -> dict[str, Any]:
+    """Return the recommended designs; empty without constraints, which a cycle implies."""
+    if not history.problem.constraints:
         return {}
-    return {"recommended": [asdict(one) for one in recommend(history, has_time=has_time)]}
+    return {"recommended": to_jsonable_python(recommend(history, has_time=has_time))}
 
 
 def _verification_record(history: History, verification: Verification | None) -> dict[str, Any] | None:

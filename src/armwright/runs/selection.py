@@ -4,8 +4,10 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic_core import to_jsonable_python
 
 from armwright.exceptions import FailureError, SettingsError, did_you_mean
 from armwright.problem.objective import Objective
@@ -15,6 +17,7 @@ from armwright.runs.history import FrontMember, History
 from armwright.runs.infeasibility import describe_infeasibility
 from armwright.runs.ranking import knee_first
 from armwright.runs.results import read_summary
+from armwright.runs.survival import evaluate_survival
 from armwright.spaces.parameters import FloatParameter
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]\w*)\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
@@ -150,6 +153,20 @@ def pick_from(
             raise FailureError(f'{run} is not verified; armwright.verify_run("{run}") in Python verifies it')
         numbers = verification["robust_numbers"]
     return history, pick(history, where, by, weights, numbers)
+
+
+def survival_of(run: Path, history: History, numbers: Sequence[int]) -> dict[int, dict[str, Any]]:
+    """Return records of the survival of designs of a run by number, as in its summary; empty without constraints.
+
+    Those of recommended designs are read; the others are evaluated.
+    """
+    recommended = (read_summary(run) or {}).get("recommended", ())
+    stored = {one["design"]: one["survival"] for one in recommended if one["survival"] is not None}
+    missing = dict.fromkeys((number for number in numbers if number not in stored), False)
+    evaluated: dict[int, dict[str, Any]] = {
+        number: to_jsonable_python(one) for number, one in evaluate_survival(history, missing).items()
+    }
+    return {number: one for number, one in {**stored, **evaluated}.items() if number in numbers}
 
 
 def _evaluated(history: History, quantity: Objective) -> dict[int, float]:

@@ -40,9 +40,9 @@ class Simulator:
     """
 
     def __init__(self, history: History) -> None:
-        mujoco_version()
         if history.problem.task.cycle is None:
             raise SettingsError(f"task {history.problem.task.name} has no cycle to simulate; try cycle: in_order")
+        mujoco_version()
         self.history = history
         self.members: dict[int, SimulatedMember] = {}
 

@@ -46,12 +46,18 @@ class _Broken(_Record):
     change: str
     constraint: str
     measured: float | None
+    violation: float | None
 
 
-class _AssumedVerdict(_Record):
-    verdict: str
+class _Perturbation(_Record):
+    name: str
     changes: Count
     broken: list[_Broken]
+
+
+class _Survival(_Record):
+    verdict: str
+    perturbations: list[_Perturbation]
     simulated: list[str]
 
 
@@ -60,7 +66,7 @@ class _Recommended(_Record):
     design: Count
     status: str
     demoted: list[_Demoted]
-    assumed: _AssumedVerdict | None = None
+    survival: _Survival | None = None
 
 
 class _Age(_Record):

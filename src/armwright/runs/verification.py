@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.kinematics.cycle_path import CyclePaths
 from armwright.pareto import masked_objectives
 from armwright.problem.evaluation import Evaluation, evaluate_arrays
 from armwright.problem.problem import Outcomes, Problem, worst_case
@@ -73,9 +72,9 @@ def verify(
     matrix = problem.space.matrix(designs)
     evaluations = _evaluate(problem, matrix)
     exact = _outcomes(problem, evaluations)
-    paths = [evaluation.cycle_paths for evaluation in evaluations]
+    near = [evaluation.entry_postures for evaluation in evaluations]
     copies = perturbed(problem.space, matrix)
-    moved = worst_case([_outcomes(problem, _evaluate(problem, rows, near=paths)) for rows in copies])
+    moved = worst_case([_outcomes(problem, _evaluate(problem, rows, near=near)) for rows in copies])
     started = exact if _visits_all(problem) else _started(problem, matrix)
     allowed = values + np.maximum(ALLOWED_SHARE * values, ALLOWED_OF_REFERENCE * np.asarray(reference_point))
     built = worst_case([exact, moved])
@@ -104,7 +103,7 @@ def _started(problem: Problem, matrix: Array) -> Outcomes:
 
 
 def _evaluate(
-    problem: Problem, matrix: Array, start: Array | None = None, near: Sequence[CyclePaths | None] = ()
+    problem: Problem, matrix: Array, start: Array | None = None, near: Sequence[Array | None] = ()
 ) -> list[Evaluation]:
     """Evaluate designs in float64 in all cases of the task.
 
@@ -112,12 +111,12 @@ def _evaluate(
         problem: The problem.
         matrix: (N, P) designs.
         start: (T, D) start posture [rad]; None for the straight one.
-        near: Paths of similar arms in each case, whose postures the designs keep.
+        near: Postures of similar arms in each case, which the designs keep (`evaluate_arrays`).
     """
     arrays, near = problem.arms(matrix, "float64"), near or [None] * len(problem.scenes)
     return [
-        evaluate_arrays(arrays, scene, initial_q=start, near=paths)
-        for scene, paths in zip(problem.scenes, near, strict=True)
+        evaluate_arrays(arrays, scene, initial_q=start, near=postures)
+        for scene, postures in zip(problem.scenes, near, strict=True)
     ]
 
 

@@ -20,6 +20,7 @@ from armwright.runs.history import FRONT_SEARCH, History
 from armwright.runs.infeasibility import ViolationTally
 from armwright.runs.results import complete_summary, discard_results, read_summary, summarize_front, write_results
 from armwright.runs.simulated_run import Simulator
+from armwright.runs.survival import evaluate_survival
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify, verify_front
 from armwright.search.front_search import FrontSearch
@@ -238,7 +239,7 @@ class DirectSearch:
                 statistics,
                 verification,
                 self.tally,
-                lambda n: self.plan.has_time_to_simulate(n, after),
+                lambda simulations, survivals: self.plan.has_time_for(simulations, survivals, after),
             )
 
         if self.folder is None:
@@ -304,11 +305,12 @@ class DirectSearch:
         design = seconds / len(history) + files_seconds(self.problem.task)
         if not history.front:
             return ResultCosts(design)
-        started = self.plan.elapsed
-        if self.problem.task.cycle is not None:
-            with suppress(MissingExtraError, SettingsError):  # such designs are not simulated later, either
-                Simulator(history)(history.front[0].number)
-        return ResultCosts(design, self.plan.elapsed - started)
+        started, number = self.plan.elapsed, history.front[0].number
+        with suppress(MissingExtraError, SettingsError):  # such designs are not simulated later, either
+            Simulator(history)(number)
+        simulated = self.plan.elapsed
+        evaluate_survival(history, {number: False})
+        return ResultCosts(design, simulated - started, self.plan.elapsed - simulated)
 
     def _front_trials(self, front: ReportedFront) -> list[FinishedTrial]:
         """Return the designs of a front as trials."""

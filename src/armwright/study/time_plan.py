@@ -1,8 +1,8 @@
 """Plan of the wall-clock time of a search: how much for evaluations, and how much for what follows them.
 
 Until the cost of results is measured on designs of the run, a fixed share is reserved for them. Afterwards, the reserve
-is what simulating the recommended designs and verifying the front, at most 300 designs, cost. If verification takes
-more than a share of the budget, fewer designs of the front are kept.
+is the cost of simulating and perturbing the recommended designs, and of verifying the front, at most 300 designs. If
+verification takes more than a share of the budget, fewer designs of the front are kept.
 """
 
 import math
@@ -20,11 +20,12 @@ SEARCH_SHARE = 0.3  # of the budget that the search gets at least
 RESULTS_SHARE = 0.2  # of the budget at most, to verify and write designs
 FEW_SHARE = 0.4  # of the budget at most, to verify and write few designs
 LATE_SECONDS = 1.0  # [s] for verifying and writing designs even if the time is up
-SIMULATION_SHARE = 0.15  # of the budget at most
+RECOMMENDED_SHARE = 0.2  # of the budget at most, to simulate and perturb the recommended designs
 UNKNOWN_SHARE = 0.3  # of the budget for results whose costs are unknown
 MEASURED_AT = 0.2  # spent share of the budget from which on costs are measured
 DRAWING_SHARE, DRAWING_SECONDS = 0.15, (2.5, 6.0)  # [s]: page and figures
-SIMULATIONS = 9  # three recommended designs, each as it is and with assumed values halved and doubled
+RECOMMENDED = 3  # designs
+SIMULATIONS = 9  # of these, each as it is and with assumed values halved and doubled
 CHUNK_SHARE, CHUNK_SECONDS = 0.02, (0.5, 5.0)  # of the budget between two looks at the clock, and its bounds [s]
 FILES_SECONDS, CYCLE_FILES_SECONDS = 0.004, 0.05  # [s] of a design's files and its part of the page; with a cycle
 SMALLEST_CHUNK, CHUNK_GROWTH = 16, 4  # designs, of which fewer take nearly as long; largest factor to the next chunk
@@ -37,10 +38,12 @@ class ResultCosts:
     Attributes:
         design: time to verify a design and write its files [s].
         simulation: time to simulate a design [s]; None while none is feasible.
+        survival: time to evaluate the survival of a design [s].
     """
 
     design: float
     simulation: float | None = None
+    survival: float = 0.0
 
 
 class TimePlan:
@@ -127,7 +130,7 @@ class TimePlan:
             return MAX_DESIGNS
         if self.costs is None:
             return 1
-        seconds = max(self.left_for_results - self._simulations, min(LATE_SECONDS, RESULTS_SHARE * self._limit))
+        seconds = max(self.left_for_results - self._for_recommended, min(LATE_SECONDS, RESULTS_SHARE * self._limit))
         affordable = seconds / max(self.costs.design, 1e-9)
         return int(min(MAX_DESIGNS, max(1.0, affordable)))
 
@@ -135,9 +138,15 @@ class TimePlan:
         """Return whether a time is more than a share of what the budget leaves to this session."""
         return seconds > share * (self._limit - self.earlier)
 
-    def has_time_to_simulate(self, n: int, after: float) -> bool:
-        """Return whether n simulations fit in before what follows them, page and figures aside, which takes `after`."""
-        return self.left_for_results - after >= n * self._simulation
+    def has_time_for(self, simulations: int, survivals: int, after: float) -> bool:
+        """Return whether there is time to simulate some designs, and to evaluate the survival of some.
+
+        Args:
+            simulations: number of simulations.
+            survivals: number of designs whose survival is evaluated.
+            after: time that writing the files takes afterwards [s]; page and figures follow.
+        """
+        return self.left_for_results - after >= self._seconds_for(simulations, survivals)
 
     @property
     def _reserved(self) -> float:
@@ -147,17 +156,17 @@ class TimePlan:
         n_designs = max(FEW_DESIGNS, min(MAX_DESIGNS, self.n_found))
         all_designs = min(RESULTS_SHARE * self._limit, n_designs * self.costs.design)
         few_designs = min(FEW_SHARE * self._limit, FEW_DESIGNS * self.costs.design)
-        return self._simulations + max(all_designs, few_designs)
+        return self._for_recommended + max(all_designs, few_designs)
 
     @property
-    def _simulations(self) -> float:
-        """Time for the simulations of recommended designs [s]."""
-        return min(SIMULATION_SHARE * self._limit, SIMULATIONS * self._simulation)
+    def _for_recommended(self) -> float:
+        """Time to simulate and perturb the recommended designs [s]."""
+        return min(RECOMMENDED_SHARE * self._limit, self._seconds_for(SIMULATIONS, RECOMMENDED))
 
-    @property
-    def _simulation(self) -> float:
-        """Time of a simulation, as far as it is known [s]."""
-        return (self.costs.simulation if self.costs is not None else None) or 0.0
+    def _seconds_for(self, simulations: int, survivals: int) -> float:
+        """Return the time of simulations and evaluations of survival, as far as it is known [s]."""
+        costs = self.costs or ResultCosts(0.0)
+        return simulations * (costs.simulation or 0.0) + survivals * costs.survival
 
 
 def files_seconds(task: Task) -> float:

@@ -15,6 +15,8 @@ IN_ORDER = "in_order"  # a line to each target in turn
 FASTEST = "fastest"
 MAX_STEPS = 1000
 MAX_DURATION = 1e4  # [s]
+NEAR_LINE = 2e-3  # [m] from a line
+NEAR_DIRECTION = 0.02  # [rad] likewise
 _BY: Mapping[By, str] = {"line": "a line", "joint": "a joint motion"}
 
 
@@ -70,12 +72,22 @@ class PathTolerance(Strict, frozen=True):
     """Largest deviations of the tool along lines.
 
     Attributes:
-        path: Distance of the tip from the line [m].
-        angle: Angle of the tool from its direction or orientation [rad].
+        path: Distance of the tip from the line [m]; None for NEAR_LINE.
+        angle: Angle of the tool from its direction or orientation [rad]; None for NEAR_DIRECTION.
     """
 
-    path: float = Field(default=0.002, gt=0.0, le=1000.0)
-    angle: float = Field(default=0.02, gt=0.0, le=3.2)
+    path: float | None = Field(default=None, gt=0.0, le=1000.0)
+    angle: float | None = Field(default=None, gt=0.0, le=3.2)
+
+    @property
+    def largest_distance(self) -> float:
+        """The stated distance, else the default [m]."""
+        return self.path or NEAR_LINE
+
+    @property
+    def largest_angle(self) -> float:
+        """The stated angle, else the default [rad]."""
+        return self.angle or NEAR_DIRECTION
 
 
 class Cycle(Strict, frozen=True):

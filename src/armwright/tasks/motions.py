@@ -51,7 +51,10 @@ class Poses:
     @property
     def arrays(self) -> TargetArrays:
         """The directions and tolerances as the inverse kinematics takes them."""
-        return TargetArrays(self.n_angular, self.rotation, self.tolerance, self.angle_tolerance, np.ones(len(self)))
+        nothing = np.zeros(len(self))
+        return TargetArrays(
+            self.n_angular, self.rotation, self.tolerance, self.angle_tolerance, nothing + 1.0, nothing, nothing
+        )
 
 
 def stack_poses(parts: Sequence[Poses]) -> Poses:
@@ -181,9 +184,11 @@ class CyclePlan:
         at_end = share >= 1.0
         return replace(
             poses,
-            tolerance=np.where(at_end, np.minimum(allowed.path, self.poses.tolerance[motion.end]), allowed.path),
+            tolerance=np.where(
+                at_end, np.minimum(allowed.largest_distance, self.poses.tolerance[motion.end]), allowed.largest_distance
+            ),
             angle_tolerance=np.where(
-                at_end, np.minimum(allowed.angle, self.poses.angle_tolerance[motion.end]), allowed.angle
+                at_end, np.minimum(allowed.largest_angle, self.poses.angle_tolerance[motion.end]), allowed.largest_angle
             ),
         )
 
@@ -235,8 +240,8 @@ def plan_cycle(cycle: Cycle, targets: Sequence[int], positions: Array, arrays: T
         before = replace(
             before,
             position=before.position - shift,
-            tolerance=np.full(len(before), allowed.path),
-            angle_tolerance=np.full(len(before), allowed.angle),
+            tolerance=np.full(len(before), allowed.largest_distance),
+            angle_tolerance=np.full(len(before), allowed.largest_angle),
         )
         poses = stack_poses([poses, before])
     points = {target: len(positions) + i for i, target in enumerate(approached)}

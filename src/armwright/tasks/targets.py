@@ -43,6 +43,8 @@ class TargetArrays:
         tolerance: (T,) distance from which on a target counts as unreached [m].
         angle_tolerance: (T,) angle likewise [rad].
         weight: (T,) factor of a target's share of a sum of errors.
+        stated_tolerance: (T,) tolerance if the task states it, else 0: what an error objective ignores [m].
+        stated_angle_tolerance: (T,) angle likewise [rad].
         restarts: number of further starts of the inverse kinematics.
     """
 
@@ -51,6 +53,8 @@ class TargetArrays:
     tolerance: Array
     angle_tolerance: Array
     weight: Array
+    stated_tolerance: Array
+    stated_angle_tolerance: Array
     restarts: int = 0
 
     def __len__(self) -> int:
@@ -75,8 +79,8 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         position: Position of the tip [m].
         axis: World direction of the tool's z axis, of any length; the tool may rotate about it.
         orientation: Instead of an axis, roll, pitch and yaw of the tool about the fixed x, then y, then z [rad].
-        tolerance: Distance from which on the target counts as unreached [m].
-        angle_tolerance: Angle likewise, for a target with an axis or an orientation [rad].
+        tolerance: Distance from which on the target counts as unreached [m]; None for REACHED.
+        angle_tolerance: Angle likewise, for a target with an axis or an orientation [rad]; None for ALIGNED.
         weight: Factor of its share of a sum of errors.
     """
 
@@ -84,8 +88,8 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     position: Point
     axis: Point | None = None
     orientation: Point | None = None
-    tolerance: float = Field(default=REACHED, gt=0.0, le=MAX_COORDINATE)
-    angle_tolerance: float = Field(default=ALIGNED, gt=0.0, le=math.pi)
+    tolerance: float | None = Field(default=None, gt=0.0, le=MAX_COORDINATE)
+    angle_tolerance: float | None = Field(default=None, gt=0.0, le=math.pi)
     weight: float = Field(default=1.0, gt=0.0, le=MAX_WEIGHT)
 
     @field_validator("position", mode="before")
@@ -103,7 +107,7 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
             raise ValueError(
                 f"orientation: expected roll, pitch, yaw within ±2π rad, got {list(self.orientation)} (90° is 1.5708)"
             )
-        if self.axis is None and self.orientation is None and "angle_tolerance" in self.model_fields_set:
+        if self.axis is None and self.orientation is None and self.angle_tolerance is not None:
             raise ValueError("angle_tolerance needs an axis or an orientation")
         return self
 
@@ -140,8 +144,8 @@ class Target(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
         """Everything but the position, on one line; empty for a plain point."""
         parts = [] if self.axis is None else [f"axis {_vector(self.axis)}"]
         parts += [] if self.orientation is None else [f"orientation {_vector(self.orientation)} rad"]
-        parts += [f"tolerance {1e3 * self.tolerance:g} mm"] * (self.tolerance != REACHED)
-        parts += [f"angle tolerance {math.degrees(self.angle_tolerance):.4g}°"] * (self.angle_tolerance != ALIGNED)
+        parts += [] if self.tolerance is None else [f"tolerance {1e3 * self.tolerance:g} mm"]
+        parts += [] if self.angle_tolerance is None else [f"angle tolerance {math.degrees(self.angle_tolerance):.4g}°"]
         parts += [f"weight {self.weight:g}"] * (self.weight != 1.0)
         return ", ".join(parts)
 
@@ -186,9 +190,11 @@ def stack_targets(records: tuple[Target | None, ...], restarts: int) -> TargetAr
     return TargetArrays(
         n_angular=np.array([target.n_angular for target in targets], dtype=np.intp),
         rotation=np.array([target.rotation for target in targets]),
-        tolerance=np.array([target.tolerance for target in targets]),
-        angle_tolerance=np.array([target.angle_tolerance for target in targets]),
+        tolerance=np.array([target.tolerance or REACHED for target in targets]),
+        angle_tolerance=np.array([target.angle_tolerance or ALIGNED for target in targets]),
         weight=np.array([target.weight for target in targets]),
+        stated_tolerance=np.array([target.tolerance or 0.0 for target in targets]),
+        stated_angle_tolerance=np.array([target.angle_tolerance or 0.0 for target in targets]),
         restarts=restarts,
     )
 

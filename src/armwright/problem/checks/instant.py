@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from armwright.exceptions import TaskError
 from armwright.problem.checks.bounds import check_constraints
 from armwright.problem.checks.finding import Finding
+from armwright.problem.checks.idle_objectives import check_idle_objectives
 from armwright.problem.checks.inside_obstacles import check_obstacles
 from armwright.problem.checks.magnitudes import check_magnitudes
 from armwright.problem.checks.reach import check_reach
@@ -20,7 +21,9 @@ def check_instantly(problem: Problem) -> list[Finding]:
         SettingsError: An objective or a constraint needs actuators, a cycle or a workspace that the problem lacks.
     """
     check_requirements(problem)
-    checks = (check_reach, check_obstacles, check_constraints, check_strength, check_magnitudes)
+    checks = (
+        check_reach, check_obstacles, check_constraints, check_strength, check_magnitudes, check_idle_objectives,
+    )  # fmt: skip
     findings = [finding for check in checks for finding in check(problem)]
     return sorted(findings, key=lambda finding: not finding.is_proven)
 

@@ -95,7 +95,8 @@ export function drawDesign() {
   const boxes = head.workspace.length ? ` Workspace: ${head.workspace.map((box) => box.description).join("; ")}.` : "";
   const lines = head.cycle ? ` Cycle: ${head.cycle}.` : "";
   const cases = head.cases ? ` Objectives are the worst of the nominal task and ${head.cases}; everything else is of the nominal task.` : "";
-  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${loads} ${head.masses}.${describeAssumed(i)}${solids}${lines}${boxes}`;
+  const ignored = head.ignored_errors ? ` In this task, ${head.ignored_errors}.` : "";
+  $("design-note").textContent = `Angles q in rad${arm.kind.includes(1) ? ", strokes of prismatic joints in m" : ""}; underlined: at a joint's limit. Torques hold the posture against gravity.${scale}${cases}${ignored}${loads} ${head.masses}.${describeAssumed(i)}${solids}${lines}${boxes}`;
 }
 
 // Describes the quantities that constraints bound.
@@ -108,12 +109,12 @@ function describeConstraints(i) {
   return `${content.isFeasible(i) ? "Feasible" : "Infeasible"}; ${values.join("; ")}.`;
 }
 
-// Says for what it is recommended, and whether its verdict holds.
+// Says for what it is recommended, whether it is verified, and which perturbations it survives.
 function describeRecommended(i) {
   const found = content.head.result.recommended.filter((one) => one.design === i);
   if (!found.length) return "";
-  const { status, assumed } = found[0], roles = found.map((one) => one.role).join(", ");
-  return ` Recommended (${roles}): ${status}${assumed ? `; ${assumed.verdict}` : ""}.`;
+  const { status, survival } = found[0], roles = found.map((one) => one.role).join(", ");
+  return ` Recommended (${roles}): ${status}; ${survival?.verdict ?? "perturbations not evaluated"}.`;
 }
 
 // Names the values of its motors that are assumed.

@@ -1,0 +1,144 @@
+"""Errors below stated tolerances: 0 in objectives, in full in constraints, and nothing without stated ones."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armwright as aw
+from armwright.problem.checks.instant import check_instantly
+from armwright.problem.ignored_errors import describe_ignored_errors, stated_tolerance
+from armwright.problem.objectives import OBJECTIVES
+from armwright.problem.problem import Problem
+from armwright.spaces.design_space import default_space, paper_space
+from armwright.tasks.catalogue import builtin_names, load_task
+from armwright.tasks.targets import ALIGNED, REACHED
+from armwright.tasks.task import Task
+
+HERE, THERE = [0.3, 0.1, 0.2], [0.2, 0.3, 0.1]
+DOWN = {"axis": [0, 0, -1]}
+RESOLUTION = {"worst_error": 1e-9, "torque": 1e-9}  # so that the front is reported as the search finds it
+ERRORS = ("position_error", "worst_error", "orientation_error", "worst_angle")
+
+
+def task(*targets: Any, **keys: Any) -> Task:
+    return Task.model_validate({"name": "mine", "targets": targets, **keys})
+
+
+def problem(*targets: Any, joints: int = 4, **keys: Any) -> Problem:
+    return Problem(task(*targets, **keys), paper_space(joints))
+
+
+def test_errors_count_beyond_the_tolerances_of_their_targets() -> None:
+    stated = problem(
+        {"position": HERE, **DOWN, "tolerance": 0.3, "weight": 2.0},
+        {"position": THERE, **DOWN, "angle_tolerance": 1.2},
+        objectives=ERRORS,
+    )
+    found = stated.physics(stated.space.sample(300, 0))
+    distance = np.maximum(found.position_error - [0.3, 0.0], 0.0)
+    angle = np.maximum(found.angle_error - [0.0, 1.2], 0.0)
+    expected = [distance @ [2.0, 1.0], distance.max(axis=1), angle @ [2.0, 1.0], angle.max(axis=1)]
+    values = stated.outcomes(found).values
+    assert values == pytest.approx(np.column_stack(expected))
+    assert (distance[:, 0] == 0.0).any()
+    assert (angle[:, 1] == 0.0).any()
+
+
+def test_default_tolerances_leave_all_errors_to_the_bit() -> None:
+    plain = problem({"position": HERE, **DOWN, "weight": 2.0}, {"position": THERE, **DOWN}, objectives=ERRORS)
+    found = plain.physics(plain.space.sample(300, 0))
+    expected = np.column_stack([OBJECTIVES[name](found) for name in ERRORS])
+    assert np.array_equal(plain.outcomes(found).values, expected)
+
+
+def test_tolerances_change_no_builtin_task() -> None:
+    for name in builtin_names():
+        assert describe_ignored_errors(Problem(load_task(name), default_space(name))) == ""
+
+
+def test_constraints_bound_the_whole_error() -> None:
+    keys: dict[str, Any] = {"constraints": ["worst_error <= 0.05"], "objectives": ["worst_error", "torque"]}
+    wide, plain = problem({"position": HERE, "tolerance": 0.3}, **keys), problem(HERE, **keys)
+    designs = wide.space.sample(300, 0)
+    outcomes = wide.evaluate(designs)
+    assert np.array_equal(outcomes.violations, plain.evaluate(designs).violations)
+    assert np.any((outcomes.values[:, 0] == 0.0) & (outcomes.violations[:, 0] > 0.0))
+
+
+def test_stated_tolerances_survive_files_even_if_they_equal_the_defaults() -> None:
+    stated = task({"position": HERE, **DOWN, "tolerance": REACHED, "angle_tolerance": ALIGNED}, THERE)
+    plain = task({"position": HERE, **DOWN}, THERE)
+    assert stated != plain
+    again = Task.model_validate(stated.model_dump(mode="json"))
+    assert again == stated
+    for one in (stated, again):
+        assert one.target_arrays.stated_tolerance.tolist() == [REACHED, 0.0]
+        assert one.target_arrays.stated_angle_tolerance.tolist() == [ALIGNED, 0.0]
+    assert not plain.target_arrays.stated_tolerance.any()
+    for name in ("tolerance", "angle_tolerance"):
+        assert np.array_equal(getattr(stated.target_arrays, name), getattr(plain.target_arrays, name))
+
+
+def test_deviations_from_lines_count_beyond_the_tolerance_of_the_cycle() -> None:
+    keys: dict[str, Any] = {
+        "objectives": ["path_error", "path_angle"],
+        "cycle": {"steps": [{"to": 1}, {"to": 2, "by": "line"}]},
+    }
+    targets = [{"position": HERE, **DOWN}, {"position": THERE, **DOWN}]
+    plain = problem(*targets, joints=5, **keys)
+    keys["cycle"] = {**keys["cycle"], "tolerance": {"path": 0.05}}
+    stated = problem(*targets, joints=5, **keys)
+    designs = plain.space.sample(40, 0)
+    full, beyond = plain.evaluate(designs).values, stated.evaluate(designs).values
+    assert full[:, 0].max() > 0.05
+    assert np.array_equal(stated_tolerance(stated.task, OBJECTIVES["path_error"]), [0.05])
+    found = stated.physics(designs)
+    assert np.array_equal(beyond[:, 0], np.maximum(OBJECTIVES["path_error"](found) - 0.05, 0.0))
+    assert np.array_equal(beyond[:, 1], OBJECTIVES["path_angle"](found))
+    assert not stated_tolerance(plain.task, OBJECTIVES["path_error"]).any()
+
+
+def test_fronts_hold_one_design_within_the_tolerances() -> None:
+    """Without stated tolerances, many designs of the front differ by errors that nobody cares about."""
+    keys: dict[str, Any] = {
+        "objectives": ["worst_error", "torque"],
+        "reference_point": [1.0, 20.0],
+        "resolution": RESOLUTION,
+    }
+    space = paper_space().model_copy(update={f"origin_{axis}": (0.0, 0.0) for axis in "xyz"})
+    near: dict[str, int] = {}
+    for name, extra in (("plain", {}), ("stated", {"tolerance": 0.005})):
+        targets = ({"position": point, **extra} for point in (HERE, THERE))
+        run = aw.find_front(Problem(task(*targets, **keys), space), evaluations=4000, seed=0)
+        found = run.history.problem.physics([member.design for member in run.front])
+        errors = found.position_error.max(axis=1)
+        near[name] = int((errors < 0.005).sum())
+        assert len(run.front) > 5
+    assert near["stated"] == 1
+    assert near["plain"] > 1
+
+
+@pytest.mark.parametrize(
+    ("targets", "constraints", "n"),
+    [
+        ([{"position": HERE, "tolerance": 0.002}], ["unreached_targets <= 0"], 1),
+        ([{"position": HERE, "tolerance": 0.002}, THERE], ["unreached_targets <= 0"], 0),
+        ([{"position": HERE, "tolerance": 0.002}], [], 0),
+        ([HERE], ["unreached_targets <= 0"], 0),
+    ],
+)
+def test_objectives_that_no_feasible_design_can_improve_are_reported(
+    targets: list[Any], constraints: list[str], n: int
+) -> None:
+    keys: dict[str, Any] = {"objectives": ["worst_error", "torque"], "constraints": constraints}
+    found = [one for one in check_instantly(problem(*targets, **keys)) if "0 for every feasible design" in str(one)]
+    assert len(found) == n
+    assert all("worst_error" in str(one) for one in found)
+
+
+def test_descriptions_name_the_objectives() -> None:
+    stated = problem({"position": HERE, "tolerance": 0.002}, objectives=["position_error", "worst_error", "torque"])
+    text = "errors below the stated tolerances count as 0 in position_error and worst_error"
+    assert describe_ignored_errors(stated) == text
+    assert describe_ignored_errors(problem(HERE)) == ""
