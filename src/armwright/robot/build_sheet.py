@@ -114,6 +114,7 @@ def sheet_markdown(title: str, arm: Arm, rows: Sequence[SheetRow], notes: Iterab
     if arm.tool.mass > 0.0:
         lines += ["", f"The tool has {1e3 * arm.tool.mass:.4g} g."]
     lines += _actuator_lines(arm)
+    lines += _body_lines(arm)
     lines += [f"\n{note}" for note in notes]
     return "\n".join(lines) + "\n"
 
@@ -145,6 +146,23 @@ def _actuator_lines(arm: Arm) -> list[str]:
     text = f"Percentages are of their peak torques, with a safety factor of {arm.safety_factor:g}."
     ratings = [f"- {_ratings(motor)}" for motor in dict.fromkeys(motors)]
     return ["", f"{len(motors)} actuators of {mass:.4g} g{price}. {text}", "", *ratings]
+
+
+def _body_lines(arm: Arm) -> list[str]:
+    """Return where the bodies of the actuators are, if they count."""
+    bodies = [(n, joint.body) for n, joint in enumerate(arm.joints, start=1) if joint.body is not None]
+    if not bodies:
+        return []
+    lines = [
+        "",
+        "Bodies of the actuators, with all joints at 0: edges along x, y and z, and the middle from the joint.",
+        "",
+    ]
+    for n, body in bodies:
+        edges = " x ".join(f"{1e3 * edge:.4g}" for edge in body.size)
+        middle = ", ".join(f"{1e3 * value:.4g}" for value in body.centre)
+        lines.append(f"- joint {n}: {body.shape} of {edges} mm, shaft along {body.axis}, middle at ({middle}) mm")
+    return lines
 
 
 def _ratings(motor: Actuator) -> str:
