@@ -19,6 +19,7 @@ from armwright.kinematics.motor_bodies import MotorBodies
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.build_sheet import sheet_markdown, sheet_rows
+from armwright.robot.mjcf import to_mjcf
 from armwright.robot.motor_body import MotorBody
 from armwright.robot.sdf import to_sdf
 from armwright.robot.srdf import to_srdf
@@ -249,6 +250,23 @@ def test_srdf_disables_motors_and_the_links_that_they_join() -> None:
         ("motor_1", "link_1"), ("motor_2", "link_1"), ("motor_2", "link_2"), ("motor_4", "link_3"),
         ("motor_4", "link_2"), ("motor_4", "link_4"),
     }  # fmt: skip
+
+
+def test_bodies_do_not_change_dynamics_in_mujoco() -> None:
+    for design in SPACE.sample(5, 12):
+        arm = SPACE.arm(design)
+        plain = replace(arm, joints=tuple(replace(joint, body=None) for joint in arm.joints))
+        for export in (to_urdf, to_mjcf):
+            forces = []
+            for exported in (arm, plain):
+                model = mujoco.MjModel.from_xml_string(export(exported))
+                model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+                data = mujoco.MjData(model)
+                state = np.random.default_rng(13).uniform(-1.0, 1.0, (3, model.nv))
+                data.qpos[:], data.qvel[:], data.qacc[:] = state
+                mujoco.mj_inverse(model, data)
+                forces.append(data.qfrc_inverse.copy())
+            assert forces[0] == pytest.approx(forces[1], rel=1e-6, abs=1e-6)
 
 
 def test_build_sheet_says_where_motors_are() -> None:

@@ -59,8 +59,8 @@ class CyclePaths:
         groups: The joint paths.
         path_error: (N, M) largest distance of the tip from the line [m]; 0 for joint motions.
         path_angle: (N, M) largest angle of the tool from its direction along the line [rad].
-        self_clearance: (N, M) smallest distance of two links that are not neighbours [m].
-        obstacle_clearance: (N, M) smallest distance of a link from an obstacle [m].
+        self_clearance: (N, M) smallest distance of two links or motor bodies that are not neighbours [m].
+        obstacle_clearance: (N, M) smallest distance of a link or motor body from an obstacle [m].
         limit_distance: (N, M) smallest distance of a joint from its limits [rad] or [m].
         jumps: (N, M) True where the joint path is not continuous, or a joint meets its limit within a line, so that
             speeds are not.

@@ -204,7 +204,7 @@ class Evaluation(Scene):
 
     @property
     def self_clearance(self) -> Array:
-        """(N, T) smallest distance of two links that are not neighbours [m]; infinite where there are none.
+        """(N, T) smallest distance of two links or motor bodies that are not neighbours [m]; infinite without any.
 
         It and the other clearances are of a target's posture and of the motions of steps to it.
         """
@@ -212,7 +212,7 @@ class Evaluation(Scene):
 
     @property
     def obstacle_clearance(self) -> Array:
-        """(N, T) smallest distance of a link from an obstacle [m]; infinite where there is none."""
+        """(N, T) smallest distance of a link or motor body from an obstacle [m]; infinite where there is none."""
         return self._clearances[1]
 
     @property
