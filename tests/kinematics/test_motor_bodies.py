@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from armwright.exceptions import ArmError, SpaceError
 from armwright.kinematics.arm_arrays import Precision, stack_arms
-from armwright.kinematics.clearance import clearances
+from armwright.kinematics.clearance import clearances, straight_motor_clearance
+from armwright.kinematics.forward import link_lines
 from armwright.kinematics.motor_bodies import MotorBodies
+from armwright.problem.evaluation import evaluate
 from armwright.problem.problem import Problem
 from armwright.robot.arm import Arm, Joint, uniform_link
 from armwright.robot.build_sheet import sheet_markdown, sheet_rows
@@ -250,6 +252,22 @@ def test_srdf_disables_motors_and_the_links_that_they_join() -> None:
         ("motor_1", "link_1"), ("motor_2", "link_1"), ("motor_2", "link_2"), ("motor_4", "link_3"),
         ("motor_4", "link_2"), ("motor_4", "link_4"),
     }  # fmt: skip
+
+
+def test_motors_may_not_overlap_in_the_straight_posture() -> None:
+    """Boxes of 20 x 100 mm, 80 mm apart, overlap by 20 mm if the arm is straight, and are 20 mm apart if it is bent."""
+    joint = Joint("revolute", "y", -2.0, 2.0, body=MotorBody("box", "y", (0.02, 0.02, 0.1)))
+    links = uniform_link((0.0, 0.0, 0.08), 0.1, 0.01), uniform_link((0.0, 0.0, 0.2), 0.1, 0.01)
+    arm = Arm((0.0, 0.0, 0.0), (joint, joint), links)
+    bent = np.array([[[0.5 * np.pi, 0.0]]])
+    assert clearances(stack_arms([arm]), bent)[0][0, 0] == pytest.approx(0.02, abs=2e-5)
+    assert straight_motor_clearance(stack_arms([arm])) == pytest.approx([-0.02], abs=1e-5)
+    target = link_lines(arm, bent[0, 0])[-1][1]
+    evaluation = evaluate([arm], [target])
+    assert evaluation.position_error[0, 0] < 1e-3
+    assert evaluation.self_clearance[0, 0] == pytest.approx(-0.02, abs=1e-5)
+    plain = replace(arm, joints=tuple(replace(joint, body=None) for joint in arm.joints))
+    assert evaluate([plain], [target]).self_clearance[0, 0] == np.inf
 
 
 def test_bodies_do_not_change_dynamics_in_mujoco() -> None:

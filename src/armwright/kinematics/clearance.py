@@ -1,6 +1,7 @@
 """Clearance of posed arms from themselves and from obstacles: numpy in, numpy out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -49,6 +50,16 @@ def clearances(
         size = min(size, max(-(-n // 8), SMALLEST_CHUNK // t))
     in_chunks(measure, n, max(1, size), device)
     return distances[0], distances[1]
+
+
+def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
+    """Return the (N,) smallest distance of two motor bodies with all joints at 0, or at the limit nearest to it [m].
+
+    Motors that overlap there leave no room for the link between their joints.
+    """
+    motors = replace(arms, radius=np.zeros_like(arms.radius))  # links of radius 0 are ignored
+    straight = np.clip(0.0, arms.lower, arms.upper)[:, None].astype(np.float64)
+    return clearances(motors, straight, device=device)[0][:, 0]
 
 
 def _distances(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from armwright.arrays import Array
 from armwright.exceptions import SettingsError, TaskError
 from armwright.kinematics.arm_arrays import ArmArrays, carrying, stack_arms
-from armwright.kinematics.clearance import clearances
+from armwright.kinematics.clearance import clearances, straight_motor_clearance
 from armwright.kinematics.cycle_loads import CycleLoads, cycle_loads, holding_torques
 from armwright.kinematics.cycle_path import CyclePaths, find_paths, rough_paths
 from armwright.kinematics.devices import Device
@@ -206,7 +206,8 @@ class Evaluation(Scene):
     def self_clearance(self) -> Array:
         """(N, T) smallest distance of two links or motor bodies that are not neighbours [m]; infinite without any.
 
-        It and the other clearances are of a target's posture and of the motions of steps to it.
+        It and the other clearances are of a target's posture and of the motions of steps to it. Motor bodies may not
+        overlap in the straight posture either.
         """
         return self._clearances[0]
 
@@ -226,6 +227,8 @@ class Evaluation(Scene):
         if self.cycle_paths is not None:
             own = -self.largest_on_motions(-self.cycle_paths.self_clearance, -own)
             clear = -self.largest_on_motions(-self.cycle_paths.obstacle_clearance, -clear)
+        if self.arms.motor_bodies is not None:
+            own = np.minimum(own, straight_motor_clearance(self.arms, self.device)[:, None])
         return own, clear
 
 
