@@ -118,12 +118,13 @@ def described_arms(files: Mapping[str, Path]) -> dict[str, tuple[Path, UrdfArm]]
 
 def print_payloads(arms: Mapping[str, tuple[Path, UrdfArm]]) -> None:
     """Print the payloads over the reach of all cases."""
-    print("\n| arm | motors | reach | payload at 50 % | at 100 % |\n|---|---|--:|--:|--:|")
+    print("\n| arm | motors | mass of links | reach | payload at 50 % | at 100 % |\n|---|---|--:|--:|--:|--:|")
     for case in CASES:
         if case.arm in arms:
-            found = payloads_over_reach(driven(arms[case.arm][1].arm, case.torques))
+            arm = arms[case.arm][1].arm
+            mass, found = sum(link.mass for link in arm.links), payloads_over_reach(driven(arm, case.torques))
             near, far = (f"{payload:.2f} kg" for payload in found.payloads)
-            print(f"| {case.arm} | {case.motors} | {found.reach:.3f} m | {near} | {far} |")
+            print(f"| {case.arm} | {case.motors} | {mass:.2f} kg | {found.reach:.3f} m | {near} | {far} |")
 
 
 def driven(arm: Arm, torques: Sequence[float]) -> Arm:
@@ -143,7 +144,7 @@ def print_servos(arm: Arm) -> None:
     arms = replace(stacked, base=np.zeros_like(stacked.base))
     q = solve_postures(arms, np.array([[FAR, 0.0, 0.0]]), precision="float64").q
     frames, servos = forward_kinematics(arms, q), np.ones(arms.motion.shape)
-    print("\nso101, stretched horizontally")
+    print(f"\nso101, stretched: tip {1e3 * np.hypot(*frames.tip[0, 0, :2]):.0f} mm from the first axis")
     for text, backlash in BACKLASHES.items():
         play = np.radians(backlash) * servos
         tip, base = (
