@@ -1,15 +1,13 @@
-"""Payload, backlash, compliance and holding torques of existing arms, beside what others published or measured.
+"""Compare payloads, backlash, sag and holding torques of existing arms with what others published or measured.
 
-The descriptions come from `robot_descriptions`, or from URDF files:
+Prints the figures of docs/validation.md, which states the sources and where the URDF files are. Arms without a FILE
+come from `robot_descriptions`. Those that are not found are named and left out.
 
-    python benchmarks/validation.py so100=FILE so101=FILE openarm=FILE openarm-hand=FILE ur5e=FILE panda=FILE
-
-OpenArm is the right arm of the bimanual robot, from files only: xacro v10.urdf.xacro bimanual:=true hand:=false, and
-hand:=true for openarm-hand.
+    python benchmarks/validation.py so101=FILE openarm=FILE openarm-hand=FILE openarm-early=FILE ur5e=FILE panda=FILE
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +15,8 @@ import numpy as np
 import pinocchio
 
 from armwright.arrays import Array
-from armwright.kinematics.arm_arrays import stack_arms
+from armwright.exceptions import ArmwrightError
+from armwright.kinematics.arm_arrays import ArmArrays, stack_arms
 from armwright.kinematics.compliance import Stiffness, backlash_errors, own_loads, tip_displacements, unit_payload
 from armwright.kinematics.forward import forward_kinematics
 from armwright.kinematics.ik import solve_postures
@@ -27,113 +26,201 @@ from armwright.robot.arm import GRAVITY, Actuator, Arm
 from armwright.robot.robot_descriptions import find_urdf
 from armwright.robot.urdf_reader import UrdfArm, read_urdf
 
-SERVO = named_actuator("STS3215-12V").completed()
+TIPS = {  # by arm: the link whose origin is the tip
+    "so101": "gripper_frame_link",
+    "openarm": "openarm_right_link8",
+    "openarm-hand": "openarm_right_hand_tcp",
+    "openarm-early": "gripper_center",
+    "ur5e": "tool0",
+    "panda": "panda_hand_tcp",
+}
 KG_CM = 0.01 * GRAVITY  # [N m]
 FAR = 1e3  # [m]
-TIPS = {"openarm": "openarm_right_link8", "openarm-hand": "openarm_right_hand_tcp"}
-DESCRIBED = ("so100", "so101", "ur5e", "panda")  # arms that robot_descriptions has by this name
-FREE_PLAY = 1.0  # [°] measured, TheRobotStudio/SO-ARM100 issue 134
+SERVO = named_actuator("STS3215-12V").completed()
+STALL = SERVO.stall_torque or 0.0  # [N m]
+COUNT = 360.0 / 4096  # [°] of the servo's encoder
+BACKLASHES = {"maker": 0.5, "measured on a servo": 1.0, "measured on the base of an SO-101": 8.75 * COUNT}  # [°]
+PAYLOAD = 0.25  # [kg] rated, of the SO-101
+SERVO_TEST = 1.5, 0.10, 45.0  # load [kg], lever [m], angle [°]
+
+GAINS = np.array([20.0, 20.0, 20.0, 20.0, 5.0, 5.0, 5.0])  # [N m/rad] of OpenArm's position control in 2025
+COMMANDED = 30.0, 45.0, 60.0, 75.0, 90.0  # [°] of OpenArm's first joint
+MEASURED = 18.2, 26.94, 36.42, 47.26, 55.91  # [°] where it stayed
+
+POSTURES = {  # values of the URDF's joints [°]
+    "ur5e": {
+        "stretched": (0, 0, 0, 0, 0, 0),
+        "upright": (0, -90, 0, -90, 0, 0),
+        "tool down": (0, -60, 90, -120, -90, 0),
+        "low": (30, -20, 60, 20, 40, 10),
+        "folded back": (-120, -150, -70, 80, -100, 45),
+    },
+    "panda": {
+        "stretched": (0, 90, 0, -4, 0, 90, 0),
+        "ready": (0, -45, 0, -135, 0, 90, 45),
+        "elbow at the side": (20, 40, -60, -90, 30, 120, 0),
+        "low": (-30, 80, 10, -60, -20, 100, 60),
+        "folded back": (90, -80, 30, -150, 60, 30, -45),
+    },
+}
 
 
 @dataclass(frozen=True)
 class Case:
-    """Torques of an arm's joints [N m], the last one of all further joints, and what others say of its payload."""
+    """Peak torques of an arm's motors [N m], the last one of all further joints."""
 
     arm: str
-    torques: tuple[float, ...]
     motors: str
-    published: str
+    torques: tuple[float, ...]
 
 
 CASES = (
-    Case("so100", (19.5 * KG_CM,), "STS3215 at 7.4 V, stall", "about 0.2 kg"),
-    Case("so100", (SERVO.stall_torque or 0.0,), "STS3215 at 12 V, stall", "about 0.3 kg"),
-    Case("so101", (19.5 * KG_CM,), "STS3215 at 7.4 V, stall", "about 0.2 kg"),
-    Case("so101", (SERVO.stall_torque or 0.0,), "STS3215 at 12 V, stall", "about 0.3 kg"),
-    Case("so101", (SERVO.rated_torque or 0.0,), "STS3215 at 12 V, rated", ""),
-    Case("openarm", (40.0, 40.0, 27.0, 27.0, 7.0), "peak", "6.0 kg for 1 s"),
-    Case("openarm", (20.0, 20.0, 9.0, 9.0, 3.0), "rated", "4.1 kg for 1 min"),
-    Case("openarm-hand", (40.0, 40.0, 27.0, 27.0, 7.0), "peak", ""),
-    Case("openarm-hand", (27.0, 27.0, 27.0, 27.0, 7.0), "shoulder of 27 N m", "1.6 kg trips it (earlier version)"),
+    Case("so101", "STS3215 at 7.4 V, stall", (19.5 * KG_CM,)),
+    Case("so101", "STS3215 at 12 V, stall", (STALL,)),
+    Case("so101", "STS3215 at 12 V, stall / 1.5", (STALL / 1.5,)),
+    Case("so101", "STS3215 at 12 V, rated", (SERVO.rated_torque or 0.0,)),
+    Case("openarm", "peak", (40.0, 40.0, 27.0, 27.0, 7.0)),
+    Case("openarm", "rated", (20.0, 20.0, 9.0, 9.0, 3.0)),
+    Case("openarm-hand", "peak", (40.0, 40.0, 27.0, 27.0, 7.0)),
+    Case("openarm-hand", "rated", (20.0, 20.0, 9.0, 9.0, 3.0)),
+    Case("openarm-early", "peak: 27 N m, wrist 7 N m", (*4 * (27.0,), 7.0)),
+    Case("openarm-early", "20 N m, wrist 7 N m", (*4 * (20.0,), 7.0)),
+    Case("openarm-early", "rated: 9 N m, wrist 3 N m", (*4 * (9.0,), 3.0)),
 )
 
 
-def main(files: Sequence[str]) -> None:
-    paths = dict(part.split("=", 1) for part in files)
-    arms = {name: read_urdf(paths.get(name) or find_urdf(name), tip=TIPS.get(name)) for name in paths or DESCRIBED}
-    print("| arm | motors | reach | payload at 50 % | at 100 % | others |")
-    print("|---|---|--:|--:|--:|---|")
+def main(arguments: Sequence[str]) -> None:
+    files = dict(part.split("=", 1) for part in arguments)
+    arms = described_arms({name: Path(file) for name, file in files.items()})
+    print_payloads(arms)
+    if "so101" in arms:
+        print_servos(arms["so101"][1].arm)
+    if "openarm-hand" in arms:
+        print_droop(arms["openarm-hand"][1])
+    for name, postures in POSTURES.items():
+        if name in arms:
+            print_torques(name, *arms[name], postures)
+
+
+def described_arms(files: Mapping[str, Path]) -> dict[str, tuple[Path, UrdfArm]]:
+    """Return the files and arms that are found, by name; print one line for each other."""
+    for name in files.keys() - TIPS.keys():
+        print(f"unknown arm {name}; available: {', '.join(TIPS)}")
+    arms: dict[str, tuple[Path, UrdfArm]] = {}
+    for name, tip in TIPS.items():
+        try:
+            path = find_urdf(files.get(name, name))
+            arms[name] = path, read_urdf(path, tip=tip)
+        except ArmwrightError as error:
+            print(f"{name} is left out: {error}")
+    return arms
+
+
+def print_payloads(arms: Mapping[str, tuple[Path, UrdfArm]]) -> None:
+    """Print the payloads over the reach of all cases."""
+    print("\n| arm | motors | mass of links | reach | payload at 50 % | at 100 % |\n|---|---|--:|--:|--:|--:|")
     for case in CASES:
         if case.arm in arms:
-            found = payloads_over_reach(driven(arms[case.arm].arm, case.torques))
+            arm = arms[case.arm][1].arm
+            mass, found = sum(link.mass for link in arm.links), payloads_over_reach(driven(arm, case.torques))
             near, far = (f"{payload:.2f} kg" for payload in found.payloads)
-            print(f"| {case.arm} | {case.motors} | {found.reach:.2f} m | {near} | {far} | {case.published} |")
-    for name in ("so100", "so101"):
-        if name in arms:
-            describe_servos(name, arms[name].arm)
-    for name in ("ur5e", "panda"):
-        if name in arms:
-            compare_torques(name, arms[name], Path(paths.get(name) or find_urdf(name)))
+            print(f"| {case.arm} | {case.motors} | {mass:.2f} kg | {found.reach:.3f} m | {near} | {far} |")
 
 
 def driven(arm: Arm, torques: Sequence[float]) -> Arm:
-    """The arm with motors of these torques, whose masses are in its links."""
-    joints, moving = [], 0
-    for joint in arm.joints:
-        if joint.kind != "fixed":
-            motor = Actuator("motor", 0.0, torques[min(moving, len(torques) - 1)])
-            joint, moving = replace(joint, actuator=motor), moving + 1
-        joints.append(joint)
+    """Return the arm with motors of these torques, whose masses are in its links."""
+    moving = (joint for joint in arm.joints if joint.kind != "fixed")
+    peaks = {id(joint): torques[min(i, len(torques) - 1)] for i, joint in enumerate(moving)}
+    joints = (
+        replace(joint, actuator=Actuator("motor", 0.0, peaks[id(joint)])) if id(joint) in peaks else joint
+        for joint in arm.joints
+    )
     return replace(arm, joints=tuple(joints), safety_factor=1.0)
 
 
-def describe_servos(name: str, arm: Arm) -> None:
+def print_servos(arm: Arm) -> None:
     """Print how far backlash, gears and control of servos move the tip of the stretched arm."""
-    arms = stack_arms([arm])
-    shifted = replace(arms, base=np.zeros_like(arms.base))
-    q = solve_postures(shifted, np.array([[FAR, 0.0, 0.0]])).q.astype(np.float64)
-    frames = forward_kinematics(shifted, q)
-    moving = arms.motion < 6
-    for text, backlash in (("maker", np.degrees(SERVO.backlash or 0.0)), ("measured", FREE_PLAY)):
-        play = backlash_errors(shifted, frames, np.where(moving, np.radians(backlash), 0.0))[0, 0]
-        print(f"{name}, stretched: backlash of {backlash:g}° ({text}): {1e3 * play:.1f} mm")
-    rigid = np.full(arms.motion.shape, np.inf)
-    for text, stiffness in (("gear", SERVO.joint_stiffness), ("position gain", SERVO.position_gain)):
-        joints = Stiffness(rigid, rigid, np.where(moving, stiffness, np.inf))
-        own, payload = (
-            tip_displacements(shifted, frames, loads(shifted, frames), joints)[0, 0]
+    stacked = stack_arms([arm], "float64")
+    arms = replace(stacked, base=np.zeros_like(stacked.base))
+    q = solve_postures(arms, np.array([[FAR, 0.0, 0.0]]), precision="float64").q
+    frames, servos = forward_kinematics(arms, q), np.ones(arms.motion.shape)
+    print(f"\nso101, stretched: tip {1e3 * np.hypot(*frames.tip[0, 0, :2]):.0f} mm from the first axis")
+    for text, backlash in BACKLASHES.items():
+        play = np.radians(backlash) * servos
+        tip, base = (
+            1e3 * backlash_errors(arms, frames, part)[0, 0] for part in (play, play * [1, *[0] * (arms.dof - 1)])
+        )
+        print(f"  backlash of {backlash:.2f}° ({text}): {tip:.1f} mm; of the base joint alone {base:.2f} mm")
+    for text, stiffness in (("gears", SERVO.joint_stiffness), ("position gain", SERVO.position_gain)):
+        rigid = np.full(arms.motion.shape, np.inf)
+        yielding = Stiffness(rigid, rigid, (stiffness or np.inf) * servos)
+        own, by_mass = (
+            1e3 * np.linalg.norm(tip_displacements(arms, frames, loads(arms, frames), yielding))
             for loads in (own_loads, unit_payload)
         )
-        print(f"{name}, stretched: {text} of {stiffness:.4g} N m/rad: {1e3 * np.linalg.norm(own):.1f} mm by its own "
-              f"weight, {1e2 * np.linalg.norm(payload):.1f} mm by 0.1 kg")  # fmt: skip
+        print(f"  {text} of {stiffness:.4g} N m/rad: {own:.1f} mm by its own weight, {0.1 * by_mass:.1f} mm by 0.1 kg")
+    own, full = (np.abs(held(arms, q, payload)).max() for payload in (0.0, PAYLOAD))
+    print(f"  largest torque: {own:.2f} N m, with {PAYLOAD:g} kg {full:.2f} N m")
+    mass, lever, angle = SERVO_TEST
+    torque = mass * GRAVITY * lever * np.cos(np.radians(angle))
+    error = np.degrees(torque / (SERVO.position_gain or np.inf))
+    print(f"  a servo that holds {torque:.2f} N m yields by {error:.1f}° of its position gain")
 
 
-def compare_torques(name: str, read: UrdfArm, path: Path) -> None:
-    """Print the holding torques of five postures, and how far they are off Pinocchio's."""
-    rng, arm = np.random.default_rng(0), read.arm
-    q = rng.uniform([j.lower for j in arm.joints], [j.upper for j in arm.joints], (5, len(arm.joints)))
-    arms = stack_arms([arm], "float64")
-    ours = solve_postures(arms, np.zeros((5, 3)), 0, initial_q=q[None], precision="float64").torque[0]
-    theirs = gravity(read, path, q)
-    largest = ", ".join(f"{value:.2f}" for value in np.abs(ours).max(axis=1))
-    print(
-        f"{name}: largest holding torques {largest} N m; off Pinocchio by {np.abs(ours - theirs).max():.1e} N m at most"
-    )
+def print_droop(read: UrdfArm) -> None:
+    """Print where OpenArm's first joint stays without compensation of gravity, by its gains and by a user."""
+    arms = stack_arms([read.arm], "float64")
+    signs = np.array(read.signs)
+    print("\n| commanded | measured | computed | torque by gain and measured error | computed there |")
+    print("|--:|--:|--:|--:|--:|")
+    for commanded, measured in zip(COMMANDED, MEASURED, strict=True):
+        target, there = (signs * np.radians([angle, *[0.0] * 6]) for angle in (commanded, measured))
+        stays = read.values_in_urdf(equilibrium(arms, target))
+        exerted, needed = GAINS[0] * np.radians(commanded - measured), abs(held(arms, there[None, None])[0, 0])
+        print(
+            f"| {commanded:g}° | {measured:g}° | {np.degrees(stays[0]):.1f}° | {exerted:.1f} N m | {needed:.1f} N m |"
+        )
+    horizontal = signs * np.radians([90.0, *[0.0] * 6])
+    print(f"horizontal: {abs(held(arms, horizontal[None, None])[0, 0]):.1f} N m")
+
+
+def equilibrium(arms: ArmArrays, target: Array) -> Array:
+    """Return the (D,) posture in which gains times errors hold an arm, within its limits [rad]; target: (D,)."""
+    q = target
+    for _ in range(500):
+        step = target - held(arms, q[None, None])[0] / GAINS - q
+        q = np.clip(q + 0.1 * step, arms.lower[0], arms.upper[0])
+    return q
+
+
+def print_torques(name: str, path: Path, read: UrdfArm, postures: Mapping[str, Sequence[float]]) -> None:
+    """Print the holding torques of postures, and how far they are off Pinocchio's."""
+    q = (np.radians(list(postures.values())) - read.zeros) * read.signs
+    ours, theirs = held(stack_arms([read.arm], "float64"), q[None]), gravity(read, path, q)
+    print(f"\n| {name} | holding torques [N m] | largest difference |\n|---|---|--:|")
+    for posture, mine, difference in zip(postures, ours * read.signs, np.abs(ours - theirs).max(axis=1), strict=True):
+        print(f"| {posture} | {', '.join(f'{round(value, 2) + 0.0:.2f}' for value in mine)} | {difference:.0e} |")
+
+
+def held(arms: ArmArrays, q: Array, payload: float = 0.0) -> Array:
+    """Return the torques (T, D) that hold an arm in postures q (1, T, D) [N m]."""
+    loads = np.full(q.shape[1], payload)
+    nowhere = np.zeros((q.shape[1], 3))
+    return solve_postures(arms, nowhere, 0, initial_q=q, payload=loads, precision="float64").torque[0]
 
 
 def gravity(read: UrdfArm, path: Path, q: Array) -> Array:
-    """Gravity torques (T, J) by Pinocchio at the arm's values q (T, J) [N m]."""
+    """Return the torques (T, D) by Pinocchio at the arm's own values q (T, D) [N m]."""
     model = pinocchio.buildModelFromUrdf(str(path))
     data = model.createData()
-    rows = []
+    joints = [model.joints[model.getJointId(name)] for name in read.joints]
+    torques = []
     for row in read.values_in_urdf(q):
-        values, places = pinocchio.neutral(model), []
-        for joint_name, value in zip(read.joints, row, strict=True):
-            joint = model.joints[model.getJointId(joint_name)]
+        values = pinocchio.neutral(model)
+        for joint, value in zip(joints, row, strict=True):
             values[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
-            places.append(joint.idx_v)
-        rows.append(pinocchio.computeGeneralizedGravity(model, data, values)[places] * read.signs)
-    return np.array(rows)
+        torques.append(pinocchio.computeGeneralizedGravity(model, data, values)[[joint.idx_v for joint in joints]])
+    return np.array(torques) * read.signs
 
 
 if __name__ == "__main__":
