@@ -1,9 +1,10 @@
-"""Make the pictures of README and docs again; some two minutes on two cores, and a browser.
+"""Make the pictures of README and docs again; some three minutes on two cores, and a browser.
 
 python -m tools.pictures            # all of them
 python -m tools.pictures page.png   # one
 """
 
+import base64
 import re
 import shutil
 import socket
@@ -15,7 +16,7 @@ import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 
-from playwright.sync_api import Page
+from playwright.sync_api import Locator, Page
 
 from tests.support import browser
 from tests.support.robots import robot
@@ -23,6 +24,10 @@ from tests.support.robots import robot
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
+SIDE_BY_SIDE = """
+main { display: inline-flex; gap: 16px; padding: 8px; background: white; font: 20px sans-serif; text-align: center }
+figure { margin: 0 }
+"""
 Shot = Callable[[Path, Page, Path], None]
 
 
@@ -95,24 +100,51 @@ def tutorial(folder: Path, page: Page, file: Path) -> None:
     page.screenshot(path=file)
 
 
+def open_arm(folder: Path, page: Page, task: str, space: str, evaluations: int, at: str) -> Locator:
+    """Return the 3D view of an example, searched and opened."""
+    command = ("design", EXAMPLES / task, "--space", EXAMPLES / space, "--evaluations", evaluations)
+    open_report(page, once(folder, f"runs/{task}", *command), (1280, 1290), at)
+    return page.locator("#arm-box")
+
+
+def turn_arm(page: Page, drag: int, zoom: int) -> None:
+    """Turn and enlarge the 3D view by the mouse."""
+    box = page.locator("#arm-box canvas").bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + drag, y, steps=5)
+    page.mouse.up()
+    page.mouse.wheel(0, -zoom)
+    page.wait_for_timeout(1000)
+
+
 def arm_of(task: str, space: str, evaluations: int, at: str, drag: int = 0, zoom: int = 0) -> Shot:
-    """Return a picture of the 3D view of an example, turned and enlarged by the mouse."""
+    """Return a picture of the 3D view of an example, turned and enlarged."""
 
     def shot(folder: Path, page: Page, file: Path) -> None:
-        command = ("design", EXAMPLES / task, "--space", EXAMPLES / space, "--evaluations", evaluations)
-        open_report(page, once(folder, f"runs/{task}", *command), (1280, 1290), at)
-        box = page.locator("#arm-box canvas").bounding_box()
-        assert box is not None
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        page.mouse.move(x, y)
-        page.mouse.down()
-        page.mouse.move(x + drag, y, steps=5)
-        page.mouse.up()
-        page.mouse.wheel(0, -zoom)
-        page.wait_for_timeout(1000)
-        page.locator("#arm-box").screenshot(path=file)
+        view = open_arm(folder, page, task, space, evaluations, at)
+        turn_arm(page, drag, zoom)
+        view.screenshot(path=file)
 
     return shot
+
+
+def stiffness(folder: Path, page: Page, file: Path) -> None:
+    """Show the recommended arms without and with a bound for the deflection, side by side."""
+    views = (
+        ("8-stiffness-unbounded-task.yaml", "#design=4&target=2", "deflection unbounded: 22 mm"),
+        ("8-stiffness-task.yaml", "#design=0&target=2", "deflection at most 1 mm"),
+    )
+    figures = ""
+    for task, at, caption in views:
+        view = open_arm(folder, page, task, "8-stiffness-space.yaml", 2000, at)
+        turn_arm(page, drag=35, zoom=700)
+        picture = base64.b64encode(view.locator("canvas").screenshot()).decode()
+        figures += f"<figure><img src='data:image/png;base64,{picture}'><figcaption>{caption}</figcaption></figure>"
+    page.set_content(f"<style>{SIDE_BY_SIDE}</style><main>{figures}</main>")
+    page.locator("main").screenshot(path=file)
 
 
 def existing_arms(folder: Path, page: Page, file: Path) -> None:
@@ -167,6 +199,7 @@ PICTURES: dict[str, Shot] = {
         "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=1&target=4", drag=90, zoom=250
     ),
     "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=3&target=3"),
+    "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
     "dashboard.png": dashboard,
 }

@@ -8,19 +8,38 @@ import warnings
 from pathlib import Path
 
 import mujoco  # noqa: F401 (here, since its window library starts a process, which no fast test may)
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import armwright as aw
 from armwright.cli.app import app
+from armwright.kinematics.compliance import Stiffness
+from armwright.problem.drive_quantities import require_ratings
+from armwright.problem.evaluation import Evaluation
+from armwright.problem.objectives import QUANTITIES
 from armwright.problem.problem import Problem
+from armwright.runs.history import FrontMember
 from armwright.runs.optuna_export import export_study
+from armwright.runs.selection import pick_from
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
 from tests import ROOT
 from tests.support.chat_server import Answer, ChatServer, Request
+from tests.support.frame_program import frame_displacement
 
 EXAMPLES = ROOT / "examples"
+TASKS = (
+    "1-paper-target",
+    "2-assembly-task",
+    "3-long-shelf-task",
+    "4-wall-painting-task",
+    "5-obstacle-reach",
+    "6-price-task",
+    "7-compare-arms-task",
+    "8-stiffness-task",
+    "8-stiffness-unbounded-task",
+)
 
 
 def run(example: str, *options: str) -> str:
@@ -32,33 +51,56 @@ def told(server: ChatServer) -> tuple[str, ...]:
     return ("--model", "test-model", "--base-url", server.url, "--origin", "scripted")
 
 
-@pytest.mark.parametrize(
-    "number",
-    [
-        "1-paper-target",
-        "2-assembly",
-        "3-long-shelf",
-        "4-wall-painting",
-        "5-obstacle-reach",
-        "6-price",
-        "7-compare-arms",
-    ],
-)
+@pytest.mark.parametrize("name", TASKS)
 @pytest.mark.slow
-def test_example_tasks_and_spaces_run(number: str, tmp_path: Path) -> None:
-    task = next(EXAMPLES.glob(f"{number}*task.yaml"), EXAMPLES / f"{number}.yaml")
-    space = EXAMPLES / f"{number}-space.yaml"
-    spaces = ["--space", str(space)] if space.is_file() else []
+def test_example_tasks_and_spaces_run(name: str, tmp_path: Path) -> None:
+    """The command in the file's first comment names the task and its space."""
+    task = EXAMPLES / f"{name}.yaml"
+    ((named_task, space),) = re.findall(
+        r"^#.*armwright (?:optimize|design) (\S+)(?: --space (\S+))?", task.read_text(), re.MULTILINE
+    )
+    assert (ROOT / named_task).samefile(task)
+    spaces = ["--space", str(ROOT / space)] if space else []
     options = ["--n-init", "5", "--n-total", "10", "--no-figures", "--json", "--out", str(tmp_path / "run")]
     result = CliRunner().invoke(app, ["optimize", str(task), *spaces, *options])
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["n_trials"] == 15
-    # The command in the file's first comment names existing files.
-    ((named_task, named_space),) = re.findall(
-        r"^#.*armwright (?:optimize|design) (\S+)(?: --space (\S+))?", task.read_text(), re.MULTILINE
-    )
-    assert (EXAMPLES.parent / named_task).samefile(task)
-    assert not named_space or (EXAMPLES.parent / named_space).samefile(space)
+
+
+def test_all_example_tasks_are_run() -> None:
+    assert {file.stem for file in EXAMPLES.glob("*.yaml") if not file.stem.endswith("-space")} == set(TASKS)
+
+
+def knee_of(name: str, out: Path) -> tuple[FrontMember, Evaluation]:
+    """The recommended arm of a direct search of an example, and its physics."""
+    space = ["--space", str(EXAMPLES / "8-stiffness-space.yaml")]
+    options = ["--evaluations", "2000", "--no-figures", "--out", str(out)]
+    result = CliRunner().invoke(app, ["design", str(EXAMPLES / name), *space, *options])
+    assert result.exit_code == 0, result.output
+    history, (knee, *_) = pick_from(out)
+    return knee, history.evaluation([knee.number])
+
+
+@pytest.mark.slow
+def test_bound_for_the_deflection_changes_the_recommended_arm(tmp_path: Path) -> None:
+    """PyNite finds the same deflections."""
+    diameters: list[list[float]] = []  # [mm]
+    deflections: list[float] = []  # [m]
+    for name in ("8-stiffness-unbounded-task.yaml", "8-stiffness-task.yaml"):
+        knee, evaluation = knee_of(name, tmp_path / name)
+        arms, payload = evaluation.arms, evaluation.payload
+        drives = require_ratings(arms.actuation, "deflection")
+        stiffness = Stiffness(arms.bending_stiffness, arms.torsional_stiffness, drives.joint_stiffness)
+        found = [
+            frame_displacement(knee.arm, q, stiffness, float(payload[t]), np.zeros(3))
+            for t, q in enumerate(evaluation.q[0])
+        ]
+        deflections.append(float(QUANTITIES["deflection"](evaluation)[0]))
+        assert deflections[-1] == pytest.approx(np.linalg.norm(found, axis=1).max(), rel=1e-4)
+        diameters.append([float(str(knee.design.params[f"tube_{j}"]).split("x")[0]) for j in (1, 2, 3)])
+    assert deflections[0] > 0.01
+    assert deflections[1] <= 0.001
+    assert min(diameters[1]) > max(diameters[0])
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from armwright.robot.arm import GRAVITY, Arm
 
 Array = NDArray[np.float64]
 
-RIGID = {"A": 1e7, "Iy": 1e6, "Iz": 1e6, "J": 1e6}  # E = G = 1
+RIGID = {"A": 1e9, "Iy": 1e8, "Iz": 1e8, "J": 1e8}  # E = G = 1
 ARM = 0.07  # [m], length of the members of a joint
 
 
@@ -68,7 +68,7 @@ def frame_displacement(arm: Arm, q: Array, stiffness: Stiffness, payload: float,
         end = positions[j] + rotations[j] @ link.offset
         if link.length > 0.0:
             bending, torsional = stiffness.bending[0, j], stiffness.torsional[0, j]
-            member = frame.extend(end, A=1e7, Iy=bending, Iz=bending, J=torsional)
+            member = frame.extend(end, Iy=bending, Iz=bending, J=torsional)
             weight = -GRAVITY * link.mass / link.length
             frame.model.add_member_dist_load(member, "FZ", weight, weight)
         frame.hang(link.end_mass, positions[j] + rotations[j] @ link.end_mass_position)
