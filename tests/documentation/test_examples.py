@@ -24,22 +24,11 @@ from armwright.runs.optuna_export import export_study
 from armwright.runs.selection import pick_from
 from armwright.study.study import optimize
 from armwright.tasks.catalogue import load_task
-from tests import ROOT
 from tests.support.chat_server import Answer, ChatServer, Request
+from tests.support.examples import EXAMPLES, example_tasks
 from tests.support.frame_program import frame_displacement
 
-EXAMPLES = ROOT / "examples"
-TASKS = (
-    "1-paper-target",
-    "2-assembly-task",
-    "3-long-shelf-task",
-    "4-wall-painting-task",
-    "5-obstacle-reach",
-    "6-price-task",
-    "7-compare-arms-task",
-    "8-stiffness-task",
-    "8-stiffness-unbounded-task",
-)
+TASKS = example_tasks()
 
 
 def run(example: str, *options: str) -> str:
@@ -51,24 +40,15 @@ def told(server: ChatServer) -> tuple[str, ...]:
     return ("--model", "test-model", "--base-url", server.url, "--origin", "scripted")
 
 
-@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("task", TASKS, ids=lambda task: task.stem)
 @pytest.mark.slow
-def test_example_tasks_and_spaces_run(name: str, tmp_path: Path) -> None:
-    """The command in the file's first comment names the task and its space."""
-    task = EXAMPLES / f"{name}.yaml"
-    ((named_task, space),) = re.findall(
-        r"^#.*armwright (?:optimize|design) (\S+)(?: --space (\S+))?", task.read_text(), re.MULTILINE
-    )
-    assert (ROOT / named_task).samefile(task)
-    spaces = ["--space", str(ROOT / space)] if space else []
+def test_example_tasks_and_spaces_run(task: Path, tmp_path: Path) -> None:
+    space = TASKS[task]
+    spaces = ["--space", str(space)] if space else []
     options = ["--n-init", "5", "--n-total", "10", "--no-figures", "--json", "--out", str(tmp_path / "run")]
     result = CliRunner().invoke(app, ["optimize", str(task), *spaces, *options])
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["n_trials"] == 15
-
-
-def test_all_example_tasks_are_run() -> None:
-    assert {file.stem for file in EXAMPLES.glob("*.yaml") if not file.stem.endswith("-space")} == set(TASKS)
 
 
 def knee_of(name: str, out: Path) -> tuple[FrontMember, Evaluation]:

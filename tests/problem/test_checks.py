@@ -1,6 +1,5 @@
 """Checks before a search: nothing true is refused, and nothing is called proven that a design disproves."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,8 @@ from armwright.problem.problem import Problem
 from armwright.spaces.design_space import DesignSpace, default_space, load_space, paper_space
 from armwright.tasks.catalogue import builtin_names, load_task
 from armwright.tasks.task import Task
+from tests.support.examples import example_tasks
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 DOWN = [0, 0, -1]
 HERE = [0.4, 0.2, 0.3]
 TABLE = {"kind": "ground", "name": "table"}
@@ -61,22 +60,14 @@ def only(checked: Problem) -> tuple[str, str]:
 # Nothing to find
 
 
-def example_problems() -> Iterator[Problem]:
-    for file in sorted(EXAMPLES.glob("*.yaml")):
-        if "space" not in file.name:
-            own = file.with_name(f"{file.stem.removesuffix('-task')}-space.yaml")
-            yield Problem(load_task(file), load_space(own) if own.exists() else paper_space())
-
-
 @pytest.mark.parametrize("name", builtin_names())
 def test_builtin_tasks_have_no_findings(name: str) -> None:
     assert found(Problem(load_task(name), default_space(name))) == []
 
 
-def test_examples_have_no_findings() -> None:
-    checked = list(example_problems())
-    assert len(checked) == 7
-    assert [found(one) for one in checked] == [[]] * 7
+@pytest.mark.parametrize(("task", "space"), example_tasks().items(), ids=lambda file: getattr(file, "stem", "paper"))
+def test_examples_have_no_findings(task: Path, space: Path | None) -> None:
+    assert found(Problem(load_task(task), load_space(space) if space else paper_space())) == []
 
 
 def test_random_tasks_have_no_findings() -> None:
