@@ -48,10 +48,11 @@ if __name__ == "__main__":
         else:
             raise AssertionError("an extra is here")
 """
-# What needs an extra, and which; all of them are asked for where a run folder "run" is.
+CYCLE = "targets: [[0.3, 0.0, 0.2], [0.2, 0.2, 0.3]]\ncycle: in_order\n"
+# What needs an extra, and which; all of them are asked for where the run folders "run" and "driven" are.
 NEEDS = (
     ("live", "live", "run"),
-    ("sim", "simulate", "run"),
+    ("sim", "simulate", "driven"),
     ("live", "optimize", "target-1", "--live", "--out", "other"),
     ("llm", "optimize", "target-1", "--model", "openai-chat:gpt-4o", "--out", "other"),
     (
@@ -129,6 +130,8 @@ def main(folder: Path) -> None:
     armwright("actuators")
     armwright("init", "mine.yaml")
     armwright("optimize", "mine.yaml", "--n-total", "10", "--no-figures", "--robust", "--space", "slideopt")
+    Path("driven.yaml").write_text(CYCLE)
+    armwright("optimize", "driven.yaml", "--n-init", "2", "--n-total", "2", "--no-figures", "--out", "driven")
     armwright("prompt", "target-1")
     armwright(
         "optimize", "target-1", "--proposer", "manual:asked", "--model-options", "{wait: false}", "--out", "by-hand"
