@@ -48,7 +48,7 @@ if __name__ == "__main__":
         else:
             raise AssertionError("an extra is here")
 """
-CYCLE = "targets: [[0.3, 0.0, 0.2], [0.2, 0.2, 0.3]]\ncycle: in_order\n"
+CYCLE = "name: driven\ntargets: [[0.3, 0.0, 0.2], [0.2, 0.2, 0.3]]\ncycle: in_order\n"
 # What needs an extra, and which; all of them are asked for where the run folders "run" and "driven" are.
 NEEDS = (
     ("live", "live", "run"),
