@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from armwright.arrays import Array
 from armwright.pareto import default_reference_point
 from armwright.problem.problem import Problem
-from armwright.search import screening
 from armwright.search.front_search import FrontSearch
 from armwright.search.screening import Screen, pays
+from armwright.search.variation import offspring
 from armwright.spaces.design_parameters import conditional_parameters
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import CategoricalParameter
@@ -23,7 +23,8 @@ def new_search(problem: Problem, reference_point: tuple[float, ...], seed: int, 
             screen.learn(matrix, outcomes)
         return outcomes.penalised
 
-    return screening.new_search(problem, evaluate, reference_point, seed, screen=screen)
+    vary = offspring if screen is None else screen.offspring
+    return FrontSearch(problem.space.parameters, evaluate, reference_point, seed, vary=vary)
 
 
 def searched(problem: Problem, reference_point: tuple[float, ...], seed: int, evaluations: int) -> FrontSearch:

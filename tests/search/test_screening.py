@@ -10,16 +10,7 @@ from armwright.problem.estimates import lower_bounds
 from armwright.problem.problem import Problem
 from armwright.runs.front_gap import known_front
 from armwright.search.encoding import DesignEncoding
-from armwright.search.screening import (
-    CANDIDATES,
-    NEAR_MISSES,
-    RANDOM_SHARE,
-    RANDOM_UNTIL,
-    REJECTED_SHARE,
-    REMEMBERED,
-    Screen,
-    pays,
-)
+from armwright.search.screening import CANDIDATES, NEAR_MISSES, REJECTED_SHARE, REMEMBERED, Screen, pays
 from armwright.search.variation import offspring
 from armwright.spaces.design_space import default_space
 from armwright.tasks.catalogue import builtin_tasks, load_task
@@ -39,13 +30,9 @@ def pool() -> Any:
     return offspring(SPACE.matrix(known.designs), np.zeros(len(known.designs)), ENCODING, 60, np.random.default_rng(0))
 
 
-def learnt(
-    pool: Any, problem: Problem = PROBLEM, point: tuple[float, ...] = POINT, evaluations: int = RANDOM_UNTIL
-) -> Screen:
-    """A screen that knows a pool, as if it were the last of so many evaluations."""
+def learnt(pool: Any, problem: Problem = PROBLEM, point: tuple[float, ...] = POINT) -> Screen:
     screen = Screen(problem, lambda: point)
     screen.learn(pool, problem.evaluate_matrix(pool))
-    screen.restore({**screen.state(), "screen_evaluations": evaluations})
     return screen
 
 
@@ -72,17 +59,6 @@ def test_a_share_of_the_evaluations_goes_to_rejected_designs(pool: Any) -> None:
     assert len(chosen) == N
     assert screen.counts["considered"] == CANDIDATES * len(chosen)
     assert screen.counts["evaluated_though_rejected"] >= REJECTED_SHARE * len(chosen)
-
-
-def test_random_designs_go_on_beside_the_chosen_ones_for_a_while(pool: Any) -> None:
-    screen = learnt(pool, evaluations=RANDOM_UNTIL - 1)
-    designs = screened(screen, pool)
-    assert len(designs) == N
-    n_random = round(RANDOM_SHARE * N)
-    assert screen.counts["considered"] == CANDIDATES * (N - n_random)
-    screen.learn(designs, PROBLEM.evaluate_matrix(designs))
-    screened(screen, pool)
-    assert screen.counts["considered"] == CANDIDATES * (2 * N - n_random)
 
 
 def test_designs_that_bounds_discard_are_not_chosen(pool: Any) -> None:

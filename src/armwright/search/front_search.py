@@ -32,7 +32,7 @@ FRONT_LIMITS = (800, 1000)  # designs; a front longer than the second is thinned
 CAPACITIES = (100, 1000)  # designs in the pool: first and final
 EVALUATIONS_PER_MEMBER = 200  # the pool grows by one design per so many evaluations
 SMALLEST_BATCH = 100  # designs per generation; later as many as the pool holds
-FIRST_BATCH = 500  # random designs at the start, unless offspring are screened
+FIRST_BATCH = 500  # random designs at the start
 PER_NUMBER = 20  # designs of each number of joints that stay in the pool, though all may be infeasible
 LEADING = 12  # structures whose best designs stay in the pool
 SIDE_FROM = 25_000  # evaluations
@@ -62,7 +62,6 @@ class FrontSearch:
         seed: of all random numbers.
         known: (N, P) designs that the first batch includes.
         vary: makes new designs from a pool, as `variation.offspring` does.
-        first_batch: number of random designs that the search and each side pool begin with.
     """
 
     def __init__(
@@ -73,12 +72,10 @@ class FrontSearch:
         seed: int,
         known: Array | None = None,
         vary: Callable[[Array, Indices, DesignEncoding, int, np.random.Generator], Array] = offspring,
-        first_batch: int = FIRST_BATCH,
     ) -> None:
         self._encoding = DesignEncoding(parameters)
         self._evaluate = evaluate
         self._vary = vary
-        self._first_batch = first_batch
         self._reference_point = np.asarray(reference_point, dtype=np.float64)
         self._seed = seed
         self._known = np.empty((0, len(self._encoding))) if known is None else known
@@ -133,11 +130,11 @@ class FrontSearch:
         """Return the (N, P) designs to evaluate next; the same ones until `tell` is called."""
         rng = np.random.default_rng(derived_seed(self._seed, self._generation))
         if self._generation == 0:
-            return np.vstack([self._known, self._encoding.random(self._first_batch, rng)])
+            return np.vstack([self._known, self._encoding.random(FIRST_BATCH, rng)])
         if not self._is_side_generation:
             return self._offspring(self._matrix, self._values, max(SMALLEST_BATCH, self._capacity), rng)
         if not len(self._side_matrix):
-            return self._encoding.random(self._first_batch, rng)
+            return self._encoding.random(FIRST_BATCH, rng)
         return self._offspring(self._side_matrix, self._side_values, SMALLEST_BATCH, rng)
 
     def tell(self, matrix: Array, values: Array) -> None:

@@ -1,8 +1,5 @@
 """Screening of offspring: of many designs, bounds discard some, estimates rank the others, and the best are evaluated.
 
-A search begins with few random designs, so that estimates choose from early on. Random designs go on beside their
-choice for a while: what the first designs do not contain, such as the smallest arms, is hardly found from them.
-
 An estimate follows the cycle roughly, from the postures of the nearest evaluated design with the same joints. A share
 of the evaluations goes to designs that the estimates reject, so that no design is out of reach because of them.
 
@@ -26,12 +23,9 @@ from armwright.pareto import feasible_mask, front_mask, total_violation
 from armwright.problem.estimates import estimates, lower_bounds
 from armwright.problem.problem import Outcomes, Problem
 from armwright.search.encoding import DesignEncoding
-from armwright.search.front_search import FrontSearch
 from armwright.search.survival import Indices
 from armwright.search.variation import offspring
 
-FIRST_BATCH = 150  # random designs at the start
-RANDOM_UNTIL, RANDOM_SHARE = 1_150, 0.35  # evaluations up to which random designs go on, and their share of these
 CANDIDATES = 30  # designs considered for each one to evaluate
 REJECTED_SHARE = 0.05  # of the designs to evaluate, at least: drawn from those that the estimates reject
 NEAR_SHARE = 0.35  # of the designs to evaluate: ranked with the violation of constraints as one more objective
@@ -39,7 +33,7 @@ NEAR_MISSES = 40  # infeasible designs that are parents
 REMEMBERED = 2000  # evaluated designs, the latest, whose postures estimates begin with
 
 COUNTS = ("considered", "discarded_by_bounds", "evaluated_though_rejected")  # in summary.json
-_ARRAYS = ("matrix", "postures", "feasible", "front", "near_matrix", "near_values", "counts", "evaluations")
+_ARRAYS = ("matrix", "postures", "feasible", "front", "near_matrix", "near_values", "counts")
 
 
 def pays(problem: Problem) -> bool:
@@ -69,7 +63,6 @@ class Screen:
         self._near_matrix: Array = np.empty((0, len(parameters)))
         self._near_values: Array = np.empty((0, len(problem.objectives) + 1))  # the last one is the violation
         self._counts = np.zeros(len(COUNTS), dtype=np.int64)
-        self._evaluations = np.int64(0)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -79,16 +72,7 @@ class Screen:
     def offspring(
         self, pool: Array, ranks: Indices, encoding: DesignEncoding, n: int, rng: np.random.Generator
     ) -> Array:
-        """Return an (n, P) matrix of new designs, random ones and the best of many of `variation.offspring`.
-
-        The arguments are those of `variation.offspring`.
-        """
-        n_random = round(RANDOM_SHARE * n) if self._evaluations < RANDOM_UNTIL else 0
-        chosen = self._chosen(pool, ranks, encoding, n - n_random, rng)
-        return np.vstack([chosen, encoding.random(n_random, rng)])
-
-    def _chosen(self, pool: Array, ranks: Indices, encoding: DesignEncoding, n: int, rng: np.random.Generator) -> Array:
-        """Return the (n, P) best of many new designs, and a share of those that the estimates reject."""
+        """Return an (n, P) matrix of new designs, chosen from many of `variation.offspring`, whose arguments it has."""
         if len(self._front):  # near misses are parents like the best designs
             pool, ranks = np.vstack([pool, self._near_matrix]), np.append(ranks, np.zeros(len(self._near_matrix), int))
             order = np.argsort(encoding.structures(pool), kind="stable")
@@ -105,7 +89,6 @@ class Screen:
         """Remember evaluated designs (N, P) and their outcomes."""
         assert outcomes.postures is not None
         feasible = feasible_mask(outcomes.violations)
-        self._evaluations = self._evaluations + len(matrix)
         self._matrix = np.vstack([self._matrix, matrix])[-REMEMBERED:]
         self._postures = np.concatenate([self._postures, outcomes.postures])[-REMEMBERED:]
         self._feasible = np.concatenate([self._feasible, feasible])[-REMEMBERED:]
@@ -178,21 +161,6 @@ class Screen:
             if len(same):
                 near[rows] = self._postures[same[KDTree(known[same]).query(own[rows])[1]]]
         return near
-
-
-def new_search(
-    problem: Problem,
-    evaluate: Callable[[Array], Array],
-    reference_point: Sequence[float],
-    seed: int,
-    known: Array | None = None,
-    screen: Screen | None = None,
-) -> FrontSearch:
-    """Return a search whose offspring are chosen by a screen, if there is one; other arguments as of `FrontSearch`."""
-    parameters = problem.space.parameters
-    if screen is None:
-        return FrontSearch(parameters, evaluate, reference_point, seed, known)
-    return FrontSearch(parameters, evaluate, reference_point, seed, known, screen.offspring, FIRST_BATCH)
 
 
 def _relaxed(outcomes: Outcomes) -> Array:

@@ -23,7 +23,9 @@ from armwright.runs.simulated_run import Simulator
 from armwright.runs.survival import evaluate_survival
 from armwright.runs.trial import FinishedTrial
 from armwright.runs.verification import Verification, verify, verify_front
-from armwright.search.screening import Screen, new_search, pays
+from armwright.search.front_search import FrontSearch
+from armwright.search.screening import Screen, pays
+from armwright.search.variation import offspring
 from armwright.study.progress import RunResult
 from armwright.study.reference_survey import ReferenceSurvey
 from armwright.study.reported_front import ReportedFront, reported_front
@@ -58,7 +60,9 @@ class DirectSearch:
         self.watch = watch
         self.survey = ReferenceSurvey(problem, config.seed)
         self.screen = Screen(problem, lambda: self.survey.point) if pays(problem) else None
-        self.search = new_search(problem, self._evaluate, self.survey.point, config.seed, matrix, self.screen)
+        vary = offspring if self.screen is None else self.screen.offspring
+        parameters = problem.space.parameters
+        self.search = FrontSearch(parameters, self._evaluate, self.survey.point, config.seed, matrix, vary)
         self.seconds = 0.0  # of earlier sessions
         self.resumed = 0  # evaluations of earlier sessions
         self.ended_after = 0.0  # largest time budget that has ended the search [s]
