@@ -96,7 +96,7 @@ def tutorial(folder: Path, page: Page, file: Path) -> None:
         block = next(b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if b.startswith(key))
         (folder / name).write_text(block)
     command = ["design", "feeder.yaml", "--space", "space.yaml", "--evaluations", 8000]
-    open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=2&target=3")
+    open_report(page, once(folder, "runs/feeder", *command), (1280, 760), "#design=0&target=3")
     page.screenshot(path=file)
 
 
@@ -196,9 +196,9 @@ PICTURES: dict[str, Shot] = {
     "page-live.png": live_report,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(
-        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=1&target=4", drag=90, zoom=250
+        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=2&target=4", drag=90, zoom=250
     ),
-    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=3&target=3"),
+    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=5&target=3"),
     "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
     "dashboard.png": dashboard,
