@@ -48,11 +48,10 @@ CONTENT: Mapping[str, Any] = {
     "link": [0.06, 0.25],
     "link_directions": ["+z", "-x", "+y"],
     "actuators": ["XM540-W270", "AK60-6", "PH42-020-S300-R", "XL330-M288"],
-    "motor_bodies": True,
 }
 SPACE = DesignSpace.model_validate(CONTENT)
 PITCH = DesignSpace.model_validate(
-    {"joints": 3, "joint_types": ["P"], "link": [0.02, 0.3], "actuators": ["XM540-W270"], "motor_bodies": True}
+    {"joints": 3, "joint_types": ["P"], "link": [0.02, 0.3], "actuators": ["XM540-W270"]}
 )
 
 
@@ -349,7 +348,6 @@ def test_contacts_in_mujoco_agree_with_the_clearance() -> None:
         ({"actuators": ["XM430-W350", "FHA-14C-100"]}, "none for FHA-14C-100: width, height, depth"),
         ({"actuators": [{"name": "own", "mass": 0.1, "stall_torque": 1.0, "width": 0.02, "depth": 0.03}]},
          "none for own: height"),
-        ({"actuators": []}, "motor_bodies: expected actuators, got none"),
         ({"joint_types": ["P", "O"]}, "got O with two at one place"),
         ({"actuators": [{"name": "own", "mass": 0.1, "stall_torque": 1.0, "shaft_edge": "length"}]}, "shaft_edge"),
         ({"bracket_mass": -0.1}, "bracket_mass"),
@@ -357,7 +355,7 @@ def test_contacts_in_mujoco_agree_with_the_clearance() -> None:
 )  # fmt: skip
 def test_spaces_that_cannot_have_bodies_are_refused(content: dict[str, Any], message: str) -> None:
     with pytest.raises((SpaceError, ValueError), match=message):
-        DesignSpace.model_validate({"actuators": ["XM430-W350"], "motor_bodies": True, **content})
+        DesignSpace.model_validate({"actuators": ["XM430-W350"], **content})
 
 
 @pytest.mark.parametrize(
@@ -378,7 +376,7 @@ def test_invalid_motor_body_is_refused(body: dict[str, Any]) -> None:
 
 
 def test_bracket_mass_adds_to_each_joint_that_moves() -> None:
-    content = {"joints": 3, "restrict": {"joint_2": "F"}, "joint_types": ["P", "F", "O"], "actuators": ["XL330-M288"]}
+    content = {"joints": 3, "restrict": {"joint_2": "F"}, "joint_types": ["P", "F"], "actuators": ["XL330-M288"]}
     plain = DesignSpace.model_validate(content)
     heavy = DesignSpace.model_validate({**content, "bracket_mass": 0.05})
     for design in plain.sample(20, 2):

@@ -25,14 +25,15 @@ TABLE = {"kind": "ground", "name": "table"}
 MOTORS = ["XL430-W250", "XM430-W350", "XM540-W270"]
 SPACES = {
     "paper": {},
-    "motors": {"joints": [2, 5], "joint_types": ["R", "O", "S", "F"], "actuators": MOTORS, "stroke": [0.1, 0.4],
+    "motors": {"joints": [2, 5], "joint_types": ["R", "P", "S", "F"], "actuators": MOTORS, "stroke": [0.1, 0.4],
                "bracket_mass": 0.05},
     "restricted": {"joints": 3, "restrict": {"link_1": [0.1, 0.2], "joint_2": ["O"], "motor_3": ["XL430-W250"]},
-                   "joint_types": ["R", "O", "X"], "actuators": MOTORS,
+                   "joint_types": ["R", "O", "X"], "actuators": MOTORS, "motor_bodies": False,
                    "link_section": {"tubes": [[0.03, 0.002]], "material": "aluminium"}},
     "slides": {"joints": [1, 4], "joint_types": ["X", "T", "S"], "stroke": 0.5, "grid": {"link": 0.02},
                "bracket_mass": 0.2, "mass": {"kind": "per_link", "kg": 0.3}},
     "tubes": {"joints": [1, 4], "joint_types": ["R", "O", "S"], "stroke": [0.1, 0.4], "actuators": MOTORS,
+              "motor_bodies": False,
               "restrict": {"tube_1": "30x2"},
               "link_section": {"tubes": [[0.03, 0.002], [0.02, 0.001]],
                                "material": {"density": 2700, "youngs": 7e10, "shear": 2.7e10, "price_per_kg": 30.0}}},
@@ -175,6 +176,22 @@ def test_proven_obstacles_leave_no_feasible_design(height: float, bounds: list[s
         sampled = violations(checked, random_designs(checked, 3000, np.random.default_rng(0)))
         assert (sampled.max(axis=1) > 0.0).all()
         assert (sampled <= 0.0).any(axis=0).all()  # each alone can be satisfied
+
+
+@pytest.mark.parametrize(("height", "is_proven"), [(0.0, True), (0.0169, True), (0.0171, False), (0.1, False)])
+def test_bases_too_low_for_the_first_motor_are_proven(height: float, is_proven: bool) -> None:
+    """An XL430-W250 or XM430-W350 reaches 17 mm below the base of a turntable, an XM540-W270 22 mm."""
+    keys = {"joints": 2, "restrict": {"joint_1": "Y"}, "actuators": MOTORS, "origin_z": [-0.1, height]}
+    checked = problem(obstacles=[TABLE], of=space(**keys))
+    if not is_proven:
+        assert found(checked) == []
+        return
+    evidence, message = only(checked)
+    assert evidence == PROVEN
+    assert message.startswith(f"origin_z: the base is at most at {height:g} m, but the motor of the first joint")
+    assert "allow bases from 0.017 m up" in message
+    outcomes = checked.evaluate_matrix(checked.space.matrix(checked.space.sample(200, 0)))
+    assert (outcomes.violations > 0.0).any(axis=1).all()
 
 
 def test_arm_of_one_link_stands_on_its_foot() -> None:

@@ -65,8 +65,10 @@ def test_points_have_no_angle_along_their_path() -> None:
     ) == [c for c in IMPLIED if "angle" not in c]
 
 
-def test_tasks_without_a_cycle_imply_nothing() -> None:
-    assert bounds(Problem(task(cycle=None).model_copy(update={"cycle": None}), DRIVEN)) == []
+def test_tasks_without_a_cycle_imply_only_that_motors_do_not_collide() -> None:
+    still = task(cycle=None).model_copy(update={"cycle": None})
+    assert bounds(Problem(still, BARE)) == []
+    assert bounds(Problem(still, DRIVEN)) == ["collision <= 0"]
 
 
 @pytest.mark.parametrize("implied", [*IMPLIED, *DRIVES])

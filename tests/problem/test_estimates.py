@@ -58,7 +58,7 @@ def test_quantities_of_an_arm_at_rest_are_exact() -> None:
         "objectives": ["price", "mass", "length", "joints", "worst_error"],
         "constraints": ["price <= 900", "mass >= 1.5", "voltages <= 1"],
     }
-    space = {"name": "mixed", "joints": [3, 5], "actuators": ["XM540-W270", "RobStride-00"]}
+    space = {"name": "mixed", "joints": [3, 5], "actuators": ["XM540-W270", "RobStride-00"], "motor_bodies": False}
     problem = Problem(Task.model_validate(content), DesignSpace.model_validate(space))
     matrix = sampled(problem, 200)
     bounds, outcomes = lower_bounds(problem, matrix), problem.evaluate_matrix(matrix)

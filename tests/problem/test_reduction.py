@@ -23,6 +23,7 @@ EVERYTHING: dict[str, Any] = {
     "stroke": [0.1, 0.6],
     "limit": [0.5, 2.4],
     "actuators": ["XL430-W250", "XM430-W350"],
+    "motor_bodies": False,  # two joints at one place have no room for them
 }
 TUBES: dict[str, Any] = {"tubes": [[0.03, 0.002], [0.02, 0.001]], "material": "aluminium"}
 SPACES = {

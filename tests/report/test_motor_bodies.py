@@ -29,7 +29,6 @@ SPACE = DesignSpace.model_validate(
         "link": [0.1, 0.3],
         "link_directions": ["+z", "-x"],
         "actuators": ["XM540-W270", "AK60-6"],
-        "motor_bodies": True,
     }
 )
 TASK = Task(name="near", targets=((0.3, 0.0, 0.3), (0.2, 0.2, 0.3)), objectives=("worst_error", "mass"))

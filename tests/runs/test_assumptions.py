@@ -14,7 +14,8 @@ from armwright.tasks.task import Task
 from tests.runs.test_simulation import DESK, SPACE, Desk
 from tests.support.command_line import armwright
 
-SERVO = ["rated_torque", "corner_speed", "rotor_inertia", "coulomb_friction", "viscous_friction"]
+SERVO = ["rated_torque", "corner_speed", "rotor_inertia", "coulomb_friction", "viscous_friction", "shaft_offset"]
+SIZE = {"width": 0.03, "height": 0.04, "depth": 0.03}
 
 
 def assumed_of(actuators: list[Any], with_cycle: bool = True) -> dict[str, list[str]]:
@@ -29,13 +30,13 @@ def test_values_along_a_cycle_are_those_that_move_and_heat_the_motors() -> None:
 
 def test_without_a_cycle_only_torques_at_rest_count() -> None:
     assert named_actuator("XM540-W270").assumed
-    assert assumed_of(["XM540-W270"], with_cycle=False) == {}
-    assert assumed_of(["PH42-020-S300-R"], with_cycle=False) == {"PH42-020-S300-R": ["peak_torque"]}
+    assert assumed_of(["XM540-W270"], with_cycle=False) == {"XM540-W270": ["shaft_offset"]}
+    assert assumed_of(["PH42-020-S300-R"], with_cycle=False) == {"PH42-020-S300-R": ["peak_torque", "shaft_offset"]}
 
 
 def test_estimates_are_assumed_and_stated_values_are_not() -> None:
     stated = dict.fromkeys((*SERVO, "position_gain", "current"), 1.0)
-    full = {"name": "full", "mass": 0.1, "stall_torque": 9.0, "speed": 4.0, "voltage": 12.0, **stated}
+    full = {"name": "full", "mass": 0.1, "stall_torque": 9.0, "speed": 4.0, "voltage": 12.0, **SIZE, **stated}
     estimate = {**full, "name": "estimate", "estimates": ["rotor_inertia", "price"], "price": 9.0}
     assert assumed_of([full, estimate]) == {"estimate": ["rotor_inertia"]}
 
@@ -67,7 +68,7 @@ def test_files_state_assumed_values(run: Path) -> None:
 
 
 def test_commands_state_assumed_values(run: Path) -> None:
-    assert "assumed values of actuators: 5 of XM540-W270" in armwright("pick", run).stdout
+    assert "assumed values of actuators: 6 of XM540-W270" in armwright("pick", run).stdout
     sheet = armwright("export", run, "--format", "sheet").stdout
     assert (
         "Assumed values of actuators, defaults of their kind or estimates: XM540-W270: rated torque 2.65 N m" in sheet

@@ -45,7 +45,7 @@ SPACE: dict[str, Any] = {
     "actuators": ["XM540-W270"],
 }
 LINKS = (0.12, 0.26, 0.22, 0.08, 0.06)
-WEAK = {"name": "weak", "mass": 0.165, "stall_torque": 1.2, "speed": 4.0}
+WEAK = {"name": "weak", "mass": 0.165, "stall_torque": 1.2, "speed": 4.0, "width": 0.04, "height": 0.06, "depth": 0.04}
 
 
 class Desk:
@@ -184,7 +184,7 @@ def test_an_arm_with_an_obstacle_in_its_way_fails(shape: Mapping[str, Any]) -> N
 def test_contacts_are_the_overlaps_of_our_clearance() -> None:
     """In random postures, with the base on the ground and a box nearby."""
     ground = [{"kind": "ground", "z": 0.02}, {"kind": "box", "center": [0.3, 0.1, 0.1], "size": [0.1, 0.1, 0.2]}]
-    blocked = Desk(obstacles=ground)
+    blocked = Desk(SPACE | {"motor_bodies": False}, obstacles=ground)  # tests/kinematics/test_motor_bodies.py has them
     model = mujoco.MjModel.from_xml_string(blocked.files[MODEL])
     data = mujoco.MjData(model)
     rng = np.random.default_rng(0)

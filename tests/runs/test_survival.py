@@ -28,7 +28,7 @@ from armwright.tasks.task import Task
 from tests.runs.test_simulation import DESK, SPACE, Desk
 
 SERVO = "XM540-W270"
-VALUES = ("rated_torque", "rotor_inertia", "coulomb_friction", "viscous_friction")  # assumed, and not 0
+VALUES = ("rated_torque", "rotor_inertia", "coulomb_friction", "viscous_friction", "shaft_offset")  # assumed, and not 0
 BOUNDS: dict[str, Any] = {"constraints": ["thermal_utilisation <= 0.9"]}
 ROOM: dict[str, Any] = {
     "constraints": ["thermal_utilisation <= 9", "dynamic_utilisation <= 9", "speed_utilisation <= 9"]

@@ -25,7 +25,9 @@ EXACT = (MASS, PRICE)
 
 
 def space(**keys: Any) -> DesignSpace:
-    return DesignSpace.model_validate({"name": "s", "joints": 2, "actuators": ["XL430-W250"], **keys})
+    return DesignSpace.model_validate(
+        {"name": "s", "joints": 2, "actuators": ["XL430-W250"], "motor_bodies": False, **keys}
+    )
 
 
 def problem(of: DesignSpace, *obstacles: dict[str, Any]) -> Problem:

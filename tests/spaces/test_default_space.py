@@ -22,16 +22,16 @@ KNOWN = {
         "AK80-64 RobStride-04 AK80-64 RobStride-04 RobStride-06 RobStride-00",
     ),
     "casting-inspection": (
-        (0.0922, 0.0104, 0.0681),
+        (0.0995, 0.0462, 0.1461),
         "YPYPP",
-        (0.03, 0.1697, 0.1573, 0.1615, 0.0304),
-        "XC430-W240 XM540-W270 XC430-W240 XM430-W350 XC430-W240",
+        (0.0599, 0.092, 0.137, 0.2152, 0.0308),
+        "XC430-W240 XM540-W150 XC430-W240 XM430-W350 XC430-W240",
     ),
     "desk-sorting": (
-        (-0.0428, 0.0, 0.0498),
+        (0.04, 0.0, 0.0553),
         "YPPP",
-        (0.0497, 0.2163, 0.24, 0.0524),
-        "XM430-W350 XM540-W270 XM540-W270 XC430-W240",
+        (0.1327, 0.1868, 0.1063, 0.0304),
+        "XM430-W210 XM540-W150 XC430-W240 XC430-W240",
     ),
     "dispensing": (
         (0.0321, 0.0668, 0.1587),
@@ -46,10 +46,10 @@ KNOWN = {
         "RobStride-04 RobStride-04 RobStride-04 RobStride-03 RobStride-02 RobStride-00",
     ),
     "screwing": (
-        (0.0428, -0.052, 0.1639),
+        (0.05, -0.067, 0.1526),
         "YPPP",
-        (0.0526, 0.2446, 0.207, 0.066),
-        "RobStride-00 RobStride-06 RobStride-02 RobStride-05",
+        (0.0799, 0.1744, 0.2958, 0.0402),
+        "RobStride-00 RobStride-00 RobStride-00 RobStride-05",
     ),
 }
 OWN = sorted(set(builtin_spaces()) & set(builtin_names()))

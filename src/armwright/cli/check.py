@@ -102,7 +102,7 @@ def record_check(problem: Problem, findings: Sequence[Finding], n_samples: int) 
 
 def show_check(console: Console, problem: Problem) -> None:
     """Print what a task and a space mean."""
-    bodies = problem.space.motor_bodies
+    bodies = problem.space.has_motor_bodies
     show_task(console, problem.task, has_drives=problem.has_drives, has_motor_bodies=bodies, is_brief=True)
     show_target_table(console, problem)
     show_cycle(console, problem.task)

@@ -36,7 +36,7 @@ def assumed_values(problem: Problem, arms: Iterable[Arm] | None = None, also: It
         entering.add("joint_stiffness")
     if problem.uses(BACKLASH_ERROR):
         entering.add("backlash")
-    if problem.space.motor_bodies:
+    if problem.space.has_motor_bodies:
         entering.add("shaft_offset")
     found = {record.name: _values(record, entering) for record in records}
     return {name: values for name, values in found.items() if values}

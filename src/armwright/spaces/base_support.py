@@ -36,7 +36,7 @@ def supported_space(space: DesignSpace, obstacles: Sequence[Obstacle]) -> Design
         foot = faces["origin_z"][0]
         if space.column is not None:
             faces["origin_z"] = (foot, math.inf)
-        elif space.motor_bodies:  # the first motor is between the face and the base
+        elif space.has_motor_bodies:  # the first motor is between the face and the base
             reach = max(actuator.shape.reach for actuator in space.arm_actuators if actuator.shape is not None)
             faces["origin_z"] = (foot, foot + reach)
         changes |= {name: _narrowed(space, name, face, obstacle) for name, face in faces.items()}

@@ -82,7 +82,7 @@ def stack_designs(
         per_joint[name] = _in_last_slot(columns.of_links(space.tube_values(name), np.inf), n_slots, np.inf)
     if motors is not None:
         per_joint["ratings"] = motors.ratings
-    if space.motor_bodies:
+    if space.has_motor_bodies:
         motor, direction = _motor_choices(space, columns), _link_directions(space, columns)
         values = motor_body_values(space, motor, joints.plan, direction, columns.mount)
         per_joint |= {f"body_{name}": value for name, value in values.items()}
@@ -119,7 +119,7 @@ def stack_designs(
         else actuation_at_joints(
             flat["ratings"], flat["travel"], motors.price, np.full(columns.n, space.safety_factor)
         ),
-        motor_bodies=_motor_bodies(flat, precision) if space.motor_bodies else None,
+        motor_bodies=_motor_bodies(flat, precision) if space.has_motor_bodies else None,
     )
 
 

@@ -66,8 +66,8 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     """Names from the catalogue, or records; several add the parameters motor_j. Empty: joints without mass."""
     safety_factor: float = Field(default=1.5, gt=0.0, le=100.0)
     """Factor of the torque that the actuators have to deliver."""
-    motor_bodies: bool = False
-    """Whether the actuators are solid bodies, which count in collisions."""
+    motor_bodies: bool = True
+    """Whether the actuators, if there are any, are solid bodies, which count in collisions."""
     bracket_mass: float = Field(default=0.0, ge=0.0, le=1e4)
     """Mass of brackets and screws at each joint that moves, where its actuator is [kg]."""
     restrict: tuple[tuple[str, Restriction], ...] = Field(default=(), max_length=100)
@@ -130,6 +130,11 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
     def min_stroke(self) -> float:
         """The stroke of prismatic joints, the shortest if it is a parameter [m]."""
         return self.stroke if isinstance(self.stroke, (int, float)) else self.stroke[0]
+
+    @property
+    def has_motor_bodies(self) -> bool:
+        """Whether there are actuators, and their bodies count."""
+        return bool(self.actuators) and self.motor_bodies
 
     @property
     def arm_actuators(self) -> tuple[Actuator, ...]:
@@ -265,20 +270,18 @@ def _check_duplicates(space: SpaceSchema) -> None:
 
 
 def _check_motor_bodies(space: SpaceSchema) -> None:
-    if not space.motor_bodies:
+    if not space.has_motor_bodies:
         return
-    if not space.actuators:
-        raise ValueError("motor_bodies: expected actuators, got none; try actuators: [XM430-W350]")
     shared = [letter for letter in space.joint_types if len(MODULES[letter].joints) > 1]
     if shared:
         raise ValueError(
-            f"motor_bodies: expected joint_types with one actuator each, got {', '.join(shared)} with two at one "
-            "place, which overlap; try R and P"
+            f"joint_types: expected modules with one actuator each, got {', '.join(shared)} with two at one place, "
+            "whose bodies overlap; try R and P, or motor_bodies: false"
         )
     for record in space.actuators:
         missing = [name for name in DIMENSIONS if value_of(record, name) is None]
         if missing:
             raise ValueError(
-                f"motor_bodies: expected the dimensions [m] of every actuator, got none for {record.name}: "
-                f"{', '.join(missing)}; describe it with them or leave it out"
+                f"actuators: expected the dimensions [m] of every body, got none for {record.name}: "
+                f"{', '.join(missing)}; add them, leave the actuator out, or try motor_bodies: false"
             )
