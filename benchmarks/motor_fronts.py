@@ -3,7 +3,7 @@
 Each task is searched twice with one seed. `stay` is how many designs of the front of a search without bodies are
 feasible when bodies count. For the front of a search with them, Coal and Pinocchio read the exported URDF and SRDF and
 follow the exported trajectories: `least` is the smallest distance of a motor from another one, from a link that is not
-next to it, or from an obstacle (of a motor at rest, only if it is inside). If it is positive, nothing is inside anything.
+next to it, or from an obstacle (of a motor at rest, only if it is inside). If it is positive, nothing overlaps.
 
     python benchmarks/motor_fronts.py [--evaluations 3000] [TASK ...]      # some 30 minutes on two cores
 """

@@ -30,6 +30,7 @@ TUBES = DesignSpace.model_validate(
     {
         "joints": [2, 4],
         "joint_types": ["R", "P", "Y", "S", "O", "F"],
+        "motor_bodies": False,  # two joints at one place have no room for them
         "actuators": ["XM540-W270", "FHA-14C-100"],
         "origin_z": [0.0, 0.0],
         "link_section": {"tubes": [[0.020, 0.0015], [0.030, 0.002]], "per_link": True, "material": "aluminium"},

@@ -32,7 +32,9 @@ from tests import ROOT
 BIG = {"name": "big", "mass": 0.165, "stall_torque": 10.6, "rated_torque": 4.0, "speed": 3.1, "price": 400.0}
 MID = {"name": "mid", "mass": 0.082, "stall_torque": 4.1, "price": 250.0}
 SMALL = {"name": "small", "mass": 0.0572, "stall_torque": 1.5, "price": 50.0}
-SPACE = DesignSpace.model_validate({"name": "motors", "actuators": [BIG, MID, SMALL], "safety_factor": 2.0})
+SPACE = DesignSpace.model_validate(
+    {"name": "motors", "actuators": [BIG, MID, SMALL], "safety_factor": 2.0, "motor_bodies": False}
+)
 TASK = Task(name="loaded", targets=((0.3, 0.0, 0.2), (0.2, 0.2, 0.3)), payload=0.1)
 
 
@@ -120,7 +122,7 @@ def test_voltages_counts_different_supplies() -> None:
     rows = [("XL330-M288", "XM430-W350", "XM540-W270"), ("XM540-W270", "XM430-W350", "XM540-W270"), ("XL330-M288",) * 3]
     designs = [space.design(base | {f"motor_{j}": m for j, m in enumerate(row, start=1)}) for row in rows]
     assert problem.evaluate(designs).violations[:, 0].tolist() == [1.0, 0.0, 0.0]
-    unknown = DesignSpace.model_validate({"actuators": [MID]})
+    unknown = DesignSpace.model_validate({"actuators": [MID], "motor_bodies": False})
     with pytest.raises(SettingsError, match="voltages needs the voltage of every actuator"):
         Problem(problem.task, unknown).evaluate(unknown.sample(1, 0))
 
@@ -136,7 +138,7 @@ def test_torque_utilisation_is_the_worst_share_of_peak_torque_with_the_safety_fa
 
 
 def test_single_actuator_is_not_a_parameter() -> None:
-    single = DesignSpace.model_validate({"actuators": [MID]})
+    single = DesignSpace.model_validate({"actuators": [MID], "motor_bodies": False})
     assert len(single.parameters) == 11
     design = single.sample(1, 0)[0]
     assert [joint.actuator.name for joint in single.arm(design).joints] == ["mid"] * 4
@@ -168,7 +170,9 @@ def test_objectives_report_missing_actuators() -> None:
         problem = Problem(TASK, objectives=named_objectives([name]))
         with pytest.raises(SettingsError, match=f"objective {name} needs actuators"):
             problem.evaluate(problem.space.sample(1, 0))
-    unpriced = DesignSpace.model_validate({"actuators": [{"name": "x", "mass": 0.1, "stall_torque": 1.0}]})
+    unpriced = DesignSpace.model_validate(
+        {"actuators": [{"name": "x", "mass": 0.1, "stall_torque": 1.0}], "motor_bodies": False}
+    )
     with pytest.raises(SettingsError, match="needs the price of every actuator"):
         Problem(TASK, unpriced, objectives=named_objectives(["price"])).evaluate(unpriced.sample(1, 0))
 

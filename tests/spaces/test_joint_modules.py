@@ -37,6 +37,7 @@ EVERYTHING: dict[str, Any] = {
     "limit": [0.5, 2.4],
     "travel": 0.004,
     "actuators": ["XL430-W250", "XM430-W350", "XM540-W270"],
+    "motor_bodies": False,  # two joints at one place have no room for them
     "link_section": {
         "tubes": [[0.03, 0.002], [0.02, 0.0015], [0.04, 0.02]],
         "material": {"density": 2700, "youngs": 70e9, "shear": 27e9, "price_per_kg": 12.5},
