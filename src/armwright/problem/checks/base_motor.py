@@ -43,12 +43,12 @@ def _first_bodies(problem: Problem) -> list[tuple[str, MotorBody]]:
     """Return the bodies that the actuator of the first joint may have, by its name; none if that joint may be fixed."""
     space = problem.space
     choices = {p.name: p.choices for p in space.parameters if isinstance(p, CategoricalParameter)}
-    letters = [letter for letter in space.joint_types if letter in choices["joint_1"]]
+    modules = [MODULES[letter] for letter in space.joint_types if letter in choices["joint_1"]]
     names = choices.get("motor_1", tuple(record.name for record in space.actuators))
-    if not all(MODULES[letter].is_actuated for letter in letters):
+    if not all(module.is_actuated for module in modules):
         return []
     return [
-        (actuator.name, placed_body(actuator.shape, MODULES[letter].joints[0][1], DIRECTIONS["+z"]))
-        for actuator, letter in product(space.arm_actuators, letters)
+        (actuator.name, placed_body(actuator.shape, module.joints[0][1], DIRECTIONS["+z"]))
+        for actuator, module in product(space.arm_actuators, modules)
         if actuator.name in names and actuator.shape is not None
     ]
