@@ -1,7 +1,9 @@
 """How many designs that are called feasible can be driven: the fronts of twelve tasks with cycles, in MuJoCo.
 
 The six built-in tasks with cycles and six of examples/, each searched with one seed; then every design of the front is
-driven by armwright and by check_simulation.py, which knows armwright's files only.
+driven by armwright and by check_simulation.py, which knows armwright's files only. `motors` is the least distance of a
+motor from anything but its neighbours by Coal, along the exported trajectories. `without bodies` is how many designs of
+the front of a search that ignores motor bodies are feasible with them.
 
     python benchmarks/drivable.py [--evaluations 20000] [TASK ...]      # some 30 minutes on two cores
 """
@@ -15,6 +17,7 @@ from tempfile import TemporaryDirectory
 
 import check_simulation
 import numpy as np
+from motor_clearance import motor_clearance
 
 import armwright as aw
 from armwright.arrays import Array
@@ -31,7 +34,12 @@ JUMP = 1.5  # times the largest speed nearby, by which joints change from row to
 
 @dataclass(frozen=True)
 class Result:
-    """What was found for a task: reasons of failures, and (K,) |simulated / claimed - 1| of all joints' peaks."""
+    """What was found for a task: reasons of failures, and (K,) |simulated / claimed - 1| of all joints' peaks.
+
+    Attributes:
+        motors: The least distance of a motor [m]; infinite without motors.
+        without_bodies: Designs of a front that ignores motor bodies, and how many of them are feasible with them.
+    """
 
     task: str
     designs: int
@@ -41,6 +49,8 @@ class Result:
     recommended: tuple[str, ...]
     deviations: Array
     reasons: Counter[str]
+    motors: float
+    without_bodies: tuple[int, int]
 
 
 def main() -> None:
@@ -48,7 +58,10 @@ def main() -> None:
     parser.add_argument("--evaluations", type=int, default=20_000)
     parser.add_argument("tasks", nargs="*", default=[*BUILT_IN, *EXAMPLES])
     chosen = parser.parse_args()
-    print(f"{'task':18s} designs verified agreed jumps recommended  peak torque off: median, worst")
+    print(
+        f"{'task':18s} designs verified agreed jumps recommended  peak torque off: median, worst, motors [mm], "
+        "without bodies"
+    )
     results: list[Result] = []
     with ProcessPoolExecutor(2) as pool:
         for result in pool.map(measure, chosen.tasks, [chosen.evaluations] * len(chosen.tasks)):
@@ -68,7 +81,8 @@ def show(result: Result) -> None:
     off = result.deviations if len(result.deviations) else np.zeros(1)
     print(
         f"{result.task:18s} {result.designs:7d} {result.verified:8d} {result.agreed:6d} {result.jumps:5d} {shown:12s} "
-        f"{np.median(off):6.2%} {off.max():6.1%}",
+        f"{np.median(off):6.2%} {off.max():6.1%} {1e3 * result.motors:8.2f}   {result.without_bodies[1]} of "
+        f"{result.without_bodies[0]}",
         flush=True,
     )
     for reason, count in result.reasons.most_common():
@@ -77,7 +91,8 @@ def show(result: Result) -> None:
 
 def measure(name: str, evaluations: int) -> Result:
     """Search the front of a task and drive all its designs."""
-    history = aw.find_front(problem(name), evaluations=evaluations, seed=0).history
+    searched = problem(name)
+    history = aw.find_front(searched, evaluations=evaluations, seed=0).history
     simulator = Simulator(history)
     members = [simulator(member.number) for member in history.front]
     with TemporaryDirectory() as folder:
@@ -92,7 +107,23 @@ def measure(name: str, evaluations: int) -> Result:
         recommended=tuple(one.status for one in recommend(history, simulator)),
         deviations=np.concatenate([deviations(member) for member in members]) if members else np.empty(0),
         reasons=Counter(failures),
+        motors=min(
+            (
+                motor_clearance(history.member(member.result.design).arm, member.trajectory.q, searched.task.obstacles)
+                for member in members
+            ),
+            default=np.inf,
+        ),
+        without_bodies=without_bodies(searched, evaluations) if searched.space.has_motor_bodies else (0, 0),
     )
+
+
+def without_bodies(searched: aw.Problem, evaluations: int) -> tuple[int, int]:
+    """Return how many designs a search that ignores motor bodies finds, and how many are feasible with them."""
+    space = searched.space.model_validate(searched.space.model_dump() | {"motor_bodies": False})
+    found = aw.find_front(aw.Problem(searched.task, space), evaluations=evaluations, seed=0).history.front
+    outcomes = searched.evaluate([searched.space.design(member.design.params) for member in found])
+    return len(found), int((outcomes.violations <= 0.0).all(axis=1).sum())
 
 
 def problem(name: str) -> aw.Problem:
