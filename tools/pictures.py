@@ -196,9 +196,9 @@ PICTURES: dict[str, Shot] = {
     "page-live.png": live_report,
     "tutorial.png": tutorial,
     "example-shelf.png": arm_of(
-        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=9&target=4", drag=90, zoom=250
+        "3-long-shelf-task.yaml", "3-long-shelf-space.yaml", 8000, "#design=6&target=4", drag=90, zoom=250
     ),
-    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=3&target=3"),
+    "example-obstacles.png": arm_of("5-obstacle-reach.yaml", "5-obstacle-reach-space.yaml", 8000, "#design=4&target=3"),
     "example-stiffness.png": stiffness,
     "compare-arms.png": existing_arms,
     "dashboard.png": dashboard,
