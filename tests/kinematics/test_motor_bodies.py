@@ -56,7 +56,7 @@ PITCH = DesignSpace.model_validate(
 
 
 class Exported:
-    """The motors of an arm's URDF in Coal, and its links as capsules, placed by Pinocchio."""
+    """Motors and column of an arm's URDF in Coal, and its links as capsules, placed by Pinocchio."""
 
     def __init__(self, arm: Arm) -> None:
         urdf = to_urdf(arm)
@@ -64,6 +64,7 @@ class Exported:
         self._geometry = pinocchio.buildGeomFromUrdfString(self._model, urdf, pinocchio.GeometryType.COLLISION)
         self.links: list[tuple[Any, coal.Transform3s]] = []
         self.motors: dict[int, tuple[Any, coal.Transform3s]] = {}
+        self.column: tuple[Any, coal.Transform3s] | None = None
 
     def at(self, q: Array) -> "Exported":
         """Place all in this posture."""
@@ -79,6 +80,8 @@ class Exported:
             if solid.name.startswith("motor_"):
                 number = int(solid.name.removeprefix("motor_").removesuffix("_0")) - 1
                 self.motors[number] = (solid.geometry, coal.Transform3s(at.rotation, at.translation))
+            if solid.name.startswith("column"):
+                self.column = (solid.geometry, coal.Transform3s(at.rotation, at.translation))
         return self
 
     def own_clearance(self) -> float:
@@ -89,6 +92,13 @@ class Exported:
             others += [link for k, link in enumerate(self.links) if k not in (j - 1, j)]
             found = min([found, *(apart(motor, other) for other in others)])
         return found
+
+    def column_clearance(self) -> float:
+        """Of the column from links and motors, of arms whose joints all move; the first of both stand on it."""
+        if self.column is None:
+            return np.inf
+        others = [*self.links[1:], *(motor for j, motor in self.motors.items() if j > 0)]
+        return min([np.inf, *(apart(self.column, other) for other in others)])
 
     def obstacle_clearance(self, obstacles: Sequence[Obstacle]) -> float:
         """Of motors from obstacles; the first motor is at rest, so that only overlaps count."""

@@ -102,8 +102,8 @@ def record_check(problem: Problem, findings: Sequence[Finding], n_samples: int) 
 
 def show_check(console: Console, problem: Problem) -> None:
     """Print what a task and a space mean."""
-    bodies = problem.space.has_motor_bodies
-    show_task(console, problem.task, has_drives=problem.has_drives, has_motor_bodies=bodies, is_brief=True)
+    has_bodies = problem.space.has_bodies
+    show_task(console, problem.task, has_drives=problem.has_drives, has_bodies=has_bodies, is_brief=True)
     show_target_table(console, problem)
     show_cycle(console, problem.task)
     minimised = ", ".join(f"{objective.name} [{objective.unit}]" for objective in problem.objectives)

@@ -94,7 +94,7 @@ def show_task(
     best_known: float | None = None,
     stored: Sequence[Baseline] = (),
     has_drives: bool = False,
-    has_motor_bodies: bool = False,
+    has_bodies: bool = False,
     is_brief: bool = False,
 ) -> None:
     """Print a task.
@@ -105,7 +105,7 @@ def show_task(
         best_known: Its best known hypervolume, if any.
         stored: Its baselines.
         has_drives: Whether the torques and speeds of the joints are limited, which a cycle turns into constraints.
-        has_motor_bodies: Whether the bodies of the actuators count, which may not collide.
+        has_bodies: Whether motors or a column are solid bodies, which may not collide.
         is_brief: Leave out the targets and the steps of the cycle.
     """
     reference = task.reference_point
@@ -127,8 +127,8 @@ def show_task(
         ("cycle", "" if is_brief else task.cycle_description),
         ("durations", task.cycle.describe_times() if task.cycle and not is_brief else ""),
         (
-            "constraints of the cycle" if task.cycle else "constraints of the motor bodies",
-            ", ".join(implied_constraints(task, has_drives, has_motor_bodies)),
+            "constraints of the cycle" if task.cycle else "constraints of the solid bodies",
+            ", ".join(implied_constraints(task, has_drives, has_bodies)),
         ),
         *(("workspace", region.describe()) for region in task.workspace),
         ("reference point", "found by the search" if reference is None else format_point(reference)),

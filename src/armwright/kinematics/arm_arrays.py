@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import ArmError, SettingsError, did_you_mean
 from armwright.kinematics.actuation import Actuation, actuation_of
+from armwright.kinematics.columns import Columns, stack_columns
 from armwright.kinematics.motor_bodies import MotorBodies, stack_bodies
 from armwright.kinematics.rigid_bodies import Bodies, PerArm, RigidBodies, Tools, joined, rigid_bodies
 from armwright.robot.arm import AXES, Arm, Joint, Link, MountedTool
@@ -60,6 +61,7 @@ class ArmArrays(PerArm):
     bodies: Bodies  # without tools; for dynamics alone
     actuation: Actuation | None = None  # None unless all moving joints have actuators
     motor_bodies: MotorBodies | None = None  # None if the bodies of actuators do not count
+    columns: Columns | None = None  # None if no base stands on a column
 
     def __len__(self) -> int:
         return len(self.base)
@@ -165,6 +167,7 @@ def stack_arms(arms: Sequence[Arm], precision: Precision = "float32") -> ArmArra
         bodies=bodies,
         actuation=actuation_of(arms, travel),
         motor_bodies=stack_bodies(arms, dof, precision),
+        columns=stack_columns(arms, precision),
     )
 
 

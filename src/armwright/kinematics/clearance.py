@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.chunks import in_chunks
-from armwright.kinematics.devices import Device, load_clearance, load_motor_clearance
+from armwright.kinematics.devices import Device, load_clearance, load_column_clearance, load_motor_clearance
 from armwright.tasks.obstacles import SHAPES, Obstacle
 
 MAX_CHUNK: dict[Device, int] = {"cpu": 2**14, "cuda": 2**20}  # postures; on the CPU their links fit into a cache
@@ -25,8 +25,9 @@ def clearances(
 
     These are the smallest distances of two links that are not neighbours, and of a link from an obstacle. The bodies of
     actuators count as well, if the arms have them: from each other, from links that they do not join, and from
-    obstacles. Clearances are negative for overlaps, and infinite without obstacles or links to compare. The tool is
-    ignored, since it is made to touch.
+    obstacles. A column below the base counts as a part of the arm; its distance from obstacles is ignored. Clearances
+    are negative for overlaps, and infinite without obstacles or links to compare. The tool is ignored, since it is made
+    to touch.
 
     Args:
         arms: N arms of up to D joints.
@@ -57,7 +58,7 @@ def straight_motor_clearance(arms: ArmArrays, device: Device = "cpu") -> Array:
 
     Motors that overlap there leave no room for the link between their joints.
     """
-    motors = replace(arms, radius=np.zeros_like(arms.radius))  # links of radius 0 are ignored
+    motors = replace(arms, radius=np.zeros_like(arms.radius), columns=None)  # links of radius 0 are ignored
     straight = np.clip(0.0, arms.lower, arms.upper)[:, None].astype(np.float64)
     return clearances(motors, straight, device=device)[0][:, 0]
 
@@ -74,18 +75,18 @@ def _distances(
     starts, ends = (wp.empty(q.shape, dtype=vector, device=device) for _ in range(2))
     offset = arms.offset.copy()
     offset[np.arange(len(arms)), arms.n_joints - 1] -= arms.tool.tip.astype(arms.precision)
-    motion = on_device(arms.motion, wp.int32)
-    posed = [on_device(arms.base, vector), motion, on_device(offset, vector)]
-    posed.append(on_device(q.astype(arms.precision), real))
+    base, motion = on_device(arms.base, vector), on_device(arms.motion, wp.int32)
+    posed = [base, motion, on_device(offset, vector), on_device(q.astype(arms.precision), real)]
     wp.launch(kernels.link_axes, dim, inputs=[*posed, starts, ends], device=device)
     self_clearance, obstacle_clearance = (on_device(np.full(dim, np.inf, dtype=arms.precision), real) for _ in range(2))
     links = [starts, ends, on_device(arms.radius, real)]
     wp.launch(kernels.self_clearance, dim, inputs=[motion, *links, self_clearance], device=device)
     if solids is not None:
         wp.launch(kernels.obstacle_clearance, dim, inputs=[*links, *solids, obstacle_clearance], device=device)
-    bodies = arms.motor_bodies
-    if bodies is not None:
+    placed: list[Any] | None = None
+    if arms.motor_bodies is not None:
         _, motors = load_motor_clearance(arms.precision, device)
+        bodies = arms.motor_bodies
         shape, axis = on_device(bodies.shape, wp.int32), on_device(bodies.axis, wp.int32)
         half, centre = on_device(bodies.half, vector), on_device(bodies.centre, vector)
         middle, into = wp.empty(q.shape, vector, device=device), wp.empty(q.shape, kernels.Matrix3, device=device)
@@ -94,6 +95,12 @@ def _distances(
         wp.launch(motors.self_clearance, dim, inputs=[*placed, *links, self_clearance], device=device)
         if solids is not None:
             wp.launch(motors.obstacle_clearance, dim, inputs=[*placed, *solids, obstacle_clearance], device=device)
+    if arms.columns is not None:
+        _, column = load_column_clearance(arms.precision, device)
+        standing = [base, on_device(arms.columns.half, vector)]
+        wp.launch(column.link_clearance, dim, inputs=[*standing, motion, *links, self_clearance], device=device)
+        if placed is not None:
+            wp.launch(column.motor_clearance, dim, inputs=[*standing, *placed, self_clearance], device=device)
     return np.stack([self_clearance.numpy(), obstacle_clearance.numpy()])
 
 

@@ -89,6 +89,12 @@ def load_motor_clearance(precision: Precision, device: Device) -> tuple[Any, Any
         return _warp(), _load_motor_clearance(precision, device)
 
 
+def load_column_clearance(precision: Precision, device: Device) -> tuple[Any, Any]:
+    """Return Warp and one variant of the kernels of clearance for columns."""
+    with _loading:
+        return _warp(), _load_column_clearance(precision, device)
+
+
 def load_path(device: Device) -> tuple[Any, Any]:
     """Return Warp and the kernels along lines."""
     with _loading:
@@ -143,6 +149,16 @@ def _load_motor_clearance(precision: Precision, device: Device) -> Any:
 
         kernels = motor_kernels(precision)
         _load_modules((kernels.motor_frames, kernels.self_clearance, kernels.obstacle_clearance), device)
+    return kernels
+
+
+@cache
+def _load_column_clearance(precision: Precision, device: Device) -> Any:
+    with _report_cache_errors():
+        from armwright.kinematics.column_kernels import column_kernels
+
+        kernels = column_kernels(precision)
+        _load_modules((kernels.link_clearance, kernels.motor_clearance), device)
     return kernels
 
 

@@ -89,6 +89,15 @@ def motor_solids(arm: Arm, q: Sequence[float] | Array) -> list[tuple[Axis, Solid
     return found
 
 
+def column_solid(arm: Arm) -> Solid | None:
+    """Return the solid of the column that the base stands on; None without one."""
+    if arm.column is None:
+        return None
+    radius, half = arm.column.radius, arm.column.length / 2
+    x, y, z = arm.base
+    return Solid("cylinder", (x, y, z - half), np.eye(3), (radius, radius, half))
+
+
 def _link_ends(arm: Arm, frames: Frames) -> Array:
     """Return the (J, 3) positions of the base and of the ends of all links but the last [m]."""
     offsets = np.array([link.offset for link in arm.links])

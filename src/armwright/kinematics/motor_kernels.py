@@ -34,9 +34,9 @@ def motor_kernels(precision: Precision) -> MotorKernels:
     base, solids, convex = frame_math(precision), solid_math(precision), convex_math(precision)
     real, Vector3, Matrix3 = base.real, base.Vector3, base.Matrix3
     translate, rotate = base.translate, base.rotate
-    signed_distance, along_segment = solids.signed_distance, solids.along_segment
+    signed_distance, nearer_link = solids.signed_distance, solids.nearer_link
     extent, separation = convex.extent, convex.separation
-    zero, half_, one = real(0.0), real(0.5), real(1.0)
+    zero, one = real(0.0), real(1.0)
 
     @kernel
     def motor_frames(
@@ -79,11 +79,7 @@ def motor_kernels(precision: Precision) -> MotorKernels:
         nearest: real, shape: int, half: Vector3, middle: Vector3, into: Matrix3, a: Vector3, b: Vector3, radius: real
     ):
         """Return the smaller of a distance and that of a body from a link with the axis from a to b."""
-        p, v = into * (a - middle), into * (b - a)
-        bound = signed_distance(shape, p + half_ * v, half) - half_ * wp.length(v)
-        if bound - radius < nearest:
-            return wp.min(nearest, along_segment(shape, p, v, half) - radius)
-        return nearest
+        return nearer_link(nearest, shape, half, into * (a - middle), into * (b - a), radius)
 
     @kernel
     def self_clearance(

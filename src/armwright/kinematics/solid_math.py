@@ -25,6 +25,7 @@ class SolidMath:
 
     signed_distance: Any
     along_segment: Any
+    nearer_link: Any
 
 
 @cache
@@ -90,4 +91,12 @@ def solid_math(precision: Precision) -> SolidMath:
                 high = middle
         return signed_distance(shape, p + half * (low + high) * v, size)
 
-    return SolidMath(signed_distance, along_segment)
+    @wp.func
+    def nearer_link(nearest: real, shape: int, size: Vector3, p: Vector3, v: Vector3, radius: real):
+        """Return the smaller of a distance and that of a solid from a link with the axis from p to p + v."""
+        bound = signed_distance(shape, p + half * v, size) - half * wp.length(v)
+        if bound - radius < nearest:
+            return wp.min(nearest, along_segment(shape, p, v, size) - radius)
+        return nearest
+
+    return SolidMath(signed_distance, along_segment, nearer_link)

@@ -74,16 +74,16 @@ def read_constraints(texts: Sequence[str]) -> tuple[Constraint, ...]:
     return constraints
 
 
-def implied_constraints(task: Task, has_actuators: bool, has_motor_bodies: bool) -> tuple[str, ...]:
-    """Return the constraints that a cycle and motor bodies imply, except for quantities that the task bounds itself.
+def implied_constraints(task: Task, has_actuators: bool, has_bodies: bool) -> tuple[str, ...]:
+    """Return the constraints that a cycle and solid bodies imply, except for quantities that the task bounds itself.
 
     Args:
         task: The task.
         has_actuators: Whether the torques and speeds of the joints are limited.
-        has_motor_bodies: Whether the bodies of the actuators count.
+        has_bodies: Whether motors or a column are solid bodies.
     """
     implied = _cycle_bounds(task.cycle, task.target_arrays.oriented, has_actuators) if task.cycle else {}
-    implied |= {"collision": 0.0} if has_motor_bodies else {}
+    implied |= {"collision": 0.0} if has_bodies else {}
     own = {constraint.quantity.name for constraint in read_constraints(task.constraints)}
     own |= {"collision"} if own & {quantity.name for quantity in CLEARANCES} else set()
     return tuple(f"{name} <= {bound:.12g}" for name, bound in implied.items() if name not in own)

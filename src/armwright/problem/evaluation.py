@@ -204,7 +204,7 @@ class Evaluation(Scene):
 
     @property
     def self_clearance(self) -> Array:
-        """(N, T) smallest distance of two links or motor bodies that are not neighbours [m]; infinite without any.
+        """(N, T) smallest distance of two links, motor bodies or the column, no neighbours [m]; infinite without any.
 
         It and the other clearances are of a target's posture and of the motions of steps to it. Motor bodies may not
         overlap in the straight posture either.

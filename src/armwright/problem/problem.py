@@ -134,7 +134,7 @@ class Problem:
             SettingsError: evaluator, tolerance, objectives and task do not go together.
         """
         object.__setattr__(self, "space", supported_space(self.space, self.task.obstacles))
-        implied = implied_constraints(self.task, self.has_drives, self.space.has_motor_bodies)
+        implied = implied_constraints(self.task, self.has_drives, self.space.has_bodies)
         texts = (*self.task.constraints, *implied)
         object.__setattr__(self, "constraints", read_constraints(texts))
         if not self.objectives:

@@ -12,7 +12,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from armwright.kinematics.forward import forward_kinematics, joint_positions, link_lines, motor_solids, rails
+from armwright.kinematics.forward import (
+    column_solid,
+    forward_kinematics,
+    joint_positions,
+    link_lines,
+    motor_solids,
+    rails,
+)
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.objectives import TORQUE
 from armwright.report.drawing import legend_mark
@@ -91,6 +98,9 @@ def _draw_panel(
                 axes.plot(*np.array([one, other]).T, **EDGE)
     _draw_motions(axes, evaluation, row, targets)
     arm = member.arm
+    column = column_solid(arm)
+    if column is not None:
+        draw_solid(axes, column, extent, LINK)
     alpha = 1.0 if len(targets) == 1 else 0.75
     for target in targets:
         q = evaluation.q[row, target, : len(arm.joints)]
@@ -163,7 +173,7 @@ def frame(axes: Any, extent: tuple[np.ndarray, float]) -> None:
 
 
 def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.ndarray, float]:
-    """Return the centre (3,) and half the side of the cube that contains all targets, postures and motions [m]."""
+    """Return centre (3,) and half side of the cube that contains all targets, columns, postures and motions [m]."""
     places = [
         joint_positions(member.arm, q[: len(member.arm.joints)])
         for row, member in enumerate(members)
@@ -171,7 +181,13 @@ def _extent(evaluation: Evaluation, members: Sequence[FrontMember]) -> tuple[np.
     ]
     motions = [points for row in range(len(members)) for points in _drawn_motions(evaluation, row)]
     corners = [corner for region in evaluation.workspace for corner in region.corners]
-    points = np.vstack([evaluation.targets, *corners, *places, *motions])
+    columns = [member.arm.column for member in members]
+    feet = [
+        np.array(member.arm.base) - (0.0, 0.0, column.length)
+        for member, column in zip(members, columns, strict=True)
+        if column is not None
+    ]
+    points = np.vstack([evaluation.targets, *corners, *feet, *places, *motions])
     low, high = points.min(axis=0), points.max(axis=0)
     for obstacle in evaluation.obstacles:
         if isinstance(obstacle, Ground) and low[2] - (high - low).max() / 4 < obstacle.z:  # a floor close below

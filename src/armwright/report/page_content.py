@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from armwright.experiments.compare_arms import dominance_counts, read_existing_arms
 from armwright.experiments.run_summary import describe_method
+from armwright.kinematics.forward import column_solid
 from armwright.kinematics.motor_bodies import NO_BODY, MotorBodies
 from armwright.llm.transcript import TRANSCRIPTS, Transcript
 from armwright.pareto import hypervolume
@@ -200,6 +201,7 @@ def _designs(history: History, numbers: range) -> Arrays:
         "payload_center": evaluation.arms.payload_center,
         **_arm_arrays(arms, evaluation.arms.dof),
         **_body_arrays(evaluation.arms.motor_bodies),
+        **({} if space.column is None else {"column_half": _column_halves(arms)}),
     }
 
 
@@ -231,6 +233,12 @@ def _body_arrays(bodies: MotorBodies | None) -> Arrays:
         return {}
     shape = np.where(bodies.shape == NO_BODY, len(SHAPES), bodies.shape).astype(np.uint8)
     return {"body_shape": shape, "body_half": bodies.half, "body_centre": bodies.centre}
+
+
+def _column_halves(arms: Sequence[Arm]) -> NDArray[np.float32]:
+    """Return radius, radius and half the length (n, 3) of the columns below the arms [m]; zeros without one."""
+    solids = map(column_solid, arms)
+    return np.array([(0.0, 0.0, 0.0) if solid is None else solid.half for solid in solids], dtype=np.float32)
 
 
 def _joined(chunks: Sequence[Arrays]) -> dict[str, NDArray[Any]]:

@@ -1,4 +1,4 @@
-"""Obstacles and motor bodies in figures: translucent faces, clipped to the drawing."""
+"""Obstacles, motor bodies and columns in figures: translucent faces, clipped to the drawing."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -200,7 +200,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A round tube below the base, which carries the arm and does not move.
+    """An upright round tube below the base, which carries the arm and does not move.
 
     Attributes:
         length: From its foot to the first joint [m].
@@ -221,6 +221,16 @@ class Column:
             raise ArmError(f"a column needs a length above 0 m and a wall of at most half its diameter, not {self}")
         if not (0.0 <= self.mass < math.inf and 0.0 <= self.price < math.inf):
             raise ArmError(f"a column needs mass >= 0 kg and price >= 0 USD, not {self.mass} kg and {self.price} USD")
+
+    @property
+    def radius(self) -> float:
+        """The outer radius [m]."""
+        return self.outer_diameter / 2
+
+    @property
+    def middle(self) -> Vector:
+        """The point halfway up, from the base [m]."""
+        return (0.0, 0.0, -self.length / 2)
 
 
 @dataclass(frozen=True, slots=True)

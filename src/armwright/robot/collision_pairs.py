@@ -62,6 +62,17 @@ def joined_by_motors(arm: Arm) -> Iterator[tuple[int, int]]:
             yield j, after[0]
 
 
+def joined_by_column(arm: Arm) -> tuple[list[int], list[int]]:
+    """Return the motors, by joint, and the solid links that need no collision check with the column, counted from 0.
+
+    These are the parts that do not move, and the first solid link. All others count.
+    """
+    first = next((j for j, joint in enumerate(arm.joints) if joint.kind != "fixed"), len(arm.joints))
+    solid = [n for n, link in enumerate(arm.links) if link.length > 0.0]
+    motors = [j for j, joint in enumerate(arm.joints[: first + 1]) if joint.body is not None]
+    return motors, [n for n in solid if n < first or n == solid[0]]
+
+
 def _proven(arm: Arm, first: int, second: int) -> Reason | None:
     """Return Never or Always; None if neither holds or can be proven with MAX_BOXES boxes."""
     joints = arm.joints[first + 1 : second + 1]

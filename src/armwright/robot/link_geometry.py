@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.robot.arm import AXES, Arm, Joint, Link, Vector
+from armwright.robot.arm import AXES, Arm, Column, Joint, Link, Vector
 from armwright.robot.motor_body import MotorBody
 
 AXIS_VECTORS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
@@ -174,6 +174,11 @@ def body_dimensions(body: MotorBody) -> dict[str, str]:
     if body.shape == "box":
         return {"size": numbers(body.size)}
     return {"radius": number(body.radius), "length": number(body.length)}
+
+
+def column_dimensions(column: Column) -> dict[str, str]:
+    """Return the dimensions of the cylinder of a column [m], by their URDF names."""
+    return {"radius": number(column.radius), "length": number(column.length)}
 
 
 def number(value: float) -> str:

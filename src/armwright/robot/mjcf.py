@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement
 
-from armwright.robot.arm import GRAVITY, Arm, Joint, Link
+from armwright.robot.arm import GRAVITY, Arm, Column, Joint, Link
 from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     COLOURS,
@@ -33,11 +33,11 @@ TIP_COLOUR = "0.07 0.07 0.07 1"
 
 
 def to_mjcf(arm: Arm, name: str = "arm") -> str:
-    """Return the MJCF of an arm: `base`, link_1 on joint_1, …, a site `tip`, and motor_1 on joint_1, ….
+    """Return the MJCF of an arm: `base`, link_1 on joint_1, …, a site `tip`, motor_1 on joint_1, …, and `column`.
 
     Names, frames, masses, inertias and colours are those of `to_urdf`: link frames are at their joints, and with all
     joints at 0 they are parallel to the world frame. A tool with mass is a body `tool` at the end of the last link. The
-    body of an actuator is a body motor_1, … on the link before its joint.
+    body of an actuator is a body motor_1, … on the link before its joint, a column a body `column` on the base.
     Each moving joint has a motor with gear 1, limited to the torque of its actuator if it has one. `ctrl` is the torque
     [N m] or force [N] on that joint.
 
@@ -51,6 +51,8 @@ def to_mjcf(arm: Arm, name: str = "arm") -> str:
     SubElement(root, "option", gravity=numbers((0.0, 0.0, -GRAVITY)))
     SubElement(SubElement(root, "default"), "geom", contype="0", conaffinity="0", mass="0")
     body = SubElement(add_scene(root, arm), "body", name="base", pos=numbers(arm.base))
+    if arm.column is not None:
+        add_column(body, arm.column)
     for segment in segments(arm):
         if segment.joint.body is not None:
             add_motor(body, segment, segment.joint.body, segment.motor_name)
@@ -125,6 +127,13 @@ def add_motor(
     size = (x / 2, y / 2, z / 2) if body.shape == "box" else (body.radius, body.length / 2)
     solid = {"type": body.shape, "size": numbers(size), "pos": numbers(body.centre), "euler": numbers(body_rpy(body))}
     SubElement(element, "geom", {**solid, "material": f"joint_{segment.joint.axis}", **(attributes or {})})
+
+
+def add_column(base: Element, column: Column, attributes: Mapping[str, str] | None = None) -> None:
+    """Add the column to the base that stands on it, with further attributes of its geometry."""
+    element = SubElement(base, "body", name="column")
+    solid = {"type": "cylinder", "size": numbers((column.radius, column.length / 2)), "pos": numbers(column.middle)}
+    SubElement(element, "geom", {**solid, "material": "link", **(attributes or {})})
 
 
 def add_tip(body: Element, arm: Arm) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement
 
 from armwright.exceptions import ArmError
-from armwright.robot.arm import Arm, Joint, Link
+from armwright.robot.arm import Arm, Column, Joint, Link
 from armwright.robot.link_geometry import (
     AXIS_VECTORS,
     COLOURS,
@@ -13,6 +13,7 @@ from armwright.robot.link_geometry import (
     Segment,
     body_dimensions,
     body_rpy,
+    column_dimensions,
     inertia_moments,
     inertia_rpy,
     joint_limits,
@@ -55,6 +56,8 @@ def to_sdf(arm: Arm, name: str = "arm") -> str:
     SubElement(base, "pose").text = f"{numbers(arm.base)} 0 0 0"
     _add_inertial(base, MASSLESS)
     _add_joint(model, "world_to_base", "fixed", "world", "base")
+    if arm.column is not None:
+        _add_column(model, arm.column)
     for segment in segments(arm):
         if segment.joint.body is not None:
             _add_motor(model, segment, segment.joint.body)
@@ -118,14 +121,9 @@ def _add_link(element: Element, segment: Segment) -> None:
     link = segment.link
     _add_inertial(element, link)
     if link.length > 0.0:
-        for purpose in ("visual", "collision"):
-            body = SubElement(element, purpose, name=f"{segment.name}_{purpose}")
-            SubElement(body, "pose").text = f"{numbers(midpoint(link))} {numbers(rpy_along(link.offset))}"
-            shape = SubElement(SubElement(body, "geometry"), "cylinder")
-            SubElement(shape, "radius").text = number(link.radius)
-            SubElement(shape, "length").text = number(link.length)
-            if purpose == "visual":
-                _add_material(body, "link")
+        pose = f"{numbers(midpoint(link))} {numbers(rpy_along(link.offset))}"
+        cylinder = {"radius": number(link.radius), "length": number(link.length)}
+        _add_solid(element, segment.name, "link", pose, "cylinder", cylinder)
     marker = SubElement(element, "visual", name=f"joint_{segment.number}_visual")
     sphere = SubElement(SubElement(marker, "geometry"), "sphere")
     SubElement(sphere, "radius").text = number(marker_radius(link))
@@ -138,15 +136,31 @@ def _add_motor(model: Element, segment: Segment, body: MotorBody) -> None:
     element = SubElement(model, "link", name=name)
     SubElement(element, "pose", relative_to=segment.parent).text = f"{numbers(segment.position)} 0 0 0"
     _add_inertial(element, MASSLESS)
+    pose = f"{numbers(body.centre)} {numbers(body_rpy(body))}"
+    _add_solid(element, name, f"joint_{segment.joint.axis}", pose, body.shape, body_dimensions(body))
+    _add_joint(model, f"{name}_joint", "fixed", segment.parent, name)
+
+
+def _add_column(model: Element, column: Column) -> None:
+    """Add the link of the column below the base; like all that stands with the base, it has no mass here."""
+    element = SubElement(model, "link", name="column")
+    SubElement(element, "pose", relative_to="base").text = "0 0 0 0 0 0"
+    _add_inertial(element, MASSLESS)
+    pose = f"{numbers(column.middle)} 0 0 0"
+    _add_solid(element, "column", "link", pose, "cylinder", column_dimensions(column))
+    _add_joint(model, "column_joint", "fixed", "base", "column")
+
+
+def _add_solid(element: Element, name: str, colour: str, pose: str, shape: str, dimensions: Mapping[str, str]) -> None:
+    """Add a box or cylinder, for display and for collisions."""
     for purpose in ("visual", "collision"):
         solid = SubElement(element, purpose, name=f"{name}_{purpose}")
-        SubElement(solid, "pose").text = f"{numbers(body.centre)} {numbers(body_rpy(body))}"
-        shape = SubElement(SubElement(solid, "geometry"), body.shape)
-        for key, value in body_dimensions(body).items():
-            SubElement(shape, key).text = value
+        SubElement(solid, "pose").text = pose
+        geometry = SubElement(SubElement(solid, "geometry"), shape)
+        for key, value in dimensions.items():
+            SubElement(geometry, key).text = value
         if purpose == "visual":
-            _add_material(solid, f"joint_{segment.joint.axis}")
-    _add_joint(model, f"{name}_joint", "fixed", segment.parent, name)
+            _add_material(solid, colour)
 
 
 def _add_material(visual: Element, colour: str) -> None:

@@ -11,6 +11,7 @@ from armwright.robot.link_geometry import (
     Segment,
     body_dimensions,
     body_rpy,
+    column_dimensions,
     inertia_moments,
     inertia_rpy,
     joint_limits,
@@ -36,7 +37,8 @@ def to_urdf(arm: Arm, name: str = "arm") -> str:
     Link frames are at their joints; with all joints at 0 they are parallel to the world frame. The z axis of the tip
     frame is the tool's axis, its x axis the tool's side. Links are solid cylinders of uniform density from joint to
     joint, for inertia, collision and display. A tool with mass is a link `tool` at the end of the last link. The body
-    of an actuator is a massless link motor_1, …, fixed to the link before its joint.
+    of an actuator is a massless link motor_1, …, fixed to the link before its joint. The column that the base stands on
+    is a massless link `column`, fixed to `base`.
 
     Example:
         >>> import armwright as aw
@@ -58,6 +60,9 @@ def urdf_tree(arm: Arm, name: str) -> Element:
     add_header(robot)
     SubElement(robot, "link", name="base")
     add_joint(robot, "world_to_base", "world", "base", numbers(arm.base))
+    if arm.column is not None:
+        add_column(robot, "column", numbers(arm.column.middle), column_dimensions(arm.column))
+        add_joint(robot, "column_joint", "base", "column", "0 0 0")
     for segment in segments(arm):
         if segment.joint.body is not None:
             motor, position = segment.motor_name, numbers(segment.position)
@@ -134,12 +139,22 @@ def add_solid(element: Element, material: str, xyz: str, rpy: str, shape: str, d
 
 def add_motor(robot: Element, segment: Segment, body: MotorBody, name: str) -> None:
     """Add the link of an actuator's body; its mass is a part of the link that carries it."""
+    element = _add_massless(robot, name)
+    material, rpy = f"joint_{segment.joint.axis}", numbers(body_rpy(body))
+    add_solid(element, material, numbers(body.centre), rpy, body.shape, body_dimensions(body))
+
+
+def add_column(robot: Element, name: str, middle: str, dimensions: dict[str, str]) -> None:
+    """Add the link of the column below the base; like all that stands with the base, it has no mass here."""
+    add_solid(_add_massless(robot, name), "link", middle, "0 0 0", "cylinder", dimensions)
+
+
+def _add_massless(robot: Element, name: str) -> Element:
     element = SubElement(robot, "link", name=name)
     inertial = SubElement(element, "inertial")
     SubElement(inertial, "mass", value="0")
     SubElement(inertial, "inertia", dict.fromkeys(TENSOR_INDICES, "0"))
-    material, rpy = f"joint_{segment.joint.axis}", numbers(body_rpy(body))
-    add_solid(element, material, numbers(body.centre), rpy, body.shape, body_dimensions(body))
+    return element
 
 
 def add_marker(element: Element, segment: Segment, radius: str) -> None:

@@ -4,29 +4,31 @@ import math
 from collections.abc import Sequence
 from xml.etree.ElementTree import Comment, Element, SubElement
 
-from armwright.robot.arm import Arm, Link, Vector
+from armwright.robot.arm import Arm, Column, Link, Vector
 from armwright.robot.link_geometry import (
     MARKER_SCALE,
     TENSOR_INDICES,
     Segment,
+    number,
     numbers,
     rpy_along,
     segments,
     tip_rpy,
     to_xml,
 )
-from armwright.robot.urdf_writer import add_header, add_joint, add_marker, add_motor, add_solid, add_tool
+from armwright.robot.urdf_writer import add_column, add_header, add_joint, add_marker, add_motor, add_solid, add_tool
 
 NAMESPACE = "http://www.ros.org/wiki/xacro"
 NOTE = """ xacro arm.xacro link_1_length:=0.25 prefix:=left_
   prefix                 before the names of all links and joints but world
-  base_x, base_y, base_z the first joint's place in the world [m]
+  base_x, base_y, base_z the first joint's place in the world [m]{column}
   tool_x, tool_y, tool_z from the end of the last link to the tip [m]
   link_N_length          from joint N to the next, or to the tool [m]
   link_N_radius          [m]
   link_N_mass            what weighs the same whatever the length [kg]
   link_N_mass_per_metre  what is added for each metre of length [kg/m]
   link_N_end_mass        a point at its end, such as the next joint's actuator [kg] """
+COLUMN_NOTE = "\n  column_foot            height of the foot of the column, which ends at the base [m]"
 
 
 def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float | Sequence[float] = 0.0) -> str:
@@ -42,12 +44,14 @@ def to_xacro(arm: Arm, name: str = "arm", mass_per_metre: float | Sequence[float
             The rest of its mass is constant. A link without length has a constant mass.
     """
     robot = Element("robot", {"xmlns:xacro": NAMESPACE, "name": _literal(name)})
-    robot.append(Comment(NOTE))
+    robot.append(Comment(NOTE.format(column="" if arm.column is None else COLUMN_NOTE)))
     _add_arguments(robot, arm, mass_per_metre)
     _add_macro(robot)
     add_header(robot)
     SubElement(robot, "link", name=_prefixed("base"))
     add_joint(robot, _prefixed("world_to_base"), "world", _prefixed("base"), "${base_x} ${base_y} ${base_z}")
+    if arm.column is not None:
+        _add_column(robot, arm.column)
     position, terms = "0 0 0", ["0", "0", "0"]
     for segment in segments(arm):
         if segment.joint.body is not None:
@@ -100,6 +104,8 @@ def _add_arguments(robot: Element, arm: Arm, mass_per_metre: float | Sequence[fl
             f"link_{n}_mass_per_metre": gain if link.length > 0.0 else 0.0,
             f"link_{n}_end_mass": link.end_mass,
         }
+    if arm.column is not None:
+        values["column_foot"] = arm.base[2] - arm.column.length
     for name, value in values.items():
         SubElement(robot, "xacro:arg", name=name, default=repr(float(value)))
         SubElement(robot, "xacro:property", name=name, value=f"$(arg {name})")
@@ -160,6 +166,14 @@ def _com(link: Link, n: int) -> list[str]:
     if link.length == 0.0:
         return [repr(x), repr(y), repr(z)]
     return _scaled((x / link.length, y / link.length, z / link.length), n)
+
+
+def _add_column(robot: Element, column: Column) -> None:
+    """Add the column, if the base is above its foot."""
+    drawn, length = SubElement(robot, "xacro:if", value="${base_z > column_foot}"), "base_z - column_foot"
+    dimensions = {"radius": number(column.radius), "length": f"${{{length}}}"}
+    add_column(drawn, _prefixed("column"), f"0 0 ${{({length}) / -2}}", dimensions)
+    add_joint(drawn, _prefixed("column_joint"), _prefixed("base"), _prefixed("column"), "0 0 0")
 
 
 def _add_link(robot: Element, segment: Segment) -> None:

@@ -5,7 +5,7 @@ distances, and touch exactly what it counts.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from xml.etree.ElementTree import Element, SubElement
@@ -14,7 +14,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.robot.arm import GRAVITY, Arm, Joint
-from armwright.robot.collision_pairs import joined_by_motors
+from armwright.robot.collision_pairs import joined_by_column, joined_by_motors
 from armwright.robot.link_geometry import (
     Segment,
     moving_joints,
@@ -25,7 +25,16 @@ from armwright.robot.link_geometry import (
     tip_rpy,
     to_xml,
 )
-from armwright.robot.mjcf import COMPILER, add_inertial, add_motor, add_scene, add_tip, add_tool, joint_attributes
+from armwright.robot.mjcf import (
+    COMPILER,
+    add_column,
+    add_inertial,
+    add_motor,
+    add_scene,
+    add_tip,
+    add_tool,
+    joint_attributes,
+)
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.payload import LoadShape
 from armwright.tasks.targets import TargetArrays
@@ -72,9 +81,10 @@ def to_simulation_mjcf(
     """Return the MJCF of an arm in its surroundings.
 
     Moving joints are joint_1, joint_2, …, each with the actuators servo_1, … (position) and ff_1, … (torque), whose sum
-    is limited to the actuator's peak torque. Link k is the capsule link_k, its actuator the sphere or body motor_k. A
-    site target_NAME is at each target; its user data are the tolerance of the position [m], of the angle [rad], and how
-    many angles count (2: the z axis, 3: all). The keyframe NAME is the posture there.
+    is limited to the actuator's peak torque. Link k is the capsule link_k, its actuator the sphere or body motor_k. The
+    column below the base is the cylinder `column`, which touches no obstacle. A site target_NAME is at each target; its
+    user data are the tolerance of the position [m], of the angle [rad], and how many angles count (2: the z axis, 3:
+    all). The keyframe NAME is the posture there.
 
     Args:
         arm: The arm.
@@ -94,6 +104,8 @@ def to_simulation_mjcf(
     _add_obstacles(world, surroundings.obstacles)
     _add_targets(world, surroundings, arm)
     body = SubElement(world, "body", name="base", pos=numbers(arm.base))
+    if arm.column is not None:
+        add_column(body, arm.column, {"name": "column", **TOUCHES_LINKS})
     names = {n: f"joint_{k}" for k, (n, _) in enumerate(moving_joints(arm), start=1)}
     motor_names = {n: f"motor{name.removeprefix('joint')}" for n, name in names.items()}
     for segment in segments(arm):
@@ -108,16 +120,25 @@ def to_simulation_mjcf(
     add_tip(body, arm)
     add_tool(body, arm)
     _add_payload(body, arm, surroundings)
-    contact = SubElement(root, "contact")
-    for first, second in uncounted_pairs(arm):
-        SubElement(contact, "exclude", body1=f"link_{first + 1}", body2=f"link_{second + 1}")
-    for joint, link in joined_by_motors(arm):
-        SubElement(contact, "exclude", body1=motor_names[joint + 1], body2=f"link_{link + 1}")
+    _add_exclusions(root, arm, motor_names)
     _add_actuators(root, arm, peak_torques)
     frames = SubElement(root, "keyframe")
     for target, q in zip(surroundings.target_names, postures.tolist(), strict=True):
         SubElement(frames, "key", name=target, qpos=numbers(q), ctrl=numbers([*q, *np.zeros(len(q))]))
     return to_xml(root)
+
+
+def _add_exclusions(root: Element, arm: Arm, motor_names: Mapping[int, str]) -> None:
+    """Exclude the pairs of bodies whose contacts do not count; motor_names: by the number of the joint."""
+    contact = SubElement(root, "contact")
+    pairs = [(f"link_{first + 1}", f"link_{second + 1}") for first, second in uncounted_pairs(arm)]
+    pairs += [(motor_names[joint + 1], f"link_{link + 1}") for joint, link in joined_by_motors(arm)]
+    if arm.column is not None:
+        motors, links = joined_by_column(arm)
+        pairs += [("column", motor_names[joint + 1]) for joint in motors]
+        pairs += [("column", f"link_{link + 1}") for link in links]
+    for first, second in pairs:
+        SubElement(contact, "exclude", body1=first, body2=second)
 
 
 def uncounted_pairs(arm: Arm) -> Iterator[tuple[int, int]]:

@@ -22,6 +22,7 @@ from armwright.kinematics.arm_arrays import (
     round_down,
     stack_tools,
 )
+from armwright.kinematics.columns import Columns, columns_of
 from armwright.kinematics.motor_bodies import MotorBodies, bodies_in
 from armwright.kinematics.rigid_bodies import Bodies, Tools
 from armwright.robot.arm import AXES
@@ -120,6 +121,7 @@ def stack_designs(
             flat["ratings"], flat["travel"], motors.price, np.full(columns.n, space.safety_factor)
         ),
         motor_bodies=_motor_bodies(flat, precision) if space.has_motor_bodies else None,
+        columns=columns.below_bases(precision),
     )
 
 
@@ -160,6 +162,12 @@ class _Columns:
         if self._column_below is None:
             return np.zeros(self.n)
         return getattr(self._column_below, per_metre) * self._column_below.lengths(self._matrix[:, 2])
+
+    def below_bases(self, precision: Precision) -> Columns | None:
+        """Return the columns below the bases; None without columns."""
+        if self._column_below is None:
+            return None
+        return columns_of(self._column_below.outer_diameter, self._column_below.lengths(self._matrix[:, 2]), precision)
 
     def _indices(self, name: str, index: Any) -> Any:
         """Return the (N,) `index` of each design's choice."""

@@ -137,6 +137,11 @@ class SpaceSchema(BaseModel, frozen=True, extra="forbid", allow_inf_nan=False, u
         return bool(self.actuators) and self.motor_bodies
 
     @property
+    def has_bodies(self) -> bool:
+        """Whether motors or a column are solid bodies, which may not collide."""
+        return self.has_motor_bodies or self.column is not None
+
+    @property
     def arm_actuators(self) -> tuple[Actuator, ...]:
         """The actuators as an arm has them, in the order of the file."""
         return _arm_actuators(self)

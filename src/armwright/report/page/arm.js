@@ -2,7 +2,7 @@
 
 import { during } from "./cycle.js";
 import { describeMiss, postures, why } from "./design.js";
-import { PRISMATIC, chain, length, motorBody, rail } from "./kinematics.js";
+import { PRISMATIC, chain, columnBody, length, motorBody, rail } from "./kinematics.js";
 import { solidParts } from "./solids.js";
 import { listen, set, state } from "./state.js";
 import { $, colour, element, number, onTheme, shown } from "./format.js";
@@ -80,6 +80,12 @@ export function drawnMotors() {
   return groups.arm.children.filter((mesh) => mesh.userData.motor).map((mesh) => [12, 13, 14].map((k) => mesh.matrix.elements[k]));
 }
 
+// Returns the middle and half the length of the drawn column in the world; null without one; for tests.
+export function drawnColumn() {
+  const mesh = groups.arm.children.find((part) => part.userData.column);
+  return mesh ? { centre: [12, 13, 14].map((k) => mesh.matrix.elements[k]), half: mesh.matrix.elements[6] / 2 } : null;
+}
+
 // Returns the corners of the drawn obstacles in the world; for tests.
 export function drawnObstacles() {
   return groups.obstacles.children.map((part) => {
@@ -126,6 +132,7 @@ function paint() {
     motors: ["x", "y", "z"].map((axis) => ({ face: faint(joint[axis], 0.3), edge: new THREE.LineBasicMaterial({ color: joint[axis] }) })),
     ghost: faint(colour("arm"), 0.2), compared: faint(target, 0.45), comparedMotor: { face: faint(target, 0.2), edge: new THREE.LineBasicMaterial({ color: target }) },
     reached: solid(HIT), missed: solid(target), now: solid(NOW),
+    column: { face: faint(colour("arm"), 0.3), edge: new THREE.LineBasicMaterial({ color: colour("arm") }) },
     obstacle: { face: faint(obstacle, 0.3), edge: new THREE.LineBasicMaterial({ color: obstacle }) },
     gap: new THREE.LineDashedMaterial({ color: missed, dashSize: 0.02, gapSize: 0.012 }),
   };
@@ -177,7 +184,9 @@ function ball(place, radius, material) {
 function extent() {
   const points = [...content.targets, ...content.head.workspace.flatMap(({ low, high }) => [low, high])];
   for (const i of new Set([state.design, state.compared ?? state.design])) {
-    content.targets.forEach((_, t) => points.push(...chain(content.arm(i), content.q(i, t)).joints));
+    const arm = content.arm(i), column = columnBody(arm);
+    content.targets.forEach((_, t) => points.push(...chain(arm, content.q(i, t)).joints));
+    if (column) points.push([arm.base[0], arm.base[1], column.centre[2] - column.half[2]]);
   }
   const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
   const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
@@ -337,6 +346,12 @@ function drawPosture(group, arm, q, paints) {
       group.add(mesh, ...edges);
     }
   }
+  const column = columnBody(arm);
+  if (column) {
+    const [mesh, ...edges] = solidParts(column, frame, paints.column);
+    mesh.userData.column = true;
+    group.add(mesh, ...edges);
+  }
   const radius = thick(arm, 0);
   const behind = (way) => Array.from(arm.base, (v, k) => v - way * arm.up[k]); // end of the base plate
   group.add(rod(behind(2.05 * radius), behind(1.15 * radius), 2.4 * radius, paints.base));
@@ -366,7 +381,7 @@ export function drawArm() {
   }
   empty(groups.compared);
   if (state.compared !== null && state.compared !== state.design) {
-    const pale = { link: materials.compared, joints: [0, 1, 2].map(() => materials.compared), base: materials.compared, motors: [0, 1, 2].map(() => materials.comparedMotor) };
+    const pale = { link: materials.compared, joints: [0, 1, 2].map(() => materials.compared), base: materials.compared, motors: [0, 1, 2].map(() => materials.comparedMotor), column: materials.comparedMotor };
     drawPosture(groups.compared, content.arm(state.compared), content.q(state.compared, state.target), pale);
   }
   render();

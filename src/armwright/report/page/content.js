@@ -114,6 +114,7 @@ export class Content {
       arm.body_shape = this._part("body_shape", i).subarray(0, n);
       for (const name of ["body_half", "body_centre"]) arm[name] = this._part(name, i).subarray(0, 3 * n);
     }
+    if (this.head.arrays.column_half) arm.column_half = this._part("column_half", i);
     return arm;
   }
 

@@ -76,6 +76,13 @@ export function motorBody(arm, posed, j) {
   return { shape, half: at(arm.body_half, j), rotation, centre: add(place, turned(frame, at(arm.body_centre, j))) };
 }
 
+// Returns the column below the base as a solid in the world; null without one.
+export function columnBody(arm) {
+  const half = arm.column_half && at(arm.column_half, 0);
+  if (!half || half[2] === 0) return null;
+  return { shape: "cylinder", half, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], centre: [arm.base[0], arm.base[1], arm.base[2] - half[2]] };
+}
+
 // Returns the angle [rad] between a tool and a target's frame (3 x 3 by rows): of its z alone, or of all its axes.
 export function angleOff(tool, frame, isWhole) {
   const goal = [0, 1, 2].map((k) => column(frame, k));

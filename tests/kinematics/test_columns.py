@@ -1,0 +1,224 @@
+"""Columns as solid bodies: clearances against Coal with the exported geometry, and contacts in MuJoCo."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pytest
+
+from armwright.kinematics.arm_arrays import Precision, stack_arms
+from armwright.kinematics.clearance import clearances, straight_motor_clearance
+from armwright.problem.problem import Problem
+from armwright.robot.arm import Arm, Column, Joint, uniform_link
+from armwright.robot.mjcf import to_mjcf
+from armwright.robot.motor_body import MotorBody
+from armwright.robot.sdf import to_sdf
+from armwright.robot.srdf import to_srdf
+from armwright.robot.urdf_writer import to_urdf
+from armwright.robot.xacro import to_xacro
+from armwright.runs.simulation_model import Surroundings, to_simulation_mjcf
+from armwright.spaces.batch_builder import stack_designs
+from armwright.spaces.design_space import DesignSpace
+from armwright.tasks.obstacles import Ground
+from armwright.tasks.payload import POINT_LOAD
+from armwright.tasks.targets import position_targets
+from armwright.tasks.task import Task
+from tests.kinematics.test_clearance import agree
+from tests.kinematics.test_motor_bodies import Exported, postures
+from tests.robot.test_sdf import Loaded
+from tests.support.exported_arms import processed
+
+CONTENT: Mapping[str, Any] = {
+    "name": "columns",
+    "joints": [3, 6],
+    "joint_types": ["R", "P", "Y", "S"],
+    "joint_range": [-3.0, 3.0],
+    "stroke": [0.05, 0.1],
+    "origin_z": [0.0, 0.6],
+    "column": {"foot": 0.1},
+    "link": [0.06, 0.25],
+    "link_directions": ["+z", "-x", "+y"],
+    "actuators": ["XM540-W270", "AK60-6", "PH42-020-S300-R", "XL330-M288"],
+}
+SPACE = DesignSpace.model_validate(CONTENT)
+WITH_FIXED = {**CONTENT, "joint_types": ["R", "P", "Y", "S", "F"]}
+LINKS_ALONE = DesignSpace.model_validate({**CONTENT, "motor_bodies": False})
+COLUMN = Column(0.5, 0.06, 0.003, 1.0)
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("space", [SPACE, LINKS_ALONE], ids=["motors", "links"])
+def test_column_clearance_agrees_with_coal(space: DesignSpace, precision: Precision) -> None:
+    arms = [space.arm(design) for design in space.sample(40, 1)]
+    q = postures(arms, 4, 2)
+    arrays = stack_arms(arms, precision)
+    own, without = clearances(arrays, q)[0], clearances(replace(arrays, columns=None), q)[0]
+    nearer, hit = 0, 0
+    for n, arm in enumerate(arms):
+        exported = Exported(arm)
+        for t in range(q.shape[1]):
+            column = exported.at(q[n, t, : len(arm.joints)]).column_clearance()
+            nearer, hit = nearer + (column < without[n, t]), hit + (column < min(0.0, without[n, t]))
+            assert agree(own[n, t], min(without[n, t], column)), (own[n, t], without[n, t], column)
+    assert nearer > 20
+    assert hit > 5
+
+
+@pytest.mark.parametrize("has_motors", [True, False])
+def test_contacts_in_mujoco_agree_with_the_clearance(has_motors: bool) -> None:
+    """An arm whose links and motors are apart touches something if and only if that is its column."""
+    surroundings = Surroundings(np.zeros((1, 3)), position_targets(1), ("one",), (), 0.0, POINT_LOAD)
+    space = DesignSpace.model_validate({**WITH_FIXED, "motor_bodies": has_motors})
+    touching = free = 0
+    for design in space.sample(60, 3):
+        arm = space.arm(design)
+        moves = [joint.kind != "fixed" for joint in arm.joints]
+        model = mujoco.MjModel.from_xml_string(
+            to_simulation_mjcf(arm, surroundings, np.zeros((1, sum(moves))), np.ones(sum(moves)))
+        )
+        data, arrays = mujoco.MjData(model), stack_arms([arm], "float64")
+        q = postures([arm], 10, 4)
+        own, without = clearances(arrays, q)[0][0], clearances(replace(arrays, columns=None), q)[0][0]
+        for t in np.flatnonzero((without > 1e-4) & (np.abs(own) > 1e-4)):
+            data.qpos[:] = q[0, t, moves]
+            mujoco.mj_forward(model, data)
+            names = [{model.geom(g).name for g in data.contact[c].geom} for c in range(data.ncon)]
+            assert bool(names) == (own[t] < 0.0), (design, own[t], names)
+            assert all("column" in pair for pair in names)
+            touching, free = touching + bool(names), free + (not names)
+    assert touching > 10
+    assert free > 100
+
+
+def test_stacked_designs_and_arms_have_equal_columns() -> None:
+    space = DesignSpace.model_validate(WITH_FIXED)
+    designs = space.sample(100, 5)
+    arms = [space.arm(design) for design in designs]
+    one, other = stack_designs(space, space.matrix(designs)), stack_arms(arms)
+    assert one.columns is not None
+    assert other.columns is not None
+    assert one.columns.half.dtype == other.columns.half.dtype
+    assert np.array_equal(one.columns.half, other.columns.half)
+    lengths = 2.0 * one.columns.half[:, 2]
+    assert lengths == pytest.approx([max(design.origin[2] - 0.1, 0.0) for design in designs], abs=1e-7)
+    assert 0.0 == lengths.min() < lengths.max()
+    q = postures(arms, 3, 6)
+    assert np.array_equal(clearances(one, q), clearances(other, q))
+    assert np.array_equal(np.array(clearances(one, q))[:, 3:9], clearances(one[3:9], q[3:9]))
+    for n in range(20):
+        assert np.array_equal(clearances(stack_arms([arms[n]]), q[n : n + 1, :, : len(arms[n].joints)])[0][0],
+                              clearances(one, q)[0][n])  # fmt: skip
+
+
+def test_bases_at_the_foot_have_no_column() -> None:
+    low = SPACE.model_copy(update={"origin_z": (0.0, 0.1)})
+    designs = low.sample(20, 7)
+    arms = stack_designs(low, low.matrix(designs))
+    assert arms.columns is None
+    assert all(low.arm(design).column is None for design in designs)
+
+
+def test_column_is_as_far_as_the_link_beside_it() -> None:
+    """The first link lies on the column, and the second hangs from its end, beside the column."""
+    joints = (Joint("revolute", "y", -3.2, 3.2), Joint("revolute", "y", -3.2, 3.2))
+    links = [uniform_link((0.0, 0.0, length), 0.1, 0.01) for length in (0.15, 0.3)]
+    arm = Arm((0.1, 0.2, 0.5), joints, tuple(links), column=COLUMN)
+    q = np.array([[[0.5 * math.pi, 0.5 * math.pi], [0.5 * math.pi, 0.0], [-0.3 * math.pi, -0.9 * math.pi]]])
+    own, obstacle = clearances(stack_arms([arm], "float64"), q, [Ground(kind="ground", z=0.4)])
+    assert own[0, :2] == pytest.approx([0.15 - 0.03 - 0.01, 0.15 - 0.03 - 0.01], abs=1e-6)
+    assert own[0, 2] < 0.0, "the second link is folded through the column"
+    assert obstacle[0, 1] > 0.0, "obstacles do not count against the column"
+
+
+def test_parts_at_rest_do_not_count() -> None:
+    """A fixed joint first: its link and the motors at both of its ends stand with the column."""
+    body = MotorBody("box", "y", (0.04, 0.04, 0.04))
+    fixed, turning = Joint("fixed", "z"), Joint("revolute", "y", -3.0, 3.0, body=body)
+    down, out = uniform_link((0.0, 0.0, -0.05), 0.1, 0.01), uniform_link((0.2, 0.0, 0.0), 0.1, 0.01)
+    arm = Arm((0.0, 0.0, 0.5), (fixed, turning, turning), (down, out, out), column=COLUMN)
+    zeros = np.zeros((1, 1, 3))
+    own = clearances(stack_arms([arm], "float64"), zeros)[0]
+    without = clearances(stack_arms([replace(arm, column=None)], "float64"), zeros)[0]
+    assert without > 0.0
+    assert own == pytest.approx(-0.04, abs=1e-3), "the second link starts on the axis of the column and is not excluded"
+    lying = replace(arm, joints=(fixed, fixed, turning), links=(down, out, out))
+    assert clearances(stack_arms([lying], "float64"), zeros)[0] > 0.1
+    pairs = ElementTree.fromstring(to_srdf(lying)).findall("disable_collisions")
+    standing = {pair.get("link2") for pair in pairs if pair.get("link1") == "column"}
+    assert standing == {"link_1", "link_2", "motor_3"}
+    pairs = ElementTree.fromstring(to_srdf(arm)).findall("disable_collisions")
+    assert {pair.get("link2") for pair in pairs if pair.get("link1") == "column"} == {"link_1", "motor_2"}
+
+
+def test_column_does_not_change_the_room_between_motors() -> None:
+    designs = SPACE.sample(50, 8)
+    arms = stack_designs(SPACE, SPACE.matrix(designs))
+    assert np.array_equal(straight_motor_clearance(arms), straight_motor_clearance(replace(arms, columns=None)))
+
+
+def test_column_implies_that_nothing_collides() -> None:
+    task = Task(name="low", targets=((0.02, 0.0, 0.3),))
+    content = {"joints": 2, "joint_types": ["P"], "link": [0.1, 0.4], "joint_range": [-3.1, 3.1]}
+    content |= {"origin_z": [0.5, 0.5], "column": {}}
+    described = [
+        constraint.description for constraint in Problem(task, DesignSpace.model_validate(content)).constraints
+    ]
+    assert described == ["collision <= 0"]
+    del content["column"]
+    assert not Problem(task, DesignSpace.model_validate(content)).constraints
+    bounded = task.model_copy(update={"constraints": ("self_clearance >= 0.01",)})
+    space = DesignSpace.model_validate({**content, "column": {}})
+    problem = Problem(bounded, space)
+    assert [constraint.description for constraint in problem.constraints] == ["self_clearance >= 0.01"]
+    folded = space.clipped((0.0, 0.0, 0.5), "PP", (0.1, 0.3))  # its tip is inside the column at the target
+    assert problem.evaluate([folded]).violations[0, 0] > 0.01
+
+
+def test_xacro_and_sdf_have_the_column_of_the_urdf() -> None:
+    arms = [arm for arm in map(SPACE.arm, SPACE.sample(4, 9)) if arm.column is not None]
+    assert len(arms) > 2
+    for arm in arms:
+        assert arm.column is not None
+        urdf = ElementTree.fromstring(to_urdf(arm))
+        element = ElementTree.fromstring(to_sdf(arm)).find("model/link[@name='column']")
+        solid = urdf.find("link[@name='column']/collision")
+        origin, (shape,) = solid.find("origin").attrib, solid.find("geometry")
+        assert element.findtext("collision/pose") == f"{origin['xyz']} {origin['rpy']}"
+        assert {one.tag: one.text for one in element.find("collision/geometry/cylinder")} == shape.attrib
+        Loaded(arm)
+        same = ElementTree.fromstring(processed(to_xacro(arm)))
+        assert cylinder_of(same) == pytest.approx(cylinder_of(urdf), abs=1e-9)
+        raised = ElementTree.fromstring(processed(to_xacro(arm), base_z=str(arm.base[2] + 0.2)))
+        length, _, middle = cylinder_of(raised)
+        assert length == pytest.approx(arm.column.length + 0.2)
+        assert middle == pytest.approx(-length / 2)
+        lowered = ElementTree.fromstring(processed(to_xacro(arm), base_z="0.05"))
+        assert lowered.find("link[@name='column']") is None
+
+
+def cylinder_of(urdf: ElementTree.Element) -> tuple[float, float, float]:
+    """Length, radius and height of the middle of the column, from the base."""
+    solid: Any = urdf.find("link[@name='column']/collision")
+    shape, joint = solid.find("geometry/cylinder"), urdf.find("joint[@name='column_joint']")
+    assert joint is not None
+    assert joint.find("parent").get("link") == "base"
+    return float(shape.get("length")), float(shape.get("radius")), float(solid.find("origin").get("xyz").split()[2])
+
+
+def test_column_does_not_change_dynamics_in_mujoco() -> None:
+    for design in SPACE.sample(6, 10):
+        arm = SPACE.arm(design)
+        for export in (to_urdf, to_mjcf):
+            forces = []
+            for exported in (arm, replace(arm, column=None)):
+                model = mujoco.MjModel.from_xml_string(export(exported))
+                model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+                data = mujoco.MjData(model)
+                data.qpos[:], data.qvel[:], data.qacc[:] = np.random.default_rng(11).uniform(-1.0, 1.0, (3, model.nv))
+                mujoco.mj_inverse(model, data)
+                forces.append(data.qfrc_inverse.copy())
+            assert forces[0] == pytest.approx(forces[1], rel=1e-9, abs=1e-9)
