@@ -21,7 +21,7 @@ MAX_TORQUE = 0.5  # [N m]
 SECONDS = 1.0  # for each target
 
 
-@aw.evaluator("distance [m]", "work [J]", worst=(10.0, 100.0))
+@aw.evaluator("distance [m]", "work [J]")
 def follow(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
     """Simulate the arm at its targets; return its total distance from them and the work of its motors."""
     model = mujoco.MjModel.from_xml_string(aw.to_mjcf(arm))
@@ -29,7 +29,7 @@ def follow(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
     model.dof_armature[:] = 1e-4  # [kg m²] of the rotors, without which joints of so light arms are stiff to compute
     data = mujoco.MjData(model)
     tip = model.site("tip").id
-    postures = aw.evaluate([arm], task.target_positions).q[0, :, : model.nq]  # (T, D) [rad], by our inverse kinematics
+    postures = aw.evaluate(arm, task).q[0, :, : model.nq]  # (T, D) [rad], by our inverse kinematics
     distance = work = 0.0
     for target, posture in zip(task.target_positions, postures, strict=True):
         for _ in range(round(SECONDS / model.opt.timestep)):

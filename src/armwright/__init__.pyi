@@ -31,7 +31,6 @@ from .proposers.rules import RulesProposer as RulesProposer
 from .report.figures import write_figures as write_figures
 from .report.page import write_report as write_report
 from .robot.arm import Arm as Arm, Joint as Joint, Link as Link, uniform_link as uniform_link
-from .robot.mjcf import to_mjcf as to_mjcf
 from .robot.ros2_control import to_ros2_control as to_ros2_control
 from .robot.sdf import to_sdf as to_sdf
 from .robot.srdf import to_srdf as to_srdf
@@ -41,6 +40,7 @@ from .robot.xacro import to_xacro as to_xacro
 from .runs.folder import read_run as read_run
 from .runs.history import FrontMember as FrontMember, History as History
 from .runs.results import verify_run as verify_run
+from .runs.task_mjcf import to_mjcf as to_mjcf
 from .runs.trial import FinishedTrial as FinishedTrial
 from .spaces.design_space import DesignSpace as DesignSpace, load_space as load_space, paper_space as paper_space
 from .spaces.parameters import Design as Design

@@ -294,11 +294,13 @@ def fails_then_goes_on(run: Path, bench: Bench, problem: aw.Problem, workers: aw
         return aw.optimize(problem, **SHORT, out=run, workers=workers)
 
     bench.ask("fail")
-    with pytest.raises(EvaluatorError, match=r"^trial \d+: sim.py:measure failed: ValueError: no licence \(") as raised:
+    with pytest.raises(
+        EvaluatorError, match=r"^the first 5 evaluations all failed: ValueError: no licence \("
+    ) as raised:
         search()
     words = str(raised.value)
     assert json.loads(words[words.index("{") : words.index("}") + 1]).keys() >= {"origin_x", "joint_1", "link_1"}
-    assert words.endswith(". Fix it and rerun the same command to resume")
+    assert words.endswith(". Fix the evaluator and rerun the same command, or go on with --allow-failures")
     (trace,) = raised.value.__notes__
     assert trace.startswith("Traceback (most recent call last):\n")
     assert trace.count("File ") == 1
@@ -317,7 +319,39 @@ def test_command_line_shows_the_evaluator_traceback(tmp_path: Path, bench: Bench
     *trace, cause, line = complained.splitlines()
     assert trace[0] == "Traceback (most recent call last):"
     assert cause == "ValueError: no licence"
-    assert line.startswith("armwright: trial 0: sim.py:measure failed: ValueError: no licence (sim.py, line ")
+    assert line.startswith("armwright: the first 5 evaluations all failed: ValueError: no licence (sim.py, line ")
+
+
+@pytest.mark.slow
+def test_hanging_evaluation_is_ended_on_a_worker(tmp_path: Path, shell: ShellCluster, bench: Bench) -> None:
+    """The run is that of this process, apart from the design whose evaluation hung."""
+    shell.only(2)
+    bench.ask("hang")
+    notes: list[dict[str, str]] = []
+    found = aw.optimize(
+        bench.problem(), **SHORT, out=tmp_path / "run", workers=on(shell, 1), evaluation_timeout=2.0,
+        watch=lambda progress: notes.append(dict(progress.latest_failures)),
+    )  # fmt: skip
+    assert found.summary["failures"] == {"exception": 0, "timeout": 1, "non_finite": 0}
+    assert notes[-1] == {"timeout": "trial 0: no result within 2 s"}
+    bench.ask("hang")
+    here = aw.optimize(bench.problem(), **SHORT, evaluation_timeout=2.0)
+    assert [(t.design, t.values, t.failure) for t in here.trials] == [
+        (t.design, t.values, t.failure) for t in found.trials
+    ]
+
+
+@pytest.mark.slow
+def test_process_of_an_evaluator_ends_with_a_killed_search(tmp_path: Path, bench: Bench) -> None:
+    bench.ask("hold")
+    command = ("optimize", "target-1", "--evaluator", f"{bench.file}:measure", *ASKED, "--evaluation-timeout", "1000")
+    search = begin_command(*command, "--out", tmp_path / "run")
+    wait_until(lambda: len(bench.evaluated) == 1)
+    started = descendants(search.pid)
+    search.kill()
+    search.communicate()
+    assert started
+    assert all_ended(started)
 
 
 def test_worker_objective_exception_has_its_traceback(shell: ShellCluster) -> None:

@@ -19,7 +19,7 @@ from tests.support.command_line import PATIENCE
 TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
 
 EVALUATOR = """
-import hashlib, os, pathlib, signal, time
+import ctypes, hashlib, os, pathlib, signal, time
 import armwright as aw
 
 PLACE = pathlib.Path({place!r})
@@ -33,6 +33,9 @@ def measure(arm, task):
         time.sleep(0.01)
     if (PLACE / "die").exists():
         os.kill(os.getpid(), signal.SIGKILL)
+    if (PLACE / "hang").exists():
+        (PLACE / "hang").unlink()
+        ctypes.PyDLL(None).sleep(1000)  # code in C that holds Python's lock
     if (PLACE / "fail").exists():
         raise ValueError("no licence")
     return sum(link.length for link in arm.links), 1.0 + arm.base[2]
@@ -51,7 +54,7 @@ class Bench:
         return aw.Problem(TASK, evaluator=aw.load_evaluator(f"{self.file}:measure"))
 
     def ask(self, what: str) -> None:
-        """Let evaluations `hold`, `die` or `fail` from now on."""
+        """Let evaluations `hold`, `die` or `fail` from now on, or the next one `hang`."""
         (self.folder / what).touch()
 
     def release(self, what: str) -> None:

@@ -40,6 +40,22 @@ EvaluatorName = Annotated[
         rich_help_panel=TASK,
     ),
 ]
+EvaluationTimeout = Annotated[
+    float | None,
+    typer.Option(
+        help="End an evaluation by --evaluator after so many seconds; its design is infeasible then.",
+        show_default="no limit",
+        rich_help_panel=EVALUATION,
+    ),
+]
+AllowFailures = Annotated[
+    bool,
+    typer.Option(
+        "--allow-failures",
+        help="Go on if the first five evaluations by --evaluator all fail with the same exception.",
+        rich_help_panel=EVALUATION,
+    ),
+]
 Robust = Annotated[
     bool,
     typer.Option(

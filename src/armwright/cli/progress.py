@@ -25,15 +25,25 @@ def study_progress(console: Console) -> Generator[Callable[[StudyProgress], None
     """Yield a callback that shows a study."""
     with _live_line(console) as update:
         started = time.perf_counter()
+        shown: dict[str, str] = {}  # the last failure of each kind that was printed
+        due = 0  # counted trials from which failures of kinds that were printed are printed again
 
         def watch(progress: StudyProgress) -> None:
+            nonlocal due
             if progress.note:
                 console.print(_note(progress))
             if progress.reason and progress.source != "rules":  # the rules are explained in the report
                 console.print(f"trial {progress.number}, {look(progress.source).label}: {progress.reason}")
             source, done = look(progress.source).label, progress.iteration
             volume = "-" if progress.hypervolume is None else f"{progress.hypervolume:.3f}"
+            new = {kind: text for kind, text in progress.latest_failures.items() if shown.get(kind) != text}
+            if new.keys() - shown.keys() or (new and progress.iteration >= due):
+                for kind, text in new.items():
+                    _print_at_once(console, f"{progress.failures[kind]} failed ({kind.replace('_', ' ')}): {text}")
+                shown.update(new)
+                due = progress.iteration + LINE_INTERVAL
             failed = f"  failed {sum(progress.faults.values())}" if progress.faults else ""
+            failed += f"  failed evaluations {sum(progress.failures.values())}" if progress.failures else ""
             count = f"iteration {done}/{progress.n_total}"
             state = f"hypervolume {volume}  front {progress.front_size}{failed}"
             if update is not None:

@@ -11,7 +11,9 @@ from armwright.cli.options import (
     EVALUATION,
     OUTPUT,
     SEARCH,
+    AllowFailures,
     DeviceName,
+    EvaluationTimeout,
     EvaluatorName,
     Figures,
     MaxCost,
@@ -175,6 +177,8 @@ def optimize(
         ),
     ] = 0,
     scheduler: Scheduler = None,
+    evaluation_timeout: EvaluationTimeout = None,
+    allow_failures: AllowFailures = False,
     out: Annotated[
         Path | None, typer.Option(help="Run folder.", show_default="runs/TASK-seedSEED", rich_help_panel=OUTPUT)
     ] = None,
@@ -232,6 +236,8 @@ def optimize(
                 initial_designs=initial_designs,
                 on_model_failure=choice.options.on_failure,
                 workers=select_workers(workers, scheduler),
+                evaluation_timeout=evaluation_timeout,
+                allow_failures=allow_failures,
                 seed=seed,
                 out=folder,
                 watch=watch,

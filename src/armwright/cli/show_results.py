@@ -41,11 +41,14 @@ def show_result(console: Console, run: StudyResult, figures: Sequence[Path]) -> 
         console.print(_attribution_table(summary["attribution"]))
     _show_hypervolume(console, history, summary, "more trials")
     more = "" if summary["evaluations"] == summary["n_trials"] else f", {summary['evaluations']:,} evaluations"
-    infeasible = f", {(~history.feasible).sum()} infeasible" if problem.constraints else ""
+    n_infeasible = int((~history.feasible & ~history.failed).sum())
+    infeasible = f", {n_infeasible} infeasible" if problem.constraints else ""
     sources = ", ".join(f"{count} {look(source).label}" for source, count in summary["by_source"].items())
     seconds = summary["seconds"]
     parts = ", ".join(f"{part} {seconds[part]:.1f}" for part in ("sampling", "evaluation", "proposing"))
     console.print(f"{summary['n_trials']} trials{more}{infeasible}: {sources}; {seconds['total']:.1f} s ({parts})")
+    if any(summary.get("failures", {}).values()):
+        _show_failures(console, history, summary["failures"])
     if summary["duplicates"]:
         console.print(
             f"{summary['duplicates']} trials repeated the design of an earlier one and were not evaluated again"
@@ -132,20 +135,35 @@ def show_refined(console: Console, refined: RefinedRun) -> None:
     _show_front_gap(console, refined.summary["front_gap"])
 
 
+def _show_failures(console: Console, history: History, failures: dict[str, int]) -> None:
+    """Print how many evaluations failed, and the last reason of each kind."""
+    latest = {trial.failure.kind: trial for trial in history if trial.failure is not None}
+    for kind, count in failures.items():
+        if count:
+            trial = latest[kind]
+            assert trial.failure is not None
+            console.print(
+                f"{count} of {len(history)} evaluations failed ({kind.replace('_', ' ')}); the last, trial "
+                f"{trial.number}: {trial.failure.description}"
+            )
+
+
 def _show_hypervolume(console: Console, history: History, summary: dict[str, Any], remedy: str) -> None:
     """Print the hypervolume and how it compares; remedy: what may help if the front is empty."""
     volume = summary["hypervolume"]
-    mean = f"mean over iterations {volume['mean']:.3f}; " if "mean" in volume else ""
+    mean = f"mean over iterations {volume['mean']:.3f}; " if volume.get("mean") is not None else ""
     origins = [
         f" ({origin})" for origin in summary.get("search", {}).get("reference_point_from", ()) if origin != "task"
     ]
     point = volume["reference_point"]
     parts = zip(point, origins or [""] * len(point), strict=True)
     reference = ", ".join(f"{value:.4g}{origin}" for value, origin in parts)
-    console.print(f"hypervolume {volume['final']:.3f} ({mean}reference point {reference})")
+    if volume["final"] is not None:
+        console.print(f"hypervolume {volume['final']:.3f} ({mean}reference point {reference})")
     if len(history) and not history.feasible.any():
-        reason = describe_infeasibility(history, summary["feasibility"]["conflict"])
-        console.print(f"{reason[0].upper()}{reason[1:]}. Use {remedy} or looser constraints.")
+        reason = describe_infeasibility(history, summary.get("feasibility", {}).get("conflict"))
+        advice = "" if history.failed.all() else f" Use {remedy} or looser constraints."
+        console.print(f"{reason[0].upper()}{reason[1:]}.{advice}")
     elif volume["final"] == 0.0:
         console.print(
             f"All designs lie beyond the reference point, so none counts. Use {remedy} or another reference point."
@@ -276,7 +294,7 @@ def _attribution_table(attribution: dict[str, dict[str, Any]]) -> Table:
     numbers = ("trials", "on the front", "hypervolume gained")
     table = plain_table("source", *numbers, right=numbers, title="Attribution")
     for source, share in attribution.items():
-        gained = f"{share['hypervolume_gained']:.3f}"
+        gained = "-" if share["hypervolume_gained"] is None else f"{share['hypervolume_gained']:.3f}"
         table.add_row(look(source).label, str(share["trials"]), str(share["front"]), gained)
     return table
 

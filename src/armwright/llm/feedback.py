@@ -15,6 +15,7 @@ from armwright.problem.unreached_reason import AT_LIMIT, unreached_reason
 from armwright.robot.arm import GRAVITY
 from armwright.runs.attribution import hypervolume_gains
 from armwright.runs.history import BBO, History
+from armwright.runs.trial import FinishedTrial
 from armwright.spaces.design_space import DesignSpace
 from armwright.spaces.parameters import Design
 from armwright.text import one_line
@@ -55,7 +56,7 @@ class Digits:
         task = history.problem.task
         weight = space.max_joints * space.heaviest_link + task.tool.mass + 2.0 * float(task.payloads.max())
         heaviest = GRAVITY * reach * weight  # [N m], more than any torque
-        largest = np.abs(history.values).max(axis=0, initial=0.0).tolist()
+        largest = np.abs(history.values[~history.failed]).max(axis=0, initial=0.0).tolist()
         rough = [value if value > 1e-6 else 0.0 for value in largest]  # as float32 is, in metres
         objectives = tuple(max(3, _decimals(v)) for v in rough)
         return cls(
@@ -118,7 +119,7 @@ class Feedback:
             "tau_ik": points(evaluation.motor_torques[row, shown, : len(joints)], at.torque),
             "limits": _limits(evaluation, row, joints),
             "load": _load(evaluation.motor_torques[row], joints),
-            "e_all": vector(self._history.trials[number].values, at.objectives),
+            "e_all": _objectives(self._history.trials[number], at),
             "violated": _violated(self._history, number),
         }
 
@@ -139,7 +140,7 @@ def proposal_records(history: History, name: str) -> list[Record]:
         {
             **_parameters(history, trial.number, at.length),
             "expected": "not said" if trial.expected is None else vector(trial.expected, at.objectives),
-            "e_all": vector(trial.values, at.objectives),
+            "e_all": _objectives(trial, at),
             "violated": _violated(history, trial.number),
             "on_front": trial.number in front,
             "reason": one_line(trial.reason, MAX_REASON_LENGTH) or "not said",
@@ -165,7 +166,7 @@ def design_lines(history: History, numbers: Sequence[int], name: str) -> list[Re
             **_parameters(history, number, at.length),
             **_fine_lengths(history, number, at.length),
             "source": own.get(history.trials[number].source, history.trials[number].source.replace("_", " ")),
-            "e_all": vector(history.trials[number].values, at.objectives),
+            "e_all": _objectives(history.trials[number], at),
             "gained": None if gains is None else _number(float(gains[number]), max(at.objectives)),
             "violated": _violated(history, number),
             "on_front": number in front,
@@ -183,6 +184,13 @@ def vector(values: Sequence[float] | NDArray[np.float64], decimals: int | Sequen
     """Format numbers with the given decimals, one number for all or one for each."""
     each = [decimals] * len(values) if isinstance(decimals, int) else decimals
     return "(" + ", ".join(_number(float(value), n) for value, n in zip(values, each, strict=True)) + ")"
+
+
+def _objectives(trial: FinishedTrial, at: Digits) -> str:
+    """Format the objectives of a trial, or say why there are none."""
+    if trial.failure is None:
+        return vector(trial.values, at.objectives)
+    return f"none, its evaluation failed ({one_line(trial.failure.description, MAX_REASON_LENGTH)})"
 
 
 def _number(value: float, decimals: int) -> str:

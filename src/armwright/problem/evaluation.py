@@ -21,10 +21,12 @@ from armwright.kinematics.restarts import nearer_postures, random_starts
 from armwright.kinematics.supply import SupplyCurrents, supply_currents
 from armwright.kinematics.torque_terms import TorqueTerms, torque_terms
 from armwright.robot.arm import Arm
+from armwright.spaces.tool_mount import carrying_tool
 from armwright.tasks.motions import CyclePlan
 from armwright.tasks.obstacles import Obstacle
 from armwright.tasks.payload import POINT_LOAD, LoadShape
 from armwright.tasks.targets import TargetArrays, position_targets
+from armwright.tasks.task import Task
 from armwright.tasks.workspace import Region, sample_regions
 
 NO_CYCLE = "path_error, cycle_time and other quantities of motions need a cycle in the task; try cycle: in_order"
@@ -232,11 +234,18 @@ class Evaluation(Scene):
         return own, clear
 
 
+def task_scene(task: Task, targets: Array, payloads: Array) -> Scene:
+    """Return the surroundings of a task with these targets (T, 3) [m] and payloads (T,) [kg]."""
+    plan = task.plan(targets) if task.cycle else None
+    held = payloads if plan is None else payloads * plan.holds_payload(len(targets))
+    return Scene(targets, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
+
+
 def evaluate(
-    arms: Sequence[Arm],
-    targets: ArrayLike,
+    arms: Arm | Sequence[Arm],
+    targets: ArrayLike | Task,
     device: Device = "cpu",
-    payload: ArrayLike = 0.0,
+    payload: ArrayLike | None = None,
     obstacles: Sequence[Obstacle] = (),
     target_arrays: TargetArrays | None = None,
     plan: CyclePlan | None = None,
@@ -245,10 +254,11 @@ def evaluate(
     """Evaluate every arm at every target. An unreached target is a result, never an exception.
 
     Args:
-        arms: N arms.
-        targets: (T, 3) positions [m].
+        arms: One arm, or N arms.
+        targets: (T, 3) positions [m], or a task. A task brings everything below and its tool, which is mounted on arms
+            that carry none.
         device: Where the arms are evaluated.
-        payload: (T,) mass carried by the tip at each target, or one for all [kg].
+        payload: (T,) mass carried by the tip at each target, or one for all [kg]; 0 by default.
         obstacles: The solids that clearances are measured from; the inverse kinematics ignores them.
         target_arrays: How the targets are to be reached (`Task.target_arrays`); by default as points.
         plan: The motions of a cycle (`Task.plan`).
@@ -260,11 +270,23 @@ def evaluate(
         >>> arms = [space.arm(design) for design in space.sample(3, seed=0)]
         >>> aw.evaluate(arms, [[0.3, 0.0, 0.2], [0.0, 0.3, 0.2]]).position_error.shape
         (3, 2)
+        >>> aw.evaluate(arms[0], aw.load_task("machine-tending")).position_error.shape
+        (1, 8)
     """
+    arms = [arms] if isinstance(arms, Arm) else arms
+    if isinstance(targets, Task):
+        if payload is not None or target_arrays is not None or plan is not None or obstacles or workspace:
+            raise SettingsError(
+                "expected a task alone, got a payload, obstacles, target_arrays, plan or workspace beside it; change "
+                "the task, or give positions"
+            )
+        scene = task_scene(targets, *targets.cases[0])
+        return evaluate_arrays(stack_arms([carrying_tool(arm, targets.tool) for arm in arms]), scene, device)
     positions = np.asarray(targets, dtype=np.float64)
     if target_arrays is None:
         target_arrays = position_targets(len(np.atleast_1d(positions)))
-    scene = Scene(positions, np.asarray(payload), target_arrays, tuple(obstacles), plan, tuple(workspace))
+    loads = np.asarray(0.0 if payload is None else payload)
+    scene = Scene(positions, loads, target_arrays, tuple(obstacles), plan, tuple(workspace))
     return evaluate_arrays(stack_arms(arms), scene, device)
 
 

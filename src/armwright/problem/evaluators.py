@@ -14,7 +14,7 @@ import math
 import re
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import chdir
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -28,15 +28,19 @@ from numpy.typing import NDArray
 from armwright.arrays import Array
 from armwright.exceptions import EvaluatorError, SettingsError, did_you_mean
 from armwright.problem.evaluation import Evaluation
+from armwright.problem.failure import Failure
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import MAX_OBJECTIVES, OBJECTIVES
 from armwright.robot.arm import Arm
 from armwright.tasks.task import Task
+from armwright.text import one_line
 
 Measure = Callable[[Arm, Task], Sequence[float] | float]
+Measurement = tuple[float, ...] | Failure  # the objectives of one arm, or why there are none
 
 NAMED = re.compile(r"([a-z][a-z0-9_]*)(?: \[([^\[\]]{1,40})\])?")  # such as "energy [J]"
 MAX_NAME_LENGTH = 40
+MAX_REASON_LENGTH = 300
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,6 @@ class Evaluator:
         name: `file.py:function` or `module:function`, as stored in the settings of a run.
         measure: The function.
         objectives: The objectives that it measures.
-        worst: Values of an arm for which the function raises or returns other than finite numbers; None stops the run.
         version: Part of the sha256 of its file; empty without a file.
         place: The argument of `load_evaluator`.
         source: Content of the file. A pickle holds it, so that other processes need no copy.
@@ -56,7 +59,6 @@ class Evaluator:
     name: str
     measure: Measure
     objectives: tuple[Objective, ...]
-    worst: tuple[float, ...] | None = None
     version: str = field(default="", compare=False)
     place: str = field(default="", compare=False)
     source: bytes = field(default=b"", compare=False, repr=False)
@@ -72,29 +74,48 @@ class Evaluator:
 
     def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
         """Return the objectives of an arm; EvaluatorError if the function fails or exits."""
+        measured = self.attempt(arm, task)
+        if not isinstance(measured, Failure):
+            return measured
+        raise evaluator_error(f"{self.name}: {measured.description}", measured)
+
+    def attempt(self, arm: Arm, task: Task) -> Measurement:
+        """Return the objectives of an arm, or why there are none."""
         try:
             with chdir("."):  # solvers change the working folder, to which the run's folder may be relative
                 made = self.measure(arm, task)
-        except (Exception, SystemExit) as fault:
-            failure = EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})")
-            failure.add_note(_traceback(fault))
-            raise failure from fault
+        except (Exception, SystemExit) as fault:  # noqa: BLE001 (the failure is recorded)
+            kind = type(fault).__name__
+            reason = one_line(f"{kind}: {fault}", MAX_REASON_LENGTH)
+            return Failure("exception", reason, kind, _place(fault), _traceback(fault))
         names = [objective.name for objective in self.objectives]
         values = _numbers(made)
         if len(values) != len(names):
-            raise EvaluatorError(f"{self.name}: expected {len(names)} numbers ({', '.join(names)}), got {made!r:.80}")
+            reason = one_line(
+                f"expected {len(names)} numbers ({', '.join(names)}), got {made!r:.80}", MAX_REASON_LENGTH
+            )
+            return Failure("exception", reason, "wrong result")
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):
-                raise EvaluatorError(f"{self.name}: expected finite numbers, got {name} = {value}")
+                return Failure("non_finite", f"expected finite numbers, got {name} = {value}")
         return values
 
 
-def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callable[[Measure], Evaluator]:
+def evaluator_error(message: str, failure: Failure) -> EvaluatorError:
+    """Return the error of a failed evaluation, with the traceback of the evaluator's code as a note."""
+    error = EvaluatorError(message)
+    if failure.traceback:
+        error.add_note(failure.traceback)
+    return error
+
+
+def evaluator(*objectives: str) -> Callable[[Measure], Evaluator]:
     """Make an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
+
+    An arm for which the function raises, or returns other than finite numbers, is infeasible.
 
     Args:
         objectives: Names, each with its unit in brackets if it has one: "energy [J]".
-        worst: Values of an arm for which the function fails, one per objective; by default the run stops.
 
     Examples:
         >>> @evaluator("reach [m]")
@@ -105,15 +126,12 @@ def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callabl
     """
     if not 1 <= len(objectives) <= MAX_OBJECTIVES or len(set(objectives)) < len(objectives):
         raise SettingsError(f"evaluator({', '.join(objectives)}): expected 1 to {MAX_OBJECTIVES} different names")
-    values = None if worst is None else tuple(float(value) for value in worst)
-    if values is not None and (len(values) != len(objectives) or not all(map(math.isfinite, values))):
-        raise SettingsError(f"worst: expected {len(objectives)} finite numbers, one per objective, got {values}")
 
     def decorated(measure: Measure) -> Evaluator:
         name = f"{measure.__module__}:{measure.__qualname__}"
         summary = (measure.__doc__ or f"what {measure.__qualname__} measures").split("\n\n")[0]
         description = " ".join(summary.split())
-        return Evaluator(name, measure, tuple(_objective(given, description, name) for given in objectives), values)
+        return Evaluator(name, measure, tuple(_objective(given, description, name) for given in objectives))
 
     return decorated
 

@@ -7,13 +7,14 @@ from functools import cached_property
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.exceptions import EvaluatorError, SettingsError, TaskError, did_you_mean
+from armwright.exceptions import SettingsError, TaskError, did_you_mean
 from armwright.kinematics.arm_arrays import ArmArrays, Precision
 from armwright.kinematics.devices import Device, resolve_device
 from armwright.pareto import penalised_objectives
 from armwright.problem.constraints import Constraint, implied_constraints, read_constraints
-from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays
-from armwright.problem.evaluators import Evaluator
+from armwright.problem.evaluation import Evaluation, Scene, evaluate_arrays, task_scene
+from armwright.problem.evaluators import Evaluator, Measurement
+from armwright.problem.failure import Failure
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import (
     ORIENTATION_ERROR,
@@ -39,14 +40,14 @@ class Outcome:
     """Hold the result of evaluating one design.
 
     Attributes:
-        values: the M objectives, minimised.
+        values: the M objectives, minimised; infinite if the evaluator failed.
         violations: of the C constraints; satisfied at <= 0.
-        failure: why the evaluator failed, so that the values are its worst ones; empty if it did not.
+        failure: why the evaluator failed; None if it did not.
     """
 
     values: tuple[float, ...]
     violations: tuple[float, ...] = ()
-    failure: str = ""
+    failure: Failure | None = None
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Outcomes:
     """Hold the results of evaluating N designs.
 
     Attributes:
-        values: (N, M) objectives, minimised.
+        values: (N, M) objectives, minimised; infinite where the evaluator failed.
         violations: (N, C) constraint violations; satisfied at <= 0.
         failures: why the evaluator failed, by row.
         postures: (N, B, D) at the first pose of each block of the cycle in the first case [rad] or [m]; None without
@@ -63,7 +64,7 @@ class Outcomes:
 
     values: Array
     violations: Array
-    failures: Mapping[int, str] = field(default_factory=dict[int, str])
+    failures: Mapping[int, Failure] = field(default_factory=dict[int, Failure])
     postures: Array | None = None
 
     def __len__(self) -> int:
@@ -71,9 +72,7 @@ class Outcomes:
 
     def __getitem__(self, row: int) -> Outcome:
         """Return the outcome of one design."""
-        return Outcome(
-            tuple(self.values[row].tolist()), tuple(self.violations[row].tolist()), self.failures.get(row, "")
-        )
+        return Outcome(tuple(self.values[row].tolist()), tuple(self.violations[row].tolist()), self.failures.get(row))
 
     def __iter__(self) -> Iterator[Outcome]:
         return (self[row] for row in range(len(self)))
@@ -209,11 +208,27 @@ class Problem:
         """Evaluate N designs: objectives and constraint violations, the worst of all cases and tolerances.
 
         Raises:
-            EvaluatorError: the custom evaluator failed and states no `worst`.
-            SettingsError: an objective or a violation is not a finite number.
+            SettingsError: a built-in objective or a violation is not a finite number.
         """
-        measured, failures = self._measure(designs)
+        return self.outcomes_of(designs, [] if self.evaluator is None else list(map(self.measure, designs)))
+
+    def measure(self, design: Design) -> Measurement:
+        """Return what the custom evaluator measures of a design, or why it fails."""
+        assert self.evaluator is not None
+        return self.evaluator.attempt(self.arm(design), self.task)
+
+    def outcomes_of(self, designs: Sequence[Design], measurements: Sequence[Measurement]) -> Outcomes:
+        """Evaluate N designs, given what the custom evaluator measured of each; nothing without one."""
+        failures = {row: one for row, one in enumerate(measurements) if isinstance(one, Failure)}
+        measured = NO_MEASUREMENTS
+        if self.evaluator is not None:
+            names = [objective.name for objective in self.evaluator.objectives]
+            nothing = (0.0,) * len(names)  # of failed ones
+            table = [nothing if isinstance(one, Failure) else one for one in measurements]
+            columns = np.array(table, dtype=np.float64).reshape(len(designs), len(names)).T
+            measured = dict(zip(names, columns, strict=True))
         found = self._evaluate(self.space.matrix(designs), measured)
+        found.values[list(failures)] = np.inf
         return Outcomes(found.values, found.violations, failures)
 
     def evaluate_matrix(self, matrix: Array) -> Outcomes:
@@ -240,15 +255,7 @@ class Problem:
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
         """Return the targets and surroundings of each case of the task."""
-        task = self.task
-        scenes: list[Scene] = []
-        for points, payloads in task.cases:
-            plan = task.plan(points) if task.cycle else None
-            held = payloads if plan is None else payloads * plan.holds_payload(len(points))
-            scenes.append(
-                Scene(points, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
-            )
-        return tuple(scenes)
+        return tuple(task_scene(self.task, targets, payloads) for targets, payloads in self.task.cases)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.
@@ -302,21 +309,6 @@ class Problem:
         task, plan = self.task, self.scenes[0].plan
         along = 0 if plan is None else 4 * (len(plan.sample().poses) + 33 * len(plan.motions))
         return len(task.target_positions) + along + sum(region.points for region in task.workspace)
-
-    def _measure(self, designs: Sequence[Design]) -> tuple[Mapping[str, Array], Mapping[int, str]]:
-        """Return (N,) of each objective that the custom evaluator measures, and its failures by row."""
-        if self.evaluator is None:
-            return NO_MEASUREMENTS, {}
-        failures: dict[int, str] = {}
-        table = np.empty((len(designs), len(self.evaluator.objectives)))
-        for row, design in enumerate(designs):
-            try:
-                table[row] = self.evaluator(self.arm(design), self.task)
-            except EvaluatorError as fault:
-                if self.evaluator.worst is None:
-                    raise
-                table[row], failures[row] = self.evaluator.worst, str(fault)
-        return {o.name: column for o, column in zip(self.evaluator.objectives, table.T, strict=True)}, failures
 
 
 def _finite(columns: Sequence[Array], names: Sequence[str], n: int) -> Array:

@@ -59,7 +59,9 @@ class Candidates:
         for name in {names[row] for row, _ in results}:
             own = [(row, trial) for row, trial in results if names[row] == name]
             alike = names == name
-            values[alike] = self._corrected(values[alike], np.flatnonzero(alike), own)
+            evaluated = [(row, trial) for row, trial in own if trial.failure is None]
+            if evaluated:
+                values[alike] = self._corrected(values[alike], np.flatnonzero(alike), evaluated)
             feasible[alike] = (1 + sum(history.feasible[trial.number] for _, trial in own)) / (1 + len(own))
         front = np.array([member.values[:2] for member in history.front]).reshape(-1, 2)
         expected = feasible * gains(front[front_mask(front)], values, history.reference_point[:2])

@@ -142,9 +142,10 @@ def draw_area(comparison: Comparison) -> Figure:
     history = run.history()
     counted = slice(run.config.study.n_trials)
     values, masked = history.values[counted, :2], history.masked_objectives[counted]
+    evaluated = values[np.isfinite(values).all(axis=1)]
     inside = values[[n for n in front_indices(masked[:, :2]) if np.all(values[n] < reference[:2])]]
     figure, axes = one_panel(4.4, 3.8)
-    axes.scatter(*values.T, s=12, color="#9A9A9A", label="designs")
+    axes.scatter(*evaluated.T, s=12, color="#9A9A9A", label="designs")
     if len(inside):
         fill = {"facecolor": "#F0E442", "alpha": 0.5, "hatch": "///", "edgecolor": "#B8AE2C"}
         draw_dominated(axes, inside, run.reference_point, label="area measured", **fill)

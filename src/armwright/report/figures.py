@@ -61,6 +61,8 @@ def _figures(
     has_time: Callable[[float], bool],
 ) -> Iterator[tuple[str, Figure]]:
     """Yield figures by name; search: the record of a direct search, whose trials are its front."""
+    if len(history) and history.failed.all():
+        return  # there is nothing to draw
     is_plane = len(history.problem.objectives) > 1  # figures of the first two objectives
     if search is not None:
         yield "hypervolume", draw_search(history, search)
@@ -158,7 +160,7 @@ def draw_samples(history: History) -> Figure:
     for axes, iteration in zip(panels, shown, strict=False):
         part = History(history.problem, history.trials[: history.n_init + iteration], history.n_init)
         _scatter(axes, part, _reference(history), limits)
-        beyond = int(np.sum(np.any(part.values[:, :2] > limits[:, 1], axis=1)))
+        beyond = int(np.sum(np.any(part.values[~part.failed, :2] > limits[:, 1], axis=1)))
         axes.set_title(f"After {iteration} iterations" + (f"\n({beyond} designs outside the view)" if beyond else ""))
         axes.label_outer()
     for axes in panels[len(shown) :]:
@@ -235,12 +237,14 @@ def _short(value: float) -> str:
 def _limits(history: History) -> Array:
     """Return the drawn part of the plane (2, 2), low and high: where the feasible designs are, if there are any."""
     feasible = history.values[history.feasible]
-    return plane_limits((feasible if len(feasible) else history.values)[:, :2], _reference(history), SHOWN)
+    return plane_limits(
+        (feasible if len(feasible) else history.values[~history.failed])[:, :2], _reference(history), SHOWN
+    )
 
 
 def _scatter(axes: Any, history: History, reference: Sequence[float], limits: Array, alpha: float = 0.85) -> None:
     values = history.values
-    infeasible = values[~history.feasible]
+    infeasible = values[~history.feasible & ~history.failed]
     axes.scatter(*infeasible.T[:2], s=14, facecolors="none", edgecolors=INFEASIBLE, linewidths=0.7, zorder=2)
     for source in _sources(history):
         found = values[history.feasible & np.array([trial.source == source for trial in history])]
@@ -275,7 +279,7 @@ def _sources(history: History) -> list[str]:
 
 def _legend(history: History) -> list[Line2D]:
     marks = [_mark(look(source)) for source in _sources(history)]
-    if not history.feasible.all():
+    if np.any(~history.feasible & ~history.failed):
         marks.append(legend_mark("infeasible", "o", INFEASIBLE, markerfacecolor="none", markersize=4))
     if len(history.problem.objectives) == 2:
         marks.append(Line2D([], [], color=FRONT, linewidth=1.2, label="Pareto front"))

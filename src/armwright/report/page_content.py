@@ -112,6 +112,7 @@ class RunContent:
             "arms": {number: _of_arm(self.history, number) for number in front},
             "cycles": self._cycles(),
             "proposals": _proposals(self.history, designs_from),
+            "failures": _failures(self.history, designs_from),
             "sources": list(dict.fromkeys(trial.source for trial in self.history)),
             "looks": {trial.source: look(trial.source)._asdict() for trial in self.history},
             "existing": EXISTING._asdict(),
@@ -328,10 +329,20 @@ def _result(history: History, summary: Mapping[str, Any] | None) -> dict[str, An
         "by_source": Counter(trial.source for trial in history),
         "seconds": search.get("seconds", sum(trial.seconds.get("total", 0.0) for trial in history)),
         "evaluations": search.get("evaluations", sum(trial.evaluations for trial in history)),
-        "infeasible": search.get("infeasible", int((~history.feasible).sum())),
+        "infeasible": search.get("infeasible", int((~history.feasible & ~history.failed).sum())),
+        "failed": int(history.failed.sum()),
         "recommended": parts.get("recommended", []),
         "robust": (parts.get("verification") or {}).get("robust_numbers"),
         "search": search.get("hypervolume_history"),
+    }
+
+
+def _failures(history: History, first: int) -> dict[int, str]:
+    """Return why evaluations failed, of the designs from `first` on."""
+    return {
+        trial.number: f"{trial.failure.kind.replace('_', ' ')}: {trial.failure.description}"
+        for trial in history.trials[first:]
+        if trial.failure is not None
     }
 
 

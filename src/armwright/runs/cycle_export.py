@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.exceptions import SettingsError
 from armwright.kinematics.arm_arrays import FIXED, carrying, stack_arms
 from armwright.kinematics.motion_path import MotionPath
@@ -35,19 +36,48 @@ def cycle_files(problem: Problem, arm: Arm, evaluation: Evaluation, row: int, na
         trajectory = trajectory_of(arm, evaluation, row)
     except SettingsError:
         return {}
-    task = problem.task
+    names = problem.task.target_names
+    model = task_model(arm, names, evaluation, row, np.abs(trajectory.tau).max(axis=0), name)
+    return {MODEL: model, TRAJECTORY: trajectory_csv(trajectory, names)}
+
+
+def task_model(
+    arm: Arm, target_names: Sequence[str], evaluation: Evaluation, row: int, peak_torques: Array, name: str
+) -> str:
+    """Return the MJCF of an arm in the surroundings in which it was evaluated.
+
+    Args:
+        arm: The arm.
+        target_names: Names of the targets.
+        evaluation: Physics of some arms.
+        row: Which of them it is.
+        peak_torques: (D,) largest torques of the moving joints [N m] or [N].
+        name: Name of the model.
+    """
     surroundings = Surroundings(
         positions=evaluation.targets,
         target_arrays=evaluation.target_arrays,
-        target_names=task.target_names,
-        obstacles=task.obstacles,
+        target_names=target_names,
+        obstacles=evaluation.obstacles,
         payload=float(evaluation.payload.max()),
         load_shape=evaluation.load_shape,
     )
-    moves = [joint for joint, one in enumerate(arm.joints) if one.kind != "fixed"]
-    postures, peaks = evaluation.q[row][:, moves], np.abs(trajectory.tau).max(axis=0)
-    model = to_simulation_mjcf(arm, surroundings, postures, peaks, name)
-    return {MODEL: model, TRAJECTORY: trajectory_csv(trajectory, task.target_names)}
+    return to_simulation_mjcf(arm, surroundings, evaluation.q[row][:, _moving(arm)], peak_torques, name)
+
+
+def peak_torques(arm: Arm, evaluation: Evaluation, row: int) -> Array:
+    """Return (D,) the largest torques of an arm's moving joints [N m] or [N]: along its cycle, else at its targets."""
+    at_targets = np.abs(evaluation.joint_torques[row][:, _moving(arm)]).max(axis=0)
+    if evaluation.plan is None:
+        return at_targets
+    try:
+        return np.abs(trajectory_of(arm, evaluation, row).tau).max(axis=0)
+    except SettingsError:  # a step of unknown duration
+        return at_targets
+
+
+def _moving(arm: Arm) -> list[int]:
+    return [joint for joint, one in enumerate(arm.joints) if one.kind != "fixed"]
 
 
 def trajectory_of(arm: Arm, evaluation: Evaluation, row: int) -> Trajectory:

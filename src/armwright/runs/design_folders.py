@@ -9,7 +9,7 @@ import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 from armwright.problem.evaluation import Evaluation
 from armwright.problem.unreached_reason import unreached_reason
@@ -22,6 +22,8 @@ from armwright.runs.history import History
 from armwright.runs.path_report import path_record
 from armwright.runs.supply_record import supply_of
 from armwright.runs.trial import FinishedTrial
+
+T = TypeVar("T")
 
 DESIGNS = "designs"
 
@@ -89,6 +91,6 @@ def violation_record(history: History, trial: FinishedTrial) -> dict[str, float]
     return {c.description: value for c, value in zip(history.problem.constraints, trial.violations, strict=True)}
 
 
-def objective_record(history: History, values: Sequence[float]) -> dict[str, float]:
+def objective_record(history: History, values: Sequence[T]) -> dict[str, T]:
     """Return values by objective."""
     return {o.name: value for o, value in zip(history.problem.objectives, values, strict=True)}

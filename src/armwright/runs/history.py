@@ -99,7 +99,7 @@ class History:
 
     @cached_property
     def values(self) -> Array:
-        """(N, M) the objectives; of the paper's: position error [m], torque [α-scaled]."""
+        """(N, M) the objectives, infinite where the evaluation failed; units as in the problem's objectives."""
         return self._matrix("values", len(self.problem.objectives))
 
     @cached_property
@@ -108,9 +108,14 @@ class History:
         return self._matrix("violations", len(self.problem.constraints))
 
     @cached_property
+    def failed(self) -> NDArray[np.bool_]:
+        """(N,) True if the evaluation failed."""
+        return np.array([trial.failure is not None for trial in self.trials], dtype=bool)
+
+    @cached_property
     def feasible(self) -> NDArray[np.bool_]:
-        """(N,) True if all constraints are satisfied."""
-        return feasible_mask(self.violations)
+        """(N,) True if the evaluation succeeded and all constraints are satisfied."""
+        return feasible_mask(self.violations) & ~self.failed
 
     @cached_property
     def masked_objectives(self) -> Array:
@@ -122,8 +127,8 @@ class History:
         return np.vstack([known, masked_objectives(self.values[n:], self.violations[n:])])
 
     def nearest(self, n: int) -> list[int]:
-        """Return at most `n` trial numbers, by increasing total violation."""
-        return np.argsort(total_violation(self.violations), kind="stable")[:n].tolist()
+        """Return at most `n` trial numbers, by increasing total violation; failed evaluations last."""
+        return np.lexsort((total_violation(self.violations), self.failed))[:n].tolist()
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:
@@ -190,9 +195,16 @@ class History:
         """After each counted trial (those after the first n_init); the random trials contribute to each value."""
         return self.hypervolumes[self.n_init :]
 
-    def found_reference_point(self) -> tuple[float, ...]:
-        """Choose a reference point: from the bounds that the constraints imply, else from the first n_init trials."""
-        found = found_reference_point(self.values[: self.n_init], self.violations[: self.n_init])
+    def found_reference_point(self) -> tuple[float, ...] | None:
+        """Choose a reference point: from the bounds that the constraints imply, else from the first n_init trials.
+
+        If all of these failed, the trials up to the first that did not; None without one.
+        """
+        succeeded = np.flatnonzero(~self.failed)
+        if not len(succeeded):
+            return None
+        first = slice(max(self.n_init, int(succeeded[0]) + 1))
+        found = found_reference_point(self.values[first], self.violations[first])
         return with_bounds(found, stated_bounds(self.problem))
 
     def evaluation(self, numbers: Sequence[int]) -> Evaluation:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armwright.arrays import Array
-from armwright.pareto import feasible_mask, total_violation
+from armwright.pareto import total_violation
 from armwright.problem.constraints import Constraint
 from armwright.runs.history import History
 from armwright.runs.path_report import describe_faults, path_record
@@ -141,14 +141,16 @@ def describe_infeasibility(history: History, record: Mapping[str, Any] | None = 
         record: The conflicts of all evaluated designs, of `conflict_record`; None for those of the history.
     """
     (number,) = history.nearest(1)
-    constraints = history.problem.constraints
+    failure, constraints = history.trials[number].failure, history.problem.constraints
+    if failure is not None:
+        return f"no evaluation succeeded; that of #{number}: {failure.description}"
     pairs = zip(constraints, history.violations[number].tolist(), strict=True)
     worst_first = sorted(pairs, key=lambda pair: -pair[1])
     violated = [f"{c.description} ({c.measured(v):.4g} {c.quantity.unit})" for c, v in worst_first if v > 0.0]
     others = f", and {', '.join(violated[1:])}" if len(violated) > 1 else ""
     faults = describe_faults(history.evaluation([number]), 0)
     along = f"; along its cycle: {faults}" if faults else ""
-    found = record or conflict_record(constraints, ViolationTally.of(history.violations))
+    found = record or conflict_record(constraints, ViolationTally.of(history.violations[~history.failed]))
     return (
         f"no design meets all constraints yet; the nearest, #{number}, violates {violated[0]} most{others}{along}; "
         f"{describe_conflict(found)}"
@@ -187,7 +189,7 @@ def feasibility_record(history: History, tally: ViolationTally | None = None) ->
         return {}
     names = [constraint.description for constraint in constraints]
     nearest = conflict = None
-    if len(history) and not feasible_mask(history.violations).any():
+    if not history.failed.all() and not history.feasible.any():
         (number,) = history.nearest(1)
         violations = history.violations[number]
         measured = [constraint.measured(value) for constraint, value in zip(constraints, violations, strict=True)]
@@ -197,7 +199,7 @@ def feasibility_record(history: History, tally: ViolationTally | None = None) ->
             "measured": dict(zip(names, measured, strict=True)),
             **path_record(history.evaluation([number]), 0),
         }
-        conflict = conflict_record(constraints, tally or ViolationTally.of(history.violations))
+        conflict = conflict_record(constraints, tally or ViolationTally.of(history.violations[~history.failed]))
     counts = (history.violations > 0.0).sum(axis=0).tolist()
     return {
         "feasibility": {

@@ -19,7 +19,7 @@ from optuna.artifacts import FileSystemArtifactStore, upload_artifact
 from optuna.exceptions import ExperimentalWarning, StorageInternalError
 from optuna.storages import RDBStorage
 from optuna.study import StudyDirection
-from optuna.trial import FrozenTrial, create_trial
+from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from armwright.exceptions import RunFolderError, SettingsError
 from armwright.files import replace_file, replace_surrogates
@@ -35,7 +35,7 @@ STUDY_DB = "study.db"
 ARTIFACTS = "artifacts"
 NOTE = "dashboard:note_str:0"  # where optuna-dashboard keeps the note of a study
 NOTE_VERSION = "dashboard:note_ver"
-TRIAL_ATTRIBUTES = ("source", "proposal", "reason", "expected", "fault", "failure", "refines", "duplicate_of")
+TRIAL_ATTRIBUTES = ("source", "proposal", "reason", "expected", "fault", "refines", "duplicate_of")
 
 
 @dataclass(frozen=True)
@@ -158,11 +158,14 @@ class _Export:
         for trial, duration in zip(self.history, durations, strict=True):
             params = problem.space.free_values(trial.design)
             attributes = {name: getattr(trial, name) for name in TRIAL_ATTRIBUTES}
+            failure = trial.failure
+            attributes["failure"] = None if failure is None else f"{failure.kind}: {failure.description}"
             attributes |= {"joints": trial.design.joints, "verdict": verdicts.get(trial.number)}
             exported = create_trial(
                 params=params,
                 distributions={name: every[name] for name in params},
-                values=trial.values,
+                state=TrialState.COMPLETE if failure is None else TrialState.FAIL,
+                values=trial.values if failure is None else None,
                 constraints=dict(zip(names, trial.violations, strict=True)),
                 user_attrs={name: value for name, value in attributes.items() if value not in (None, "")},
                 system_attrs={**trial.sampler_notes.get("trial", {}), **artifacts.get(trial.number, {})},

@@ -18,6 +18,7 @@ from armwright.arrays import Array
 from armwright.exceptions import RunFolderError
 from armwright.files import naming_write_errors, replace_folder, to_csv
 from armwright.pareto import hypervolume
+from armwright.problem.failure import FAILURE_KINDS
 from armwright.runs.assumptions import assumed_values
 from armwright.runs.attribution import attribution_by_source
 from armwright.runs.config import FrontMethod, RunConfig
@@ -135,6 +136,7 @@ def summarize(
         **_common_record(history, config, history.masked_objectives, volume, verification),
         "evaluations": sum(trial.evaluations for trial in history),
         "duplicates": sum(trial.duplicate_of is not None for trial in history),
+        **_failure_record(history, config),
         "refine": None,
         "attribution": {source: asdict(one) for source, one in attribution_by_source(history).items()},
         "proposer": None if proposer is None else _proposer_record(history, config, proposer),
@@ -170,6 +172,14 @@ def summarize_front(
         "search": dict(search),
         "versions": dict(config.versions),
     }
+
+
+def _failure_record(history: History, config: RunConfig) -> dict[str, Any]:
+    """Return the number of failed evaluations by kind; empty without a custom evaluator."""
+    if config.evaluator is None:
+        return {}
+    counts = Counter(trial.failure.kind for trial in history if trial.failure is not None)
+    return {"failures": {kind: counts[kind] for kind in FAILURE_KINDS}}
 
 
 def _common_record(
@@ -291,5 +301,7 @@ def _overlap_record(history: History, config: RunConfig, reserved: Sequence[Fini
 def _row(history: History, trial: FinishedTrial) -> dict[str, Any]:
     """Return a trial as a row of trials.csv."""
     params = {p.name: trial.design.params.get(p.name) for p in history.problem.space.parameters}
-    objectives, violations = objective_record(history, trial.values), violation_record(history, trial)
-    return {"number": trial.number, "source": trial.source, **params, **objectives, **violations}
+    values = trial.values if trial.failure is None else [None] * len(trial.values)
+    results = {**objective_record(history, values), **violation_record(history, trial)}
+    failure = {} if not history.failed.any() else {"failure": trial.failure.kind if trial.failure else None}
+    return {"number": trial.number, "source": trial.source, **params, **results, **failure}

@@ -151,6 +151,7 @@ class StudySummary(_Summary):
     hypervolume: _Curve
     evaluations: Count
     duplicates: Count
+    failures: dict[str, Count] = {}
     refine: _Refinement | None
     attribution: dict[str, Attribution]
     proposer: _Proposer | None

@@ -4,6 +4,7 @@
 """
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
@@ -11,6 +12,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter
 
 from armwright.files import replace_surrogates
+from armwright.problem.failure import Failure
 from armwright.runs.config import RunConfig
 from armwright.spaces.parameters import Design, ParameterValue
 
@@ -35,7 +37,7 @@ class FinishedTrial:
         number: of the trial in its run, from 0.
         source: `random`, `initial_design`, `bbo`, `refine`, `front_search`, or the name of the proposer.
         design: what was evaluated.
-        values: the objectives.
+        values: the objectives; infinite if its evaluation failed, and left out of its line.
         proposal: the proposal's id, if a proposer made the design.
         reason: why the proposer suggested it.
         expected: objectives that the proposer expected.
@@ -48,7 +50,7 @@ class FinishedTrial:
         seconds: wall time by part (total, proposing, sampling, evaluation).
         sampler_notes: attributes that the sampler set on its trial and study, needed to resume.
         violations: of each constraint; satisfied at <= 0.
-        failure: why the custom evaluator gave no values, so that the design has its `worst`.
+        failure: why the custom evaluator gave no values, which makes the design infeasible.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -69,7 +71,7 @@ class FinishedTrial:
     seconds: Mapping[str, float] = field(default_factory=dict[str, float])
     sampler_notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     violations: tuple[float, ...] = ()
-    failure: _Text = ""
+    failure: Failure | None = None
 
     @property
     def request(self) -> tuple[int, int] | None:
@@ -81,8 +83,8 @@ class FinishedTrial:
 
     @property
     def is_feasible(self) -> bool:
-        """Return whether it satisfies all constraints."""
-        return all(violation <= 0.0 for violation in self.violations)
+        """Return whether its evaluation succeeded and it satisfies all constraints."""
+        return self.failure is None and all(violation <= 0.0 for violation in self.violations)
 
 
 _LINE: TypeAdapter[FinishedTrial] = TypeAdapter(FinishedTrial)
@@ -90,6 +92,8 @@ _LINE: TypeAdapter[FinishedTrial] = TypeAdapter(FinishedTrial)
 
 def trial_line(trial: FinishedTrial) -> bytes:
     """Return the line of a trial: fields that have their default are left out, but for `proposal`."""
+    if trial.failure is not None:
+        trial = replace(trial, values=())  # JSON has no infinity
     fields = _LINE.dump_python(trial, mode="json", by_alias=True, exclude_defaults=True)
     return (
         json.dumps({"number": trial.number, "source": trial.source, "proposal": trial.proposal} | fields).encode()
@@ -106,11 +110,13 @@ def parse_trial(line: bytes, number: int, config: RunConfig) -> FinishedTrial:
     """
     trial = _LINE.validate_json(line)
     for name, found, expected in (
-        ("values", trial.values, config.objectives),
+        ("values", trial.values, () if trial.failure is not None else config.objectives),
         ("violations", trial.violations, config.problem.constraints),
     ):
         if len(found) != len(expected):
             raise ValueError(f"expected {len(expected)} {name}, found {len(found)}")
     if trial.number != number:
         raise ValueError(f"expected trial number {number}, found {trial.number}")
+    if trial.failure is not None:
+        trial = replace(trial, values=(math.inf,) * len(config.objectives))
     return replace(trial, design=config.space.design(trial.design.params))

@@ -37,6 +37,7 @@ SamplerFactory = Callable[[int], BaseSampler]
 #
 # Three seeds separate 10 from 50, but not from 5.
 POPULATION = 10
+FAILED = "evaluation failed"  # the constraint that failed trials violate by 1
 
 
 def _gp(seed: int) -> BaseSampler:
@@ -128,6 +129,8 @@ class BlackBox:
         seed: of the run.
         n_objectives: number of objectives, all minimised.
         constraints: names of the constraints; Optuna's samplers prefer trials that satisfy them (Deb's rules).
+        can_fail: whether evaluations can fail. Samplers then see one more constraint, which failed trials violate, and
+            infinite values of these.
     """
 
     def __init__(
@@ -137,9 +140,11 @@ class BlackBox:
         seed: int,
         n_objectives: int = 2,
         constraints: Sequence[str] = (),
+        can_fail: bool = False,
     ) -> None:
         self._space = space
-        self._constraints = tuple(constraints)
+        self._can_fail = can_fail
+        self._constraints = (*constraints, FAILED) if can_fail else tuple(constraints)
         self._factory = sampler_factory(sampler)
         self._seed = seed
         self._distributions = distributions(space)
@@ -164,7 +169,7 @@ class BlackBox:
                     values=list(trial.values),
                     user_attrs=_attributes(trial.source, trial.proposal),
                     system_attrs=dict(trial.sampler_notes.get("trial", {})),
-                    constraints=dict(zip(self._constraints, trial.violations, strict=True)),
+                    constraints=self._constraint_values(trial.violations, trial.failure is not None),
                 )
             )
             for name, note in trial.sampler_notes.get("study", {}).items():
@@ -198,7 +203,7 @@ class BlackBox:
         return trial, checked
 
     def tell(
-        self, trial: Trial, values: Iterable[float], violations: Iterable[float] = ()
+        self, trial: Trial, values: Iterable[float], violations: Iterable[float] = (), has_failed: bool = False
     ) -> dict[str, dict[str, Any]]:
         """Pass the result of a trial to the sampler.
 
@@ -206,11 +211,12 @@ class BlackBox:
             trial: a trial from `draw` or `inject`.
             values: objective values.
             violations: constraint violations; satisfied at <= 0.
+            has_failed: whether the evaluation failed.
 
         Returns:
             Notes of the sampler on the trial and on the study, such as generations and parents; needed by `restore`.
         """
-        for name, violation in zip(self._constraints, violations, strict=True):
+        for name, violation in self._constraint_values(violations, has_failed).items():
             trial.set_constraint(name, violation)
         finished = self._study.tell(trial, list(values))
         before, self._study_notes = self._study_notes, self._storage.get_study_system_attrs(self._study_id)
@@ -219,6 +225,10 @@ class BlackBox:
             "study": {name: note for name, note in self._study_notes.items() if before.get(name) != note},
         }
         return {level: noted for level, noted in notes.items() if noted}
+
+    def _constraint_values(self, violations: Iterable[float], has_failed: bool) -> dict[str, float]:
+        failure = (float(has_failed),) if self._can_fail else ()
+        return dict(zip(self._constraints, (*violations, *failure), strict=True))
 
     def _suggest(self, trial: Trial) -> Design:
         """Return the design that a trial suggests; earlier parameters decide which of the later ones are free."""

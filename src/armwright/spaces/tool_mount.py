@@ -27,6 +27,13 @@ def with_tool(arm: Arm, tool: Tool) -> Arm:
     return replace(arm, tool=_mounted(tool, np.column_stack([x, np.cross(z, x), z]), np.array(arm.tool.tip)))
 
 
+def carrying_tool(arm: Arm, tool: Tool) -> Arm:
+    """Return an arm with a tool on its tip, unless it carries one already."""
+    own = arm.tool
+    is_bare = own.mass == 0.0 and not any(own.tip)
+    return with_tool(arm, tool) if is_bare and own not in mounted_tools(tool).values() else arm
+
+
 def _mount_frame(mount: Mount) -> Array:
     """Return the (3, 3) rotation of the base, its axes in the world as columns."""
     return np.column_stack([mounted_vector(DIRECTIONS[direction], mount) for direction in ("+x", "+y", "+z")])

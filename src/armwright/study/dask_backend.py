@@ -1,14 +1,15 @@
 """Evaluation of a study's designs by Dask workers: local processes, or those of an existing cluster."""
 
+import threading
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
-from armwright.exceptions import EvaluatorError, SettingsError
+from armwright.exceptions import EvaluatorError
 from armwright.problem.problem import Problem
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import MAX_LOSSES, Cluster, Workers
-from armwright.study.evaluation_backend import Evaluated, EvaluationBackend, describe_design, evaluate_trial
+from armwright.study.evaluation_backend import Evaluated, EvaluationBackend, describe_design, evaluate_design
+from armwright.study.evaluation_process import EvaluationProcess, pickle_problem, unpickle_problem
 
 
 class DaskBackend(EvaluationBackend):
@@ -17,6 +18,7 @@ class DaskBackend(EvaluationBackend):
     Args:
         problem: the problem.
         workers: the workers.
+        timeout: for one evaluation [s]; None for no limit.
         notify: called with news for the user.
 
     Raises:
@@ -24,8 +26,11 @@ class DaskBackend(EvaluationBackend):
         ClusterError: the workers did not start, or the scheduler does not answer.
     """
 
-    def __init__(self, problem: Problem, workers: Workers, notify: Callable[[str], None]) -> None:
-        self._problem = _pickled(problem)
+    def __init__(
+        self, problem: Problem, workers: Workers, timeout: float | None, notify: Callable[[str], None]
+    ) -> None:
+        self._problem = pickle_problem(problem)
+        self._timeout = timeout
         self._designs: dict[int, Design] = {}  # in flight
         self._cluster = Cluster(workers, notify)
 
@@ -37,10 +42,10 @@ class DaskBackend(EvaluationBackend):
     def submit(self, number: int, design: Design) -> None:
         """Send a design to a worker."""
         self._designs[number] = design
-        self._cluster.submit(number, f"trial {number}", evaluate_on_worker, self._problem, number, design)
+        self._cluster.submit(number, f"trial {number}", evaluate_on_worker, self._problem, design, self._timeout)
 
     def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
-        """Return a trial that finished; errors of evaluators are raised here."""
+        """Return a trial that finished."""
         finished = self._cluster.wait(timeout)
         if finished is None:
             return None
@@ -60,29 +65,20 @@ class DaskBackend(EvaluationBackend):
         self._cluster.close()
 
 
-def evaluate_on_worker(pickled: bytes, number: int, design: Design) -> Evaluated:
+def evaluate_on_worker(pickled: bytes, design: Design, timeout: float | None) -> Evaluated:
     """Evaluate a design of a pickled problem; called on the worker."""
-    return evaluate_trial(_unpickled(pickled), number, design)
+    process = None if timeout is None else _process(pickled, timeout)
+    return evaluate_design(unpickle_problem(pickled), design, process)
 
 
-def _pickled(problem: Problem) -> bytes:
-    import cloudpickle
-
-    try:
-        return bytes(cloudpickle.dumps(problem))
-    except Exception as fault:
-        reason = " ".join(str(fault).split())
-        raise SettingsError(f"the problem cannot be sent to workers: {type(fault).__name__}: {reason}") from fault
+_own = threading.local()  # a process for each thread of a worker
 
 
-@lru_cache(maxsize=4)  # one per search that the worker serves; the file of an evaluator is loaded once
-def _unpickled(pickled: bytes) -> Problem:
-    import cloudpickle
-
-    try:
-        return cloudpickle.loads(pickled)
-    except (ImportError, SettingsError) as fault:
-        raise EvaluatorError(
-            f"a worker cannot load the problem: {fault}; install the module on every worker, or keep the evaluator in "
-            "one file and name it by load_evaluator or --evaluator FILE.py:FUNCTION"
-        ) from fault
+def _process(pickled: bytes, timeout: float) -> EvaluationProcess:
+    """Return the process that runs the evaluator for this thread; it replaces the one of an earlier search."""
+    process: EvaluationProcess | None = getattr(_own, "process", None)
+    if process is None or (process.pickled, process.timeout) != (pickled, timeout):
+        if process is not None:
+            process.close()
+        process = _own.process = EvaluationProcess(pickled, timeout)
+    return process

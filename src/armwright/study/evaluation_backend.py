@@ -1,6 +1,6 @@
-"""Where the designs of a study are evaluated: the interface, and the backend that uses this process.
+"""Where the designs of a study are evaluated: the interface, and the backends that evaluate one design at a time.
 
-`dask_backend.py` has the other backend: worker processes, local ones or those of a cluster.
+`dask_backend.py` has another backend: several worker processes, local ones or those of a cluster.
 """
 
 import json
@@ -9,9 +9,9 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Protocol
 
-from armwright.exceptions import EvaluatorError
 from armwright.problem.problem import Outcome, Problem
 from armwright.spaces.parameters import Design
+from armwright.study.evaluation_process import EvaluationProcess, pickle_problem
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class EvaluationBackend(Protocol):
             One result, or None if there is none yet.
 
         Raises:
-            EvaluatorError: an evaluator failed, or the workers that ran it were lost.
+            EvaluatorError: an evaluator cannot be loaded, or the workers that ran it were lost.
             ClusterError: the cluster was lost.
         """
         ...
@@ -71,7 +71,7 @@ class InProcessBackend(EvaluationBackend):
 
     def submit(self, number: int, design: Design) -> None:
         """Evaluate the design at once."""
-        self._results.append((number, evaluate_trial(self._problem, number, design)))
+        self._results.append((number, evaluate_design(self._problem, design)))
 
     def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
         """Return the trial that was submitted."""
@@ -85,24 +85,55 @@ class InProcessBackend(EvaluationBackend):
         """Do nothing: no design is in flight."""
 
 
-def evaluate_trial(problem: Problem, number: int, design: Design) -> Evaluated:
-    """Evaluate the design of a trial.
+class ProcessBackend(EvaluationBackend):
+    """Runs the custom evaluator in a process of its own, one design at a time, and ends it after a timeout.
 
-    Raises:
-        EvaluatorError: the evaluator failed. The message names the trial and the design; the traceback of the
-            evaluator's code is a note of the exception, which also comes back from other processes.
+    Args:
+        problem: the problem.
+        timeout: for one evaluation [s].
     """
+
+    def __init__(self, problem: Problem, timeout: float) -> None:
+        self._problem = problem
+        self._process = EvaluationProcess(pickle_problem(problem), timeout)
+        self._current: tuple[int, Design] | None = None
+        self._started = 0.0
+
+    @property
+    def capacity(self) -> int:
+        """One design."""
+        return 1
+
+    def submit(self, number: int, design: Design) -> None:
+        """Send a design to the process."""
+        self._process.submit(design)
+        self._current, self._started = (number, design), time.perf_counter()
+
+    def next_result(self, timeout: float) -> tuple[int, Evaluated] | None:
+        """Return the trial that was submitted, if it finished."""
+        if self._current is None:
+            time.sleep(timeout)  # a paused study looks again then
+            return None
+        measured = self._process.result(timeout)
+        if measured is None:
+            return None
+        (number, design), self._current = self._current, None
+        outcome = self._problem.outcomes_of([design], [measured])[0]
+        return number, Evaluated(outcome, time.perf_counter() - self._started)
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.close()
+
+
+def evaluate_design(problem: Problem, design: Design, process: EvaluationProcess | None = None) -> Evaluated:
+    """Evaluate a design; `process` runs the custom evaluator if there is one."""
     started = time.perf_counter()
-    try:
-        outcome = problem.evaluate([design])[0]
-    except EvaluatorError as failure:
-        named = EvaluatorError(
-            f"trial {number}: {failure}; design: {describe_design(design)}. Fix it and rerun the same command to resume"
-        )
-        for note in getattr(failure, "__notes__", ()):
-            named.add_note(note)
-        raise named from failure.__cause__
-    return Evaluated(outcome, time.perf_counter() - started)
+    if process is None:
+        outcomes = problem.evaluate([design])
+    else:
+        outcomes = problem.outcomes_of([design], [process.measure(design)])
+    return Evaluated(outcomes[0], time.perf_counter() - started)
 
 
 def describe_design(design: Design) -> str:

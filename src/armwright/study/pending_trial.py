@@ -19,6 +19,7 @@ class PendingTrial:
         slot: the proposer's slot, if the trial is one.
         proposing: time spent on the proposal [s].
         sampling: time spent in the sampler [s].
+        traceback: of the custom evaluator's code, if it raised.
     """
 
     optuna_trial: Any
@@ -26,6 +27,7 @@ class PendingTrial:
     slot: ProposalSlot | None
     proposing: float
     sampling: float
+    traceback: str = ""
 
     @property
     def is_evaluated(self) -> bool:
@@ -34,12 +36,14 @@ class PendingTrial:
 
     def finish(self, evaluated: Evaluated, sampler_notes: dict[str, dict[str, Any]]) -> None:
         """Store the outcome of the trial, the notes of the sampler and the times."""
-        outcome = evaluated.outcome
+        outcome, failure = evaluated.outcome, evaluated.outcome.failure
+        if failure is not None:
+            self.traceback, failure = failure.traceback, replace(failure, traceback="")
         self.trial = replace(
             self.trial,
             values=outcome.values,
             violations=outcome.violations,
-            failure=outcome.failure,
+            failure=failure,
             sampler_notes=sampler_notes,
             seconds={
                 "total": round(self.proposing + self.sampling + evaluated.seconds, 6),

@@ -28,6 +28,8 @@ class Progress:
         n_in_flight: requests to the proposer that run while trials go on.
         fault: kind of the fault of this trial.
         faults: faults of all trials so far, by kind.
+        failures: failed evaluations so far, by kind.
+        latest_failures: trial and reason of the last failed evaluation of each kind.
         note: message for the user, reported once.
         reason: reason of the proposer for this trial's design.
     """
@@ -42,6 +44,8 @@ class Progress:
     n_in_flight: int = 0
     fault: str | None = None
     faults: Mapping[str, int] = field(default_factory=dict[str, int])
+    failures: Mapping[str, int] = field(default_factory=dict[str, int])
+    latest_failures: Mapping[str, str] = field(default_factory=dict[str, str])
     note: str = ""
     reason: str = ""
 

@@ -1,7 +1,10 @@
 """Settings of a study, checked."""
 
+import math
 import operator
+import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from armwright.exceptions import SettingsError
@@ -15,6 +18,21 @@ from armwright.study.cluster import Workers
 
 MAX_INTEGER = 2**31 - 1
 ON_MODEL_FAILURE = ("stop", "continue")
+
+
+@dataclass(frozen=True)
+class EvaluationOptions:
+    """How the designs of a study are evaluated.
+
+    Attributes:
+        workers: processes that evaluate the designs; None: this process.
+        timeout: for one call of the custom evaluator [s]; None for no limit.
+        allow_failures: whether the run goes on if its first evaluations all fail with the same exception.
+    """
+
+    workers: Workers | None = None
+    timeout: float | None = None
+    allow_failures: bool = False
 
 
 def study_method(
@@ -76,7 +94,7 @@ def check_proposer(proposer: str | Proposer | None) -> Proposer | None:
     return proposer
 
 
-def check_settings(problem: Problem, method: Method, workers: Workers | None, on_model_failure: str) -> None:
+def check_settings(problem: Problem, method: Method, evaluation: EvaluationOptions, on_model_failure: str) -> None:
     """Raise a SettingsError for settings that exclude each other, or for an initial design outside the space."""
     if on_model_failure not in ON_MODEL_FAILURE:
         raise SettingsError(f'on_model_failure "{on_model_failure}" is not one of {", ".join(ON_MODEL_FAILURE)}')
@@ -84,8 +102,20 @@ def check_settings(problem: Problem, method: Method, workers: Workers | None, on
         problem.space.design(design)
     if problem.evaluator is not None and method.refine_every is not None:
         raise SettingsError("--refine-every does not go with an evaluator: a refinement takes a thousand evaluations")
-    if workers is not None and method.in_flight is not None:
+    _check_timeout(problem, evaluation.timeout)
+    if evaluation.workers is not None and method.in_flight is not None:
         raise SettingsError("in_flight does not go with --workers, which evaluate while a question is asked anyway")
+
+
+def _check_timeout(problem: Problem, timeout: float | None) -> None:
+    if timeout is None:
+        return
+    if not 0.0 < timeout < math.inf:
+        raise SettingsError(f"evaluation_timeout: expected seconds > 0, got {timeout!r}")
+    if problem.evaluator is None:
+        raise SettingsError("evaluation_timeout ends custom evaluators; without --evaluator leave it out")
+    if sys.platform == "win32":
+        raise SettingsError("evaluation_timeout needs Linux or macOS; leave it out")
 
 
 def check_integer(name: str, value: Any, least: int) -> int:

@@ -15,6 +15,7 @@ from typing import Any
 from armwright.exceptions import ModelError, StoppedError
 from armwright.pareto import FrontTracker
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
+from armwright.problem.evaluators import evaluator_error
 from armwright.problem.problem import Outcome, Problem
 from armwright.proposers.proposer import Proposer
 from armwright.runs.config import RunConfig
@@ -28,13 +29,20 @@ from armwright.search.samplers import BlackBox, SamplerFactory
 from armwright.spaces.parameters import Design
 from armwright.study.cluster import Workers
 from armwright.study.dask_backend import DaskBackend
-from armwright.study.evaluation_backend import Evaluated, EvaluationBackend, InProcessBackend
+from armwright.study.evaluation_backend import (
+    Evaluated,
+    EvaluationBackend,
+    InProcessBackend,
+    ProcessBackend,
+    describe_design,
+)
+from armwright.study.failure_watch import FailureWatch
 from armwright.study.overlapping_schedule import request_schedule
 from armwright.study.pending_trial import PendingTrial, new_trial
 from armwright.study.progress import Activity, Progress, StudyResult
 from armwright.study.proposal_requests import ProposalRequests, ProposalSlot, past_slots
 from armwright.study.schedule import ReplaySchedule, Schedule
-from armwright.study.settings import check_proposer, check_settings, run_config, study_method
+from armwright.study.settings import EvaluationOptions, check_proposer, check_settings, run_config, study_method
 
 POLL_SECONDS = 0.1  # between two checks for requests of the watcher while the study waits
 
@@ -53,6 +61,8 @@ def optimize(
     on_model_failure: str = "stop",
     verify: bool = True,
     workers: Workers | None = None,
+    evaluation_timeout: float | None = None,
+    allow_failures: bool = False,
     seed: int = 0,
     out: str | Path | None = None,
     watch: Callable[[Progress], None] | None = None,
@@ -73,12 +83,15 @@ def optimize(
             black-box trials only. A run that has started always continues.
         verify: whether the final front is verified (`runs/verification.py`); never with an evaluator.
         workers: processes that evaluate the designs; None: this process.
+        evaluation_timeout: ends a call of the custom evaluator after so many seconds; the design is infeasible then.
+        allow_failures: whether the run goes on if its first five evaluations all fail with the same exception.
         seed: of all random numbers.
         out: run folder, which keeps every trial; a second call resumes.
         watch: called with the progress.
 
     Raises:
         TaskError: it is proven that no design of the space can serve the task.
+        EvaluatorError: the first five evaluations all failed with the same exception.
 
     Examples:
         >>> import armwright as aw
@@ -94,7 +107,8 @@ def optimize(
     """
     proposer = check_proposer(proposer)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
-    check_settings(problem, method, workers, on_model_failure)
+    evaluation = EvaluationOptions(workers, evaluation_timeout, allow_failures)
+    check_settings(problem, method, evaluation, on_model_failure)
     stop_if_proven(check_instantly(problem))
     config = run_config(problem, method, seed)
     with ExitStack() as stack:
@@ -102,7 +116,7 @@ def optimize(
         if out is not None:
             folder = stack.enter_context(RunFolder(Path(out)))
             config = folder.adopt(config)
-        study = Study(problem, config, proposer, sampler, folder, watch, workers)
+        study = Study(problem, config, proposer, sampler, folder, watch, evaluation)
         return study.run(on_model_failure, verify and problem.evaluator is None)
 
 
@@ -117,10 +131,10 @@ class Study:
         sampler: str | SamplerFactory,
         folder: RunFolder | None,
         watch: Callable[[Progress], None] | None,
-        workers: Workers | None = None,
+        evaluation: EvaluationOptions,
     ) -> None:
         self._problem = problem
-        self._workers = workers
+        self._evaluation = evaluation
         self._config = config
         self._method = config.study
         self._proposer = proposer
@@ -132,12 +146,14 @@ class Study:
             notify = self._report_request if self._method.in_flight is None else None
             self._requests = ProposalRequests(proposer, config.seed, notify)
         n_objectives, names = len(problem.objectives), [constraint.description for constraint in problem.constraints]
-        self._black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names)
+        can_fail = problem.evaluator is not None
+        self._black_box = BlackBox(problem.space, sampler, config.seed, n_objectives, names, can_fail)
         self._trials = folder.open_trials(config) if folder is not None else []
         self._black_box.restore(self._trials)
         self._first_of: dict[Design, int] = {}  # the first trial of each design
         for trial in self._trials:
             self._first_of.setdefault(trial.design, trial.number)
+        self._failures = FailureWatch(self._trials, self._method.n_trials)
         self._faults = Counter(trial.fault for trial in self._trials if trial.fault)
         self._n_refined = sum(trial.refines is not None for trial in self._trials)
         self._latest = History(problem, (), self._method.n_init, config.reference_point, self._method)
@@ -177,10 +193,7 @@ class Study:
         if self._folder is not None:
             discard_results(self._folder.path)  # those of fewer trials
             self._config = self._folder.note_versions(self._config, self._problem.evaluator)
-        if self._workers is not None:
-            self._backend = DaskBackend(
-                self._problem, self._workers, lambda note: self._report("beginning", len(self._trials), note=note)
-            )
+        self._backend = self._new_backend()
         self._schedule = self._new_schedule()
         with closing(self._schedule):
             for number in range(first, self._method.n_trials):
@@ -188,6 +201,14 @@ class Study:
                 self._start_trial(number)
             while self._pending:
                 self._take_results(POLL_SECONDS)
+
+    def _new_backend(self) -> EvaluationBackend:
+        workers, timeout = self._evaluation.workers, self._evaluation.timeout
+        if workers is not None:
+            return DaskBackend(
+                self._problem, workers, timeout, lambda note: self._report("beginning", len(self._trials), note=note)
+            )
+        return InProcessBackend(self._problem) if timeout is None else ProcessBackend(self._problem, timeout)
 
     def _check_model(self, on_model_failure: str) -> None:
         """Report what the proposals will cost, and check that the proposer works."""
@@ -318,7 +339,9 @@ class Study:
         """Pass the result of a trial to the sampler at once, even if earlier trials are missing."""
         started = time.perf_counter()
         outcome = evaluated.outcome
-        notes = self._black_box.tell(pending.optuna_trial, outcome.values, outcome.violations)
+        notes = self._black_box.tell(
+            pending.optuna_trial, outcome.values, outcome.violations, outcome.failure is not None
+        )
         pending.sampling += time.perf_counter() - started
         pending.finish(evaluated, notes)
 
@@ -339,10 +362,24 @@ class Study:
         if trial.fault:
             self._faults[trial.fault] += 1
         self._freeze_reference_point()
+        if self._failures.add(trial) and not self._evaluation.allow_failures:
+            self._stop_failing(pending)
         note = "" if pending.slot is None else pending.slot.note
-        if trial.failure:
-            note = f"trial {trial.number}: {trial.failure}"
         self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)
+
+    def _stop_failing(self, pending: PendingTrial) -> None:
+        """Discard the trials, whose evaluations all failed in the same way, and raise EvaluatorError."""
+        failure = pending.trial.failure
+        assert failure is not None
+        if self._folder is not None:
+            self._folder.replace_trials([])
+        n = sum(trial.duplicate_of is None for trial in self._trials)
+        raise evaluator_error(
+            f"the first {n} evaluations all failed: {failure.description}; last design: "
+            f"{describe_design(pending.trial.design)}. Fix the evaluator and rerun the same command, or go on with "
+            "--allow-failures",
+            replace(failure, traceback=pending.traceback),
+        )
 
     def _history(self) -> History:
         """Return the finished trials; extends the last history, so that the cost does not grow with the trials."""
@@ -353,6 +390,8 @@ class Study:
         """Store a reference point that the task leaves open, once the random trials give it."""
         if self._config.reference_point is None and len(self._trials) >= self._method.n_init:
             reference_point = self._history().found_reference_point()
+            if reference_point is None:  # no evaluation succeeded yet
+                return
             self._config = self._config.model_copy(update={"reference_point": reference_point})
             self._tracker.set_reference_point(reference_point)
             if self._folder is not None:
@@ -387,6 +426,8 @@ class Study:
                 n_in_flight=self._schedule.n_in_flight,
                 fault=fault,
                 faults=self._faults.copy(),
+                failures=self._failures.counts.copy(),
+                latest_failures=self._failures.latest.copy(),
                 note=note,
                 reason=reason,
             )

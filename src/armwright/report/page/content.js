@@ -30,6 +30,7 @@ export class Content {
     this.head = null;
     this.calls = [];
     this.proposals = {};
+    this.failures = {}; // why evaluations failed, which then have no finite values
     this._clear();
   }
 
@@ -49,6 +50,7 @@ export class Content {
     this.head = head;
     this.curve = arrays.curve.data;
     Object.assign(this.proposals, head.proposals);
+    Object.assign(this.failures, head.failures);
     this.calls = [...this.calls.slice(0, head.calls_from), ...head.calls];
     if (arrays.values) {
       const rows = arrays.values.shape[0];
@@ -76,7 +78,8 @@ export class Content {
   look(i) { return this.head.looks[this.source(i)]; } // by name, of what JSON.parse made: no name is special
   values(i) { return this._part("values", i); }
   violations(i) { return this._part("violations", i); } // one per constraint; satisfied at <= 0
-  isFeasible(i) { return this.violations(i).every((value) => value <= 0); }
+  hasFailed(i) { return i in this.failures; }
+  isFeasible(i) { return !this.hasFailed(i) && this.violations(i).every((value) => value <= 0); }
 
   // The active parameters: the arm has their module, and its type uses them.
   params(i) {

@@ -69,7 +69,7 @@ export function drawDesign() {
   const verdict = robust === null || !head.front.includes(i) ? "" : robust ? ", robust" : ", sensitive";
   $("design-title").textContent = `#${i} ${content.joints(i)}, ${content.look(i).label}${verdict}`;
   const iteration = head.is_study && i >= content.nInit ? ` Iteration ${i - content.nInit + 1}.` : "";
-  const objectives = content.objectives.map((o, k) => {
+  const objectives = content.hasFailed(i) ? [`Evaluation failed (${content.failures[i]})`] : content.objectives.map((o, k) => {
     const mean = o.name === "position_error" && n > 1 ? ` summed over ${n} targets (${millimetres(values[k] / n)} on average)` : "";
     return `${o.label} ${number(values[k])} ${o.unit.replace(" x ", " × ")}${mean}`;
   });

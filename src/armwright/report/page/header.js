@@ -35,6 +35,7 @@ export function drawHeader() {
   }
   const robust = result.robust === null ? "" : `, ${result.robust.length} robust`;
   facts.push(fact("front", `${plural(head.front.length, "design")}${robust}`));
+  if (head.result.failed) facts.push(fact("failed evaluations", `${head.result.failed}`));
   if (head.result.infeasible) facts.push(fact("infeasible", `${head.result.infeasible}`));
   for (const [source, n] of Object.entries(result.by_source)) {
     facts.push(fact(head.looks[source].label, `${n}`, head.looks[source].colour));

@@ -74,7 +74,7 @@ function isPrecise() {
 function range(k) {
   const reference = content.head.reference_point;
   if (reference === null) return undefined;
-  const all = [...Array(content.n).keys()], feasible = all.filter((i) => content.isFeasible(i));
+  const all = [...Array(content.n).keys()].filter((i) => !content.hasFailed(i)), feasible = all.filter((i) => content.isFeasible(i));
   const within = (feasible.length ? feasible : all).filter((i) => [x, y].every((m) => content.values(i)[m] <= VIEW * reference[m]));
   const shown = within.length ? within : frontUntil(content.n);
   if (!shown.length) return [0, VIEW * reference[k]];
@@ -148,7 +148,8 @@ function draw() {
     });
   }
   const onFront = new Set(many && n === content.n ? content.head.front : front);
-  const infeasible = [...Array(n).keys()].filter((i) => !content.isFeasible(i));
+  const failed = [...Array(n).keys()].filter((i) => content.hasFailed(i));
+  const infeasible = [...Array(n).keys()].filter((i) => !content.isFeasible(i) && !content.hasFailed(i));
   if (infeasible.length) {
     traces.push({
       x: infeasible.map((i) => placed(content.values(i)[x], 0)),
@@ -214,10 +215,11 @@ function draw() {
   };
   Plotly.react($("pareto"), traces, layout, CONFIG);
   const outside = reference === null ? 0
-    : [...Array(n).keys()].filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
+    : [...Array(n).keys()].filter((i) => !content.hasFailed(i)).filter((i) => content.values(i)[x] > high(x) || content.values(i)[y] > high(y)).length;
   const notes = ["Click a design to see its arm."];
   if (outside) notes.push(`${outside} of ${n} designs lie outside this view; zoom out to see them.`);
   if (infeasible.length) notes.push(`Hollow: infeasible, ${infeasible.length} of ${n}.`);
+  if (failed.length) notes.push(`Not shown: ${plural(failed.length, "design")} whose evaluation failed.`);
   for (const arm of content.head.existing_arms) notes.push(describeExisting(arm, high));
   if (many) notes.push("Large: on the front in all objectives; other designs may dominate them in this plane.");
   if (log) notes.push(`Logarithmic: values below ${number(floor)} are drawn at ${number(floor)}.`);
@@ -253,7 +255,7 @@ function mark() {
   const { xaxis, yaxis } = $("pareto")._fullLayout, [width, height] = [xaxis._length, yaxis._length];
   for (const [id, i] of [["ring-selected", state.design], ["ring-compared", state.compared]]) {
     const ring = $(id);
-    ring.hidden = i === null || i >= until();
+    ring.hidden = i === null || i >= until() || content.hasFailed(i);
     if (ring.hidden) continue;
     const values = content.values(i);
     const [left, top] = [xaxis.d2p(placed(values[x], 0)), yaxis.d2p(values[y])];

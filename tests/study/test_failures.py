@@ -1,0 +1,210 @@
+"""Evaluations that fail: what is recorded, what samplers learn, when a run stops."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import optuna
+import pytest
+
+import armwright as aw
+from armwright.exceptions import EvaluatorError
+from armwright.llm.feedback import Feedback
+from armwright.pareto import hypervolume
+from armwright.runs.optuna_export import export_study
+from armwright.search.samplers import SAMPLERS
+from armwright.study.progress import Progress
+
+TASK = aw.load_task("target-1").model_copy(update={"reference_point": None})
+SPACE = aw.paper_space(joints=3)
+SHORT: dict[str, Any] = {"proposer": "rules", "n_init": 6, "n_step": 4, "n_total": 14}
+
+
+def length_of(arm: aw.Arm) -> float:
+    return sum(link.length for link in arm.links)
+
+
+@aw.evaluator("reach [m]", "height [m]")
+def sometimes(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+    """Fail for bases on one side, where the best values would be."""
+    if arm.base[0] < 0.0:
+        raise ValueError("no licence")
+    return length_of(arm), math.nan if arm.base[1] > 0.5 else 1.0 + arm.base[2]
+
+
+@aw.evaluator("reach [m]", "height [m]")
+def never(arm: aw.Arm, task: aw.Task) -> tuple[float, float]:
+    """Fail for every arm."""
+    raise TypeError("wrong argument")
+
+
+def recorded(run: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (run / "trials.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run with failures of two kinds."""
+    out = tmp_path_factory.mktemp("failures") / "run"
+    aw.optimize(aw.Problem(TASK, SPACE, evaluator=sometimes), **SHORT, out=out)
+    return out
+
+
+def test_failed_trials_are_recorded_without_values_and_read_as_infinite(run: Path) -> None:
+    _, history = aw.read_run(run)
+    failed = [trial for trial in recorded(run) if "failure" in trial]
+    assert {trial["failure"]["kind"] for trial in failed} == {"exception", "non_finite"}
+    assert all(trial["values"] == [] for trial in failed)
+    assert [trial["number"] for trial in failed] == np.flatnonzero(history.failed).tolist()
+    assert np.isinf(history.values[history.failed]).all()
+    assert np.isfinite(history.values[~history.failed]).all()
+    raised = next(trial for trial in failed if trial["failure"]["kind"] == "exception")
+    assert raised["failure"]["reason"] == "ValueError: no licence"
+    assert raised["failure"]["place"].startswith("test_failures.py, line ")
+
+
+def test_failed_trials_are_in_no_front_and_no_hypervolume(run: Path) -> None:
+    _, history = aw.read_run(run)
+    assert history.front
+    assert not {member.number for member in history.front} & set(np.flatnonzero(history.failed).tolist())
+    evaluated = history.values[~history.failed]
+    assert history.reference_point is not None
+    assert history.hypervolumes[-1] == pytest.approx(hypervolume(evaluated, history.reference_point))
+    assert not history.feasible[history.failed].any()
+
+
+def test_summary_counts_failures_by_kind(run: Path) -> None:
+    summary = json.loads((run / "summary.json").read_text())
+    kinds = [trial["failure"]["kind"] for trial in recorded(run) if "failure" in trial]
+    assert summary["failures"] == {kind: kinds.count(kind) for kind in ("exception", "timeout", "non_finite")}
+    table = (run / "trials.csv").read_text()
+    assert "inf" not in table
+    assert table.splitlines()[0].endswith(",reach,height,failure")
+
+
+@pytest.mark.slow
+def test_pages_figures_and_prompts_show_failures(run: Path) -> None:
+    assert aw.write_report(run).is_file()
+    assert aw.write_figures(run)
+    _, history = aw.read_run(run)
+    feedback = Feedback(history, 0, others="all")
+    feedback_of = {record["number"]: record for record in feedback.records(feedback.others, [0])}
+    shown = [record["e_all"] for n, record in feedback_of.items() if n in np.flatnonzero(history.failed)]
+    assert all(text.startswith("none, its evaluation failed (") for text in shown)
+    assert all("inf" not in str(record["e_all"]) for record in feedback_of.values())
+
+
+@pytest.mark.slow
+def test_exported_study_has_failed_trials(run: Path) -> None:
+    exported = export_study(run)
+    (study,) = optuna.get_all_study_summaries(f"sqlite:///{exported.database}")
+    trials = optuna.load_study(study_name=study.study_name, storage=f"sqlite:///{exported.database}").trials
+    _, history = aw.read_run(run)
+    states = [trial.state == optuna.trial.TrialState.FAIL for trial in trials]
+    assert states == history.failed.tolist()
+    assert all(trial.user_attrs["failure"] for trial in trials if trial.state == optuna.trial.TrialState.FAIL)
+
+
+@pytest.mark.parametrize("sampler", [name for name in SAMPLERS if name != "gp"])
+def test_run_with_failures_resumes_to_the_bit(tmp_path: Path, sampler: str) -> None:
+    problem = aw.Problem(TASK, SPACE, evaluator=sometimes)
+    whole = aw.optimize(problem, **SHORT, sampler=sampler)
+    aw.optimize(problem, **SHORT | {"n_total": 5}, sampler=sampler, out=tmp_path / "run")
+    resumed = aw.optimize(problem, **SHORT, sampler=sampler, out=tmp_path / "run")
+    assert [(t.design, t.values, t.failure) for t in resumed.trials] == [
+        (t.design, t.values, t.failure) for t in whole.trials
+    ]
+
+
+def test_sampler_learns_to_avoid_failures() -> None:
+    """TPE proposes fewer failing designs than a random search."""
+    problem = aw.Problem(TASK, SPACE, evaluator=sometimes)
+    failed = {
+        sampler: sum(
+            int(aw.optimize(problem, proposer="none", sampler=sampler, n_total=40, seed=seed).history.failed[10:].sum())
+            for seed in range(3)
+        )
+        for sampler in ("tpe", "random")
+    }
+    assert failed["tpe"] < 0.6 * failed["random"]
+
+
+def test_run_stops_if_the_first_evaluations_fail_alike(tmp_path: Path) -> None:
+    """The trials are discarded, so that a mended evaluator begins anew."""
+    out = tmp_path / "run"
+    with pytest.raises(
+        EvaluatorError, match=r"^the first 5 evaluations all failed: TypeError: wrong argument"
+    ) as raised:
+        aw.optimize(aw.Problem(TASK, SPACE, evaluator=never), **SHORT, out=out)
+    assert raised.value.exit_code == 1
+    (trace,) = raised.value.__notes__
+    assert 'test_failures.py", line' in trace
+    assert recorded(out) == []
+    going_on = aw.optimize(aw.Problem(TASK, SPACE, evaluator=never), **SHORT, out=out, allow_failures=True)
+    assert going_on.summary["failures"]["exception"] == len(going_on.trials) == 20
+    assert going_on.front == []
+    assert going_on.summary["hypervolume"]["final"] is None
+    assert aw.write_report(out).is_file()
+    assert aw.write_figures(out) == []
+
+
+def test_run_goes_on_if_one_of_the_first_evaluations_succeeds() -> None:
+    calls: list[int] = []
+
+    @aw.evaluator("reach [m]")
+    def second(arm: aw.Arm, task: aw.Task) -> float:
+        calls.append(1)
+        if len(calls) != 2:
+            raise TypeError("wrong argument")
+        return length_of(arm)
+
+    found = aw.optimize(aw.Problem(TASK, SPACE, evaluator=second), **SHORT)
+    assert found.summary["failures"]["exception"] == len(calls) - 1
+    assert [member.number for member in found.front] == [1]
+
+
+def test_reference_point_waits_for_the_first_success(tmp_path: Path) -> None:
+    calls: list[int] = []
+
+    @aw.evaluator("reach [m]")
+    def later(arm: aw.Arm, task: aw.Task) -> float:
+        calls.append(1)
+        if len(calls) <= 9:
+            raise TypeError("wrong argument")
+        return length_of(arm)
+
+    points: list[float | None] = []
+
+    def watch(progress: Progress) -> None:
+        points.append(progress.hypervolume)
+
+    found = aw.optimize(aw.Problem(TASK, SPACE, evaluator=later), **SHORT, allow_failures=True, watch=watch)
+    first = int(np.flatnonzero(~found.history.failed)[0])
+    assert found.config.reference_point == pytest.approx([1.1 * found.history.values[first, 0]])
+    assert points[-1] == pytest.approx(found.summary["hypervolume"]["final"])
+
+
+@pytest.mark.slow
+def test_timeout_ends_code_that_holds_the_lock_and_crashes_are_failures() -> None:
+    @aw.evaluator("reach [m]")
+    def fragile(arm: aw.Arm, task: aw.Task) -> float:
+        import ctypes
+        import os
+        import signal
+
+        if arm.base[0] < -0.5:
+            ctypes.PyDLL(None).sleep(1000)
+        if arm.base[0] > 0.5:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return sum(link.length for link in arm.links)
+
+    problem = aw.Problem(TASK, SPACE, evaluator=fragile)
+    found = aw.optimize(problem, proposer="none", n_init=8, n_total=1, evaluation_timeout=1.0)
+    for trial in found.trials:
+        x = trial.design.origin[0]
+        expected = "timeout" if x < -0.5 else "exception" if x > 0.5 else None
+        assert (trial.failure.kind if trial.failure else None) == expected
+    reasons = {trial.failure.reason for trial in found.trials if trial.failure}
+    assert reasons == {"no result within 1 s", "the process of the evaluator was ended by SIGSEGV"}
