@@ -46,6 +46,7 @@ def drawn(history: History, number: int) -> tuple[Figure, list[np.ndarray]]:
     return figure, [np.concatenate(one._faces) for one in solids]
 
 
+@pytest.mark.slow
 def test_figures_draw_the_column_down_to_its_foot(folder: Path) -> None:
     history = read_run(folder)[1]
     seen = set()
