@@ -1,7 +1,7 @@
 """Expensive evaluators: the hypervolume that searches reach within 10 to 200 evaluations.
 
     python benchmarks/expensive.py --out expensive              # the whole plan; the same command resumes
-    python benchmarks/expensive.py --out expensive --share 1/2  # half of it; --share 2/2 at the same time on another core
+    python benchmarks/expensive.py --out expensive --share 1/2  # half of it; --share 2/2 on another core
     python benchmarks/expensive.py --out expensive --methods tpe,surrogate --evaluators pd --tasks target-1 --seeds 3
     python benchmarks/expensive.py --out expensive --only-tables
 
