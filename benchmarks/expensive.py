@@ -1,12 +1,18 @@
 """Expensive evaluators: the hypervolume that searches reach within 10 to 200 evaluations.
 
     python benchmarks/expensive.py --out expensive              # the whole plan; the same command resumes
-    python benchmarks/expensive.py --out expensive --share 1/2  # half of it; --share 2/2 at the same time on another core
+    python benchmarks/expensive.py --out expensive --share 1/2  # half of it; 2/2 beside it on another core
     python benchmarks/expensive.py --out expensive --methods tpe,surrogate --evaluators pd --tasks target-1 --seeds 3
     python benchmarks/expensive.py --out expensive --only-tables
 
+Set OMP_NUM_THREADS=1 for `gp` and `botorch`: their threads only get in each other's way.
+
 Each finished run is one line of OUT/runs.jsonl. All methods of a seed begin with the same 10 random designs, which
 count as evaluations. Hypervolumes are bounded by the point of `reference_point`.
+
+`gp` and `botorch` (qNEHVI) need packages that armwright does not bring, best in an environment of their own:
+
+    pip install -e '.[gp]' mujoco optuna-integration==5.0.0 botorch==0.18.1
 
 | evaluator | objectives | time |
 |---|---|---|
@@ -31,7 +37,7 @@ import numpy as np
 
 import armwright as aw
 from armwright.arrays import Array
-from armwright.exceptions import UsageError
+from armwright.exceptions import SettingsError, UsageError
 from armwright.experiments.statistics import LEVEL, PairedTest, holm, interval, paired_test
 from armwright.pareto import hypervolume_history
 from armwright.spaces.design_space import default_space
@@ -41,12 +47,27 @@ COUNTS = (10, 20, 30, 60, 100, 200)
 FULL = Path(__file__).parents[1] / "examples" / "mujoco_simulation.py"
 BOX = {"pd": (5.0, 20.0), "simulation": (5.0, 20.0)}  # [m], [J]
 N_PROBED, QUANTILE = 64, 0.75  # random designs that bound the other evaluators
+
+
+def botorch(seed: int) -> Any:
+    """Return BoTorch's noisy expected hypervolume improvement as a sampler of Optuna."""
+    try:
+        from optuna_integration.botorch import (  # pyright: ignore
+            BoTorchSampler,  # pyright: ignore
+            qnehvi_candidates_func,  # pyright: ignore
+        )
+    except ImportError as reason:
+        raise SettingsError(f"{reason}; pip install optuna-integration botorch greenlet") from reason
+    return BoTorchSampler(candidates_func=qnehvi_candidates_func, n_startup_trials=N_INIT, seed=seed)  # pyright: ignore
+
+
 METHODS: Mapping[str, dict[str, Any]] = {
     "random": {"sampler": "random", "proposer": "none"},
     "tpe": {"sampler": "tpe", "proposer": "none"},
     "tpe-rules": {"sampler": "tpe", "proposer": "rules"},
     "nsga2": {"sampler": "nsga2", "proposer": "none"},
     "gp": {"sampler": "gp", "proposer": "none"},
+    "botorch": {"sampler": botorch, "proposer": "none"},
     "surrogate": {"sampler": "surrogate", "proposer": "none"},
 }
 OURS, MAIN = "surrogate", ("tpe", "tpe-rules", "surrogate")
@@ -153,9 +174,10 @@ def execute(cell: Cell, method: str, seed: int, evaluations: int) -> Run:
 
 
 def read(file: Path) -> list[Run]:
-    """Return the finished runs, without a truncated last line."""
+    """Return the finished runs, the longest of each kind, without a truncated last line."""
     lines = file.read_bytes().split(b"\n")[:-1] if file.exists() else []
-    return [Run(**json.loads(line)) for line in lines]
+    runs = sorted((Run(**json.loads(line)) for line in lines), key=lambda run: len(run.values))
+    return list({run.key: run for run in runs}.values())
 
 
 def append(file: Path, run: Run) -> None:
@@ -167,7 +189,7 @@ def append(file: Path, run: Run) -> None:
 
 def work(options: argparse.Namespace, file: Path) -> None:
     """Execute the runs of the plan that are missing."""
-    done = {run.key for run in read(file)}
+    done = {run.key for run in read(file) if len(run.values) >= options.evaluations}
     part, parts = options.share
     deadline = time.monotonic() + 3600.0 * options.hours
     unusable: set[str] = set()

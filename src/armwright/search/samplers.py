@@ -181,8 +181,10 @@ class BlackBox:
         seed = derived_seed(self._seed, SAMPLING, number)
         sampler = self._factory(seed)
         self._study.sampler = RandomSampler(seed=seed) if source == RANDOM else sampler
-        trial = self._study.ask()
-        design = self._suggest(trial)
+        with warnings.catch_warnings():  # of infinite values, which failed trials have
+            warnings.filterwarnings("ignore", "Clip non-finite values", UserWarning)
+            trial = self._study.ask()
+            design = self._suggest(trial)
         self._assign_generation(sampler, trial)
         trial.set_user_attr("source", source)
         return trial, design
