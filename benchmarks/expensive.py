@@ -10,7 +10,8 @@ Set OMP_NUM_THREADS=1 for `gp` and `botorch`: their threads only get in each oth
 Each finished run is one line of OUT/runs.jsonl. All methods of a seed begin with the same 10 random designs, which
 count as evaluations. Hypervolumes are bounded by the point of `reference_point`.
 
-`gp` and `botorch` (qNEHVI) need packages that armwright does not bring, best in an environment of their own:
+`gp` and `botorch` (qNEHVI) need packages that armwright does not bring, best in an environment of their own. `botorch`
+takes seconds a trial, so it runs only if it is named by --methods.
 
     pip install -e '.[gp]' mujoco optuna-integration==5.0.0 botorch==0.18.1
 
@@ -26,6 +27,7 @@ import argparse
 import json
 import os
 import time
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -52,13 +54,21 @@ N_PROBED, QUANTILE = 64, 0.75  # random designs that bound the other evaluators
 def botorch(seed: int) -> Any:
     """Return BoTorch's noisy expected hypervolume improvement as a sampler of Optuna."""
     try:
-        from optuna_integration.botorch import (  # pyright: ignore
-            BoTorchSampler,  # pyright: ignore
-            qnehvi_candidates_func,  # pyright: ignore
-        )
+        from optuna_integration import botorch as integration  # pyright: ignore
     except ImportError as reason:
         raise SettingsError(f"{reason}; pip install optuna-integration botorch greenlet") from reason
-    return BoTorchSampler(candidates_func=qnehvi_candidates_func, n_startup_trials=N_INIT, seed=seed)  # pyright: ignore
+
+    def candidates(x: Any, y: Any, constraints: Any, bounds: Any, pending: Any) -> Any:
+        varies = constraints is not None and bool((constraints > 0.0).any())  # some evaluation failed
+        return integration.botorch.qnehvi_candidates_func(  # pyright: ignore
+            x, y, constraints if varies else None, bounds, pending
+        )
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that it is experimental
+        return integration.BoTorchSampler(  # pyright: ignore
+            candidates_func=candidates, n_startup_trials=N_INIT, seed=seed
+        )
 
 
 METHODS: Mapping[str, dict[str, Any]] = {
@@ -297,7 +307,7 @@ def read_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of runs.jsonl")
     parser.add_argument("--tasks", type=names(tasks), default=tasks)
-    parser.add_argument("--methods", type=names(METHODS), default=list(METHODS))
+    parser.add_argument("--methods", type=names(METHODS), default=[name for name in METHODS if name != "botorch"])
     parser.add_argument("--evaluators", type=names(evaluators), default=evaluators)
     parser.add_argument(
         "--seeds", type=int, help=f"default: {SEEDS_OF_MAIN} for {', '.join(MAIN)}, else {SEEDS_OF_OTHERS}"

@@ -229,7 +229,8 @@ class BlackBox:
         return {level: noted for level, noted in notes.items() if noted}
 
     def _constraint_values(self, violations: Iterable[float], has_failed: bool) -> dict[str, float]:
-        failure = (float(has_failed),) if self._can_fail else ()
+        # Models of constraints then expect success where nothing is known, and the border half-way.
+        failure = (1.0 if has_failed else -1.0,) if self._can_fail else ()
         return dict(zip(self._constraints, (*violations, *failure), strict=True))
 
     def _suggest(self, trial: Trial) -> Design:
