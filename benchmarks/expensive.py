@@ -184,8 +184,9 @@ def execute(cell: Cell, method: str, seed: int, evaluations: int) -> Run:
 
 
 def read(file: Path) -> list[Run]:
-    """Return the finished runs, the longest of each kind, without a truncated last line."""
-    lines = file.read_bytes().split(b"\n")[:-1] if file.exists() else []
+    """Return the finished runs, the longest of each kind; lines that a kill truncated do not count."""
+    lines = file.read_bytes().split(b"\n") if file.exists() else []
+    lines = [line for line in lines if line.endswith(b"}")]
     runs = sorted((Run(**json.loads(line)) for line in lines), key=lambda run: len(run.values))
     return list({run.key: run for run in runs}.values())
 
@@ -193,7 +194,7 @@ def read(file: Path) -> list[Run]:
 def append(file: Path, run: Run) -> None:
     """Write a run as one line, in a single write."""
     with file.open("ab", buffering=0) as out:
-        out.write(json.dumps(asdict(run)).encode() + b"\n")
+        out.write(b"\n" + json.dumps(asdict(run)).encode() + b"\n")  # apart from a truncated line
         os.fsync(out.fileno())
 
 
