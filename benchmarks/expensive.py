@@ -5,8 +5,15 @@
     python benchmarks/expensive.py --out expensive --methods tpe,surrogate --evaluators pd --tasks target-1 --seeds 3
     python benchmarks/expensive.py --out expensive --only-tables
 
+Set OMP_NUM_THREADS=1 for `gp` and `botorch`: their threads only get in each other's way.
+
 Each finished run is one line of OUT/runs.jsonl. All methods of a seed begin with the same 10 random designs, which
 count as evaluations. Hypervolumes are bounded by the point of `reference_point`.
+
+`gp` and `botorch` (qNEHVI) need packages that armwright does not bring, best in an environment of their own. `botorch`
+takes seconds a trial, so it runs only if it is named by --methods.
+
+    pip install -e '.[gp]' mujoco optuna-integration==5.0.0 botorch==0.18.1
 
 | evaluator | objectives | time |
 |---|---|---|
@@ -20,6 +27,7 @@ import argparse
 import json
 import os
 import time
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -31,7 +39,7 @@ import numpy as np
 
 import armwright as aw
 from armwright.arrays import Array
-from armwright.exceptions import UsageError
+from armwright.exceptions import SettingsError, UsageError
 from armwright.experiments.statistics import LEVEL, PairedTest, holm, interval, paired_test
 from armwright.pareto import hypervolume_history
 from armwright.spaces.design_space import default_space
@@ -41,12 +49,35 @@ COUNTS = (10, 20, 30, 60, 100, 200)
 FULL = Path(__file__).parents[1] / "examples" / "mujoco_simulation.py"
 BOX = {"pd": (5.0, 20.0), "simulation": (5.0, 20.0)}  # [m], [J]
 N_PROBED, QUANTILE = 64, 0.75  # random designs that bound the other evaluators
+
+
+def botorch(seed: int) -> Any:
+    """Return BoTorch's noisy expected hypervolume improvement as a sampler of Optuna."""
+    try:
+        from optuna_integration import botorch as integration  # pyright: ignore
+    except ImportError as reason:
+        raise SettingsError(f"{reason}; pip install optuna-integration botorch greenlet") from reason
+
+    def candidates(x: Any, y: Any, constraints: Any, bounds: Any, pending: Any) -> Any:
+        varies = constraints is not None and bool((constraints > 0.0).any())  # some evaluation failed
+        return integration.botorch.qnehvi_candidates_func(  # pyright: ignore
+            x, y, constraints if varies else None, bounds, pending
+        )
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that it is experimental
+        return integration.BoTorchSampler(  # pyright: ignore
+            candidates_func=candidates, n_startup_trials=N_INIT, seed=seed
+        )
+
+
 METHODS: Mapping[str, dict[str, Any]] = {
     "random": {"sampler": "random", "proposer": "none"},
     "tpe": {"sampler": "tpe", "proposer": "none"},
     "tpe-rules": {"sampler": "tpe", "proposer": "rules"},
     "nsga2": {"sampler": "nsga2", "proposer": "none"},
     "gp": {"sampler": "gp", "proposer": "none"},
+    "botorch": {"sampler": botorch, "proposer": "none"},
     "surrogate": {"sampler": "surrogate", "proposer": "none"},
 }
 OURS, MAIN = "surrogate", ("tpe", "tpe-rules", "surrogate")
@@ -153,21 +184,23 @@ def execute(cell: Cell, method: str, seed: int, evaluations: int) -> Run:
 
 
 def read(file: Path) -> list[Run]:
-    """Return the finished runs, without a truncated last line."""
-    lines = file.read_bytes().split(b"\n")[:-1] if file.exists() else []
-    return [Run(**json.loads(line)) for line in lines]
+    """Return the finished runs, the longest of each kind; lines that a kill truncated do not count."""
+    lines = file.read_bytes().split(b"\n") if file.exists() else []
+    lines = [line for line in lines if line.endswith(b"}")]
+    runs = sorted((Run(**json.loads(line)) for line in lines), key=lambda run: len(run.values))
+    return list({run.key: run for run in runs}.values())
 
 
 def append(file: Path, run: Run) -> None:
     """Write a run as one line, in a single write."""
     with file.open("ab", buffering=0) as out:
-        out.write(json.dumps(asdict(run)).encode() + b"\n")
+        out.write(b"\n" + json.dumps(asdict(run)).encode() + b"\n")  # apart from a truncated line
         os.fsync(out.fileno())
 
 
 def work(options: argparse.Namespace, file: Path) -> None:
     """Execute the runs of the plan that are missing."""
-    done = {run.key for run in read(file)}
+    done = {run.key for run in read(file) if len(run.values) >= options.evaluations}
     part, parts = options.share
     deadline = time.monotonic() + 3600.0 * options.hours
     unusable: set[str] = set()
@@ -275,7 +308,7 @@ def read_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True, help="folder of runs.jsonl")
     parser.add_argument("--tasks", type=names(tasks), default=tasks)
-    parser.add_argument("--methods", type=names(METHODS), default=list(METHODS))
+    parser.add_argument("--methods", type=names(METHODS), default=[name for name in METHODS if name != "botorch"])
     parser.add_argument("--evaluators", type=names(evaluators), default=evaluators)
     parser.add_argument(
         "--seeds", type=int, help=f"default: {SEEDS_OF_MAIN} for {', '.join(MAIN)}, else {SEEDS_OF_OTHERS}"

@@ -181,8 +181,10 @@ class BlackBox:
         seed = derived_seed(self._seed, SAMPLING, number)
         sampler = self._factory(seed)
         self._study.sampler = RandomSampler(seed=seed) if source == RANDOM else sampler
-        trial = self._study.ask()
-        design = self._suggest(trial)
+        with warnings.catch_warnings():  # of infinite values, which failed trials have
+            warnings.filterwarnings("ignore", "Clip non-finite values", UserWarning)
+            trial = self._study.ask()
+            design = self._suggest(trial)
         self._assign_generation(sampler, trial)
         trial.set_user_attr("source", source)
         return trial, design
@@ -227,7 +229,8 @@ class BlackBox:
         return {level: noted for level, noted in notes.items() if noted}
 
     def _constraint_values(self, violations: Iterable[float], has_failed: bool) -> dict[str, float]:
-        failure = (float(has_failed),) if self._can_fail else ()
+        # Models of constraints then expect success where nothing is known, and the border half-way.
+        failure = (1.0 if has_failed else -1.0,) if self._can_fail else ()
         return dict(zip(self._constraints, (*violations, *failure), strict=True))
 
     def _suggest(self, trial: Trial) -> Design:

@@ -354,6 +354,8 @@ class Study:
     def _record(self, pending: PendingTrial) -> None:
         """Write an evaluated trial, which is part of the run from now on."""
         trial = pending.trial
+        if self._failures.add(trial) and not self._evaluation.allow_failures:
+            self._stop_failing(pending)
         if self._folder is not None:
             self._folder.append(trial)
         self._trials.append(trial)
@@ -362,8 +364,6 @@ class Study:
         if trial.fault:
             self._faults[trial.fault] += 1
         self._freeze_reference_point()
-        if self._failures.add(trial) and not self._evaluation.allow_failures:
-            self._stop_failing(pending)
         note = "" if pending.slot is None else pending.slot.note
         self._report("finished", trial.number, trial.source, fault=trial.fault, note=note, reason=trial.reason)
 
@@ -373,7 +373,7 @@ class Study:
         assert failure is not None
         if self._folder is not None:
             self._folder.replace_trials([])
-        n = sum(trial.duplicate_of is None for trial in self._trials)
+        n = 1 + sum(trial.duplicate_of is None for trial in self._trials)
         raise evaluator_error(
             f"the first {n} evaluations all failed: {failure.description}; last design: "
             f"{describe_design(pending.trial.design)}. Fix the evaluator and rerun the same command, or go on with "
