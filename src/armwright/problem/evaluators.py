@@ -4,12 +4,15 @@
 def simulate(arm, task):
     ...
     return error, energy
+
+A function with a third argument, `design`, also gets the parameters that do not change the arm: design.params["kp"].
 """
 
 import hashlib
 import importlib
 import importlib.abc
 import importlib.util
+import inspect
 import math
 import re
 import sys
@@ -31,9 +34,12 @@ from armwright.problem.evaluation import Evaluation
 from armwright.problem.objective import Objective
 from armwright.problem.objectives import MAX_OBJECTIVES, OBJECTIVES
 from armwright.robot.arm import Arm
+from armwright.spaces.parameters import Design
 from armwright.tasks.task import Task
 
-Measure = Callable[[Arm, Task], Sequence[float] | float]
+Measure = Callable[[Arm, Task], Sequence[float] | float] | Callable[[Arm, Task, Design], Sequence[float] | float]
+
+DESIGN = "design"  # name of the argument of a function that takes the design, too
 
 NAMED = re.compile(r"([a-z][a-z0-9_]*)(?: \[([^\[\]]{1,40})\])?")  # such as "energy [J]"
 MAX_NAME_LENGTH = 40
@@ -70,11 +76,23 @@ class Evaluator:
             return load_evaluator, (f"{where}:{function}",)
         return Evaluator.__new__, (Evaluator,), self.__dict__
 
-    def __call__(self, arm: Arm, task: Task) -> tuple[float, ...]:
-        """Return the objectives of an arm; EvaluatorError if the function fails or exits."""
+    @property
+    def takes_design(self) -> bool:
+        """Whether the function has the argument `design`."""
+        return DESIGN in inspect.signature(self.measure).parameters
+
+    def __call__(self, arm: Arm, task: Task, design: Design | None = None) -> tuple[float, ...]:
+        """Return the objectives of an arm; EvaluatorError if the function fails or exits.
+
+        Args:
+            arm: The arm.
+            task: The task.
+            design: The design that the arm was built from, for a function that takes it.
+        """
+        given: dict[str, Any] = {DESIGN: design} if self.takes_design else {}
         try:
             with chdir("."):  # solvers change the working folder, to which the run's folder may be relative
-                made = self.measure(arm, task)
+                made = cast("Callable[..., object]", self.measure)(arm, task, **given)
         except (Exception, SystemExit) as fault:
             failure = EvaluatorError(f"{self.name} failed: {type(fault).__name__}: {fault} ({_place(fault)})")
             failure.add_note(_traceback(fault))
@@ -91,6 +109,8 @@ class Evaluator:
 
 def evaluator(*objectives: str, worst: Iterable[float] | None = None) -> Callable[[Measure], Evaluator]:
     """Make an evaluator of a function `(arm, task) -> numbers`, one for each of the objectives.
+
+    A function `(arm, task, design) -> numbers` also gets the design, whose `params` hold the custom parameters.
 
     Args:
         objectives: Names, each with its unit in brackets if it has one: "energy [J]".

@@ -19,9 +19,11 @@ from armwright.problem.objectives import (
     ORIENTATION_ERROR,
     ORIENTATION_QUANTITIES,
     PAPER_OBJECTIVES,
+    QUANTITIES,
     RENAMED,
     named_objectives,
 )
+from armwright.problem.scenes import scenes_of
 from armwright.robot.arm import Arm
 from armwright.spaces.base_support import supported_space
 from armwright.spaces.batch_builder import stack_designs
@@ -141,6 +143,7 @@ class Problem:
             object.__setattr__(self, "objectives", self._default_objectives())
         if self.evaluator is not None and self.tolerance > 0.0:
             raise SettingsError(f"expected a tolerance or an evaluator, got both ({self.evaluator.name})")
+        self._check_custom_parameters()
         for objective in self.objectives:
             if objective in ORIENTATION_QUANTITIES and not self.task.target_arrays.oriented:
                 raise SettingsError(
@@ -181,6 +184,20 @@ class Problem:
                     f'task {self.task.name}: resolution: "{name}" is not an objective of the task '
                     f"({', '.join(names)}).{did_you_mean(name, names, RENAMED)}"
                 )
+
+    def _check_custom_parameters(self) -> None:
+        """Raise SettingsError for custom parameters that no evaluator reads, or that are named like a quantity."""
+        names = [name for name, _ in self.space.custom]
+        for name in names:
+            if name in QUANTITIES or name in {objective.name for objective in self.objectives}:
+                raise SettingsError(
+                    f'space {self.space.name}: parameters: "{name}" is the name of a quantity; try "my_{name}"'
+                )
+        if names and self.evaluator is not None and not self.evaluator.takes_design:
+            raise SettingsError(
+                f"{self.evaluator.name}: expected a function (arm, task, design), since the space has the parameters "
+                f"{', '.join(names)}, got one without design"
+            )
 
     @property
     def reference_point(self) -> tuple[float, ...] | None:
@@ -240,15 +257,7 @@ class Problem:
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
         """Return the targets and surroundings of each case of the task."""
-        task = self.task
-        scenes: list[Scene] = []
-        for points, payloads in task.cases:
-            plan = task.plan(points) if task.cycle else None
-            held = payloads if plan is None else payloads * plan.holds_payload(len(points))
-            scenes.append(
-                Scene(points, held, task.target_arrays, task.obstacles, plan, task.workspace, task.load_shape)
-            )
-        return tuple(scenes)
+        return scenes_of(self.task)
 
     def outcomes(self, evaluation: Evaluation, measured: Mapping[str, Array] = NO_MEASUREMENTS) -> Outcomes:
         """Return objectives and violations of evaluated arms.
@@ -311,7 +320,7 @@ class Problem:
         table = np.empty((len(designs), len(self.evaluator.objectives)))
         for row, design in enumerate(designs):
             try:
-                table[row] = self.evaluator(self.arm(design), self.task)
+                table[row] = self.evaluator(self.arm(design), self.task, design)
             except EvaluatorError as fault:
                 if self.evaluator.worst is None:
                     raise

@@ -14,6 +14,7 @@ from typing import Any
 
 from armwright.exceptions import ModelError, StoppedError
 from armwright.pareto import FrontTracker
+from armwright.problem.checks.custom_parameters import refuse_unread_parameters
 from armwright.problem.checks.instant import check_instantly, stop_if_proven
 from armwright.problem.problem import Outcome, Problem
 from armwright.proposers.proposer import Proposer
@@ -95,6 +96,7 @@ def optimize(
     proposer = check_proposer(proposer)
     method = study_method(proposer, sampler, n_init, n_step, n_total, in_flight, refine_every, initial_designs)
     check_settings(problem, method, workers, on_model_failure)
+    refuse_unread_parameters(problem)
     stop_if_proven(check_instantly(problem))
     config = run_config(problem, method, seed)
     with ExitStack() as stack:
