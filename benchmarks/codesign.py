@@ -1,17 +1,17 @@
 """What searching arm and controller together is worth, at equal numbers of simulations.
 
-    python benchmarks/codesign.py --file codesign.jsonl [--seeds 10] [--budgets 60 200]
+    python benchmarks/codesign.py --file codesign.jsonl [--seeds 10] [--budgets 60 200] [--sampler tpe]
     python benchmarks/codesign.py --file codesign.jsonl --resimulate
 
 The evaluator is examples/design_and_control.py. Methods:
 
-- together: TPE over arm, gears and controller;
-- design first: the front of cycle time and thermal utilisation by our own physics, with bare drives, then TPE over
-  gears and controller of three arms of it, from the fastest to the coolest, with a third of the simulations each;
+- together: the sampler over arm, gears and controller;
+- design first: the front of cycle time and thermal utilisation by our own physics, with bare drives, then the sampler
+  over gears and controller of three arms of it, from the fastest to the coolest, with a third of the simulations each;
 - random: uniform over arm, gears and controller.
 
 The figure is the hypervolume of the feasible designs within REFERENCE. Each finished run is one line of the file; runs
-that it holds are not repeated. Paired Wilcoxon tests over the seeds, corrected by Holm.
+that it holds are not repeated, so a file is for one sampler. Paired Wilcoxon tests over the seeds, corrected by Holm.
 
 With --resimulate, the designs of all fronts are simulated again by the forward dynamics of Pinocchio with the same
 controller; the second engine integrates with another scheme and another model of friction.
@@ -42,7 +42,7 @@ import design_and_control as example  # noqa: E402
 
 METHODS = ("together", "design first", "random")
 REFERENCE = (2.0, 400.0, 50.0)  # s, J, mm
-N_RANDOM = 10  # trials before TPE
+N_RANDOM = 10  # trials before the sampler
 ARMS = 3  # of the method that designs first
 FIRST_EVALUATIONS = 4000  # by our physics
 SUBSTEPS = 20  # of Pinocchio in a period of the controller
@@ -56,6 +56,7 @@ class Cell:
     method: str
     budget: int
     seed: int
+    sampler: str
 
 
 def problem_in(space: aw.DesignSpace) -> aw.Problem:
@@ -72,7 +73,7 @@ def run(cell: Cell) -> list[aw.FinishedTrial]:
     """The trials of a run."""
     if cell.method == "design first":
         return [trial for study in after_design(cell) for trial in study]
-    sampler = "random" if cell.method == "random" else "tpe"
+    sampler = "random" if cell.method == "random" else cell.sampler
     return searched(whole_space(), cell.budget, cell.seed, sampler)
 
 
@@ -94,7 +95,7 @@ def after_design(cell: Cell) -> Iterator[list[aw.FinishedTrial]]:
         fixed = {**dict(space.restrict), **member.design.params}
         space_of_arm = space.model_copy(update={"restrict": tuple(fixed.items())})
         budget = cell.budget // ARMS + (number < cell.budget % ARMS)
-        yield searched(space_of_arm, budget, ARMS * cell.seed + number, "tpe")
+        yield searched(space_of_arm, budget, ARMS * cell.seed + number, cell.sampler)
 
 
 def record(cell: Cell) -> dict[str, Any]:
@@ -220,6 +221,7 @@ def main() -> None:
     parser.add_argument("--file", type=Path, required=True)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--budgets", type=int, nargs="+", default=[60, 200])
+    parser.add_argument("--sampler", default="tpe")
     parser.add_argument("--resimulate", action="store_true")
     parser.add_argument("--most", type=int, default=200, help="designs to simulate again")
     options = parser.parse_args()
@@ -230,7 +232,7 @@ def main() -> None:
     for seed, budget, method in itertools.product(range(options.seeds), options.budgets, METHODS):
         if (method, budget, seed) not in done:
             with options.file.open("a") as file:
-                file.write(json.dumps(record(Cell(method, budget, seed))) + "\n")
+                file.write(json.dumps(record(Cell(method, budget, seed, options.sampler))) + "\n")
     summarize(options.file)
 
 

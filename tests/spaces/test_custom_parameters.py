@@ -236,7 +236,7 @@ def test_searches_without_evaluator_refuse_custom_parameters() -> None:
         ):
             search(problem)
     assert [str(finding) for finding in check_instantly(problem)] == [
-        "parameters gear, kp, cells, belt: only an evaluator reads them; try --evaluator (suspected)"
+        "parameters gear, kp, cells, belt: only an evaluator reads them; try armwright optimize --evaluator (suspected)"
     ]
 
 

@@ -10,7 +10,12 @@ def check_custom_parameters(problem: Problem) -> list[Finding]:
     names = _unread(problem)
     if not names:
         return []
-    return [Finding(f"parameters {', '.join(names)}: only an evaluator reads them; try --evaluator", SUSPECTED)]
+    return [
+        Finding(
+            f"parameters {', '.join(names)}: only an evaluator reads them; try armwright optimize --evaluator",
+            SUSPECTED,
+        )
+    ]
 
 
 def refuse_unread_parameters(problem: Problem) -> None:
