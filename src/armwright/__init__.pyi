@@ -30,7 +30,7 @@ from .proposers.replay import ReplayProposer as ReplayProposer
 from .proposers.rules import RulesProposer as RulesProposer
 from .report.figures import write_figures as write_figures
 from .report.page import write_report as write_report
-from .robot.arm import Actuator as Actuator, Arm as Arm, Joint as Joint, Link as Link, uniform_link as uniform_link
+from .robot.arm import Arm as Arm, Joint as Joint, Link as Link, uniform_link as uniform_link
 from .robot.mjcf import to_mjcf as to_mjcf
 from .robot.ros2_control import to_ros2_control as to_ros2_control
 from .robot.sdf import to_sdf as to_sdf
